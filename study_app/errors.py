@@ -6,11 +6,12 @@
     ├── ProtocolError          a protocol or scene file that cannot be used; lists every problem
     ├── DeviceError            what the participant feels with
     │   ├── DeviceNotFound     asked for, but not there or not known
-    │   └── DeviceLost         was there, and stopped answering
+    │   └── DeviceLost         was there, and stopped responding
     ├── ServoFault             the servo stopped itself; the force is zero
     ├── SessionError           an event that the session cannot take in its present state
     ├── StoreError             results that cannot be written or read
     ├── AnalysisError          results that cannot be evaluated
+    ├── WorkerError            a process that computes for this program ended unexpectedly
     └── DisplayError           no screen to open a window on
 """
 
@@ -62,7 +63,7 @@ class DeviceNotFound(DeviceError):
 
 
 class DeviceLost(DeviceError):
-    """The device stopped answering while in use."""
+    """The device stopped responding while in use."""
 
 
 class ServoFault(StudyError):
@@ -79,6 +80,10 @@ class StoreError(StudyError):
 
 class AnalysisError(StudyError):
     """Results cannot be evaluated."""
+
+
+class WorkerError(StudyError):
+    """A process that computes for this program ended unexpectedly."""
 
 
 class DisplayError(StudyError):

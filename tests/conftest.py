@@ -1,5 +1,6 @@
-"""What all tests share: no screen, no Qt where its libraries are missing, and no warning that nobody expected."""
+"""What all tests share: no screen, no Qt where its libraries are missing, and no warning that no test expects."""
 
+import gc
 import itertools
 import logging
 import os
@@ -33,6 +34,22 @@ def pytest_plugin_registered(plugin: object, manager: pytest.PytestPluginManager
     """Without Qt the plugin that tests it cannot start, and must not keep the other tests from running."""
     if not QT_IS_HERE and manager.get_name(plugin) == "pytest-qt":
         manager.unregister(plugin)
+
+
+def pytest_sessionstart() -> None:
+    """Collect garbage between tests alone: a thread that collected would destroy widgets whose timers then crash Qt."""
+    if QT_IS_HERE:
+        gc.disable()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown() -> None:
+    """Collect what is due; what a full collection leaves, mostly modules, is not looked at again."""
+    if QT_IS_HERE:
+        from study_app.app.session.garbage_collection import collect_if_due
+
+        if collect_if_due() == 2:
+            gc.freeze()
 
 
 _settings = itertools.count()

@@ -23,13 +23,14 @@ needs_display = pytest.mark.skipif(bool(MISSING), reason=f"not installed here: {
 
 
 @contextmanager
-def virtual_display(*more: str) -> Iterator[str]:
-    """A virtual X display that nobody else uses; ``more`` is said to its server.
+def virtual_display(*more: str, size: tuple[int, int] = (1920, 1080)) -> Iterator[str]:
+    """A virtual X display that nobody else uses, of a size [px]; ``more`` is said to its server.
 
     It does not begin anew with every last client that goes: that would turn away one that is just coming.
     """
     read_end, write_end = os.pipe()
-    how = ("-screen", "0", "1920x1080x24", "-nolisten", "tcp", "-noreset", *more)
+    width, height = size
+    how = ("-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp", "-noreset", *more)
     words_of_xvfb = ["Xvfb", "-displayfd", str(write_end), *how]
     server = subprocess.Popen(
         words_of_xvfb, pass_fds=(write_end,), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
@@ -53,11 +54,15 @@ def wait_for(found: Callable[[], object], what: str, seconds: float = 60.0) -> N
 class Program:
     """The program as a person meets it: windows, keys, a mouse, and files that appear."""
 
-    def __init__(self, display: str, folder: Path) -> None:
+    def __init__(self, display: str, folder: Path, *arguments: str) -> None:
         self.folder = folder
         self.environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "study_app"], cwd=folder, env=self.environment, stderr=subprocess.PIPE, text=True
+            [sys.executable, "-m", "study_app", *arguments],
+            cwd=folder,
+            env=self.environment,
+            stderr=subprocess.PIPE,
+            text=True,
         )
 
     def close(self) -> None:

@@ -13,6 +13,8 @@ from study_app.store.exclusions import exclude
 from study_app.store.tables.column_dictionary import dictionary_markdown
 from tests.compiled import needs_servo
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parent.parent
 BEGIN = "<!-- dictionary: printed by python -m study_app.store.tables.column_dictionary -->\n\n"
 END = "\n<!-- end of dictionary -->\n"

@@ -33,6 +33,7 @@ GIVEN = [7, 1, 4, 6, 2, 3, 5, 7, 1]
 BY_CLICK = {1, 4, 8}
 
 pytestmark = [
+    pytest.mark.slow,
     needs_servo,
     pytest.mark.xvfb,
     pytest.mark.timeout(300),
@@ -124,11 +125,12 @@ def answer_nine_items(program: Program, felt: str, qtbot) -> None:
     plan.show_page(questionnaire())
     plan.show()
     qtbot.waitExposed(plan)
+    QApplication.processEvents()
     page = plan.widget
     assert isinstance(page, QuestionnaireWidget)
     for number, value in enumerate(GIVEN):
         if number in BY_CLICK:
-            program.click(felt, place_in(plan, page.rows[number].cells[value - 1]))
+            program.click(felt, place_in(plan, page.fields[number].options[value - 1]))
             program.wait_for_event("choice", number + 1)
             program.key(felt, "Tab")
         else:

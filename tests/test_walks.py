@@ -41,7 +41,7 @@ from tests.walking import ANSWERS, TRIALS, Pages, Person, Visitor, laid_out, pla
 SCREEN_PX = 1080
 CORRECTED = {2: 5}  # statement: first answer, of every page
 
-pytestmark = [needs_servo, pytest.mark.xvfb, pytest.mark.timeout(300), needs_display]
+pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.xvfb, pytest.mark.timeout(300), needs_display]
 
 
 @pytest.fixture
@@ -184,11 +184,11 @@ class ByMouse(Person):
         widget = self._shown(page)
         assert isinstance(widget, QuestionnaireWidget)
         cells: list[QWidget] = []
-        for row, value in zip(widget.rows, values, strict=True):
-            if row.item.number in CORRECTED:
-                first = CORRECTED[row.item.number] if CORRECTED[row.item.number] != value else value % 7 + 1
-                cells.append(row.cells[first - 1])
-            cells.append(row.cells[value - 1])
+        for row, value in zip(widget.fields, values, strict=True):
+            if row.view.number in CORRECTED:
+                first = CORRECTED[row.view.number] if CORRECTED[row.view.number] != value else value % 7 + 1
+                cells.append(row.options[first - 1])
+            cells.append(row.options[value - 1])
         self.click(self.window, *(place_in(self._plan, part) for part in (*cells, widget.button)))
 
     def leave_tank(self) -> None:

@@ -12,7 +12,7 @@ from study_app.cli.options import keep_offered_workspace
 from study_app.errors import StoreError
 from study_app.protocol.load import load as load_protocol
 from study_app.protocol.load import source_bytes
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import keep_workspace, load, recent_protocols, remember_protocol
 from study_app.user_folder import settings_file
 from study_app.viewmodels.home import sources, study_facts
@@ -91,9 +91,13 @@ def test_windows_show_the_same_sessions_and_suggest_the_same_id_from_two_start_f
 
 def begin_session(folder: Path, participant: str) -> None:
     begin(
-        folder, load_protocol("demo"), source_bytes("demo"), participant, seed=1, operator="AK", language="en",
-        device={"name": "mouse"}, screens={}, simulated=False,
-    ).close()  # fmt: skip
+        folder,
+        load_protocol("demo"),
+        source_bytes("demo"),
+        SessionStart(
+            participant, seed=1, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=False
+        ),
+    ).close()
 
 
 def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documents, tmp_path, monkeypatch, qtbot):

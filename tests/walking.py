@@ -26,14 +26,16 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Explore, Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.source.files import source_bytes
+from study_app.protocol.wording.without_force import without_force
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.transitions.commands import ShowPage
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, LanguageChosen, Submitted, TaskDone
 from study_app.session.transitions.state import FINAL
 from study_app.session.transitions.table import advance, open_session
+from study_app.store.progress import Progress
 from study_app.viewmodels.operator import OperatorView, Session, operator_view
 from study_app.viewmodels.servo_health import ServoHealth
-from study_app.viewmodels.session_stages import SessionProgress, stages
+from study_app.viewmodels.session.stages import stages
 from tests.real_windows import Program, wait_for
 
 SHORTER = {
@@ -135,7 +137,8 @@ class Pages:
         protocol = parse(SHORT.encode(), "rek2024")
         self.schedule = build_schedule(protocol, started["participant"], started["seed"])
         key = draw_key(protocol, stream(1, "key").random)  # codes are all that pages show
-        self._state = open_session(protocol, self.schedule, key, started["language"])
+        shown = without_force(protocol) if started["device"] == "mouse" else protocol
+        self._state = open_session(shown, self.schedule, key, started["language"])
         self.protocol: Protocol = protocol
         self.page: Page | None = None
         self.take(Begin(0.0))
@@ -159,19 +162,21 @@ class Pages:
 
     def ended_view(self) -> OperatorView:
         """Return what the operator sees in the end."""
-        progress = SessionProgress(self.protocol, self.schedule).after("session_started", 0.0, {})
+        ended = Progress()
+        ended.take({"event": "session_started", "t_s": 0.0})
+        ended.take({"event": "session_ended", "t_s": 1.0, "status": "completed"})
         session = Session(
             protocol=self.protocol,
+            schedule=self.schedule,
             stages=stages(self.protocol, self.schedule),
             who="",
             expected_s=1200.0,
             answers_of=ANSWERS,
             lateness_limit_s=0.002,
             device_name="",
-            device_kind="mouse",
+            device_icon="mouse",
             device_rows=(("Priority", "normal"),),
         )
-        ended = progress.after("session_ended", 1.0, {"status": "completed"})
         return operator_view(session, ended, ServoHealth(1000.0).vitals(), now_s=1.0, force_on=False)
 
 

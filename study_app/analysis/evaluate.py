@@ -3,29 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Final, TypeAlias
 
-from study_app.analysis.designs.block_tests import Asked, asked, sealed
-from study_app.analysis.designs.delays import delays_found
-from study_app.analysis.designs.liquids import liquids_found
-from study_app.analysis.findings.block_results import BlockFound, Results
-from study_app.analysis.findings.conduct import delivered, orders
-from study_app.analysis.findings.not_tested import NotTested
-from study_app.analysis.findings.section_failures import Ended, Failure, Failures
+from study_app.analysis.designs.block_tests import SEALED, Asked, asked, facts, untested
+from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.questions import questions_found, scores_found
+from study_app.analysis.findings import all_findings
+from study_app.analysis.results.block_results import BlockFound, Results
+from study_app.analysis.results.conduct import delivered, orders
+from study_app.analysis.results.not_tested import NotTested
+from study_app.analysis.results.section_failures import Ended, Failure, Failures
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.performance import Performance, performance
 from study_app.analysis.tables.study import Study
 
 Progress: TypeAlias = Callable[[str, float], object]
-"""Is told what is being done, and which share of all is done (0 to 1); what it raises ends the evaluation."""
+"""Receives what is being done, and which share of all is done (0 to 1); what it raises ends the evaluation."""
 
 SEED: Final = 1
 """Of all random rearrangements and resamples: the same results give the same numbers."""
 
 
 def silent(_what: str, _share: float) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 def evaluate(study: Study, *, seed: int = SEED, progress: Progress = silent, planning: bool = True) -> Results:
@@ -35,6 +37,18 @@ def evaluate(study: Study, *, seed: int = SEED, progress: Progress = silent, pla
     what so few participants could not show. A part that fails is in ``Results.failures`` and, with the reason, in its
     block's ``absent``; everything else is there. ``planning``: whether to
     compute how many participants each comparison would need, which is most of the work.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from study_app.analysis.findings.settings_differ import FINDING
+    >>> from study_app.analysis.tables.study import load_study
+    >>> results = evaluate(load_study(Path("results/sample-rek2024")), planning=False)
+    >>> [(block.id, block.n, block.revealed) for block in results.blocks]
+    [('liquids', 12, False), ('delays', 12, False)]
+    >>> tested = FINDING.of(results.blocks[0])[0]
+    >>> print(f"{tested.item}: p = {tested.outcome.p:.2f}, W = {tested.outcome.effect:.2f}")
+    feels_liquid: p = 0.78, W = 0.03
     """
     failures = Failures()
     try:
@@ -58,9 +72,12 @@ def _evaluated(study: Study, seed: int, failures: Failures, progress: Progress, 
         found = failures.attempt(
             "all tests", partial(_block, study, block, seed, each, failures, planning=planning), block=block.id
         )
-        blocks.append(_without_tests(block, found) if isinstance(found, Failure) else found)
+        blocks.append(untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found)
     shown = failures.attempt("the delays as they were shown", lambda: delivered(study))
     run = failures.attempt("the orders as run", lambda: orders(study))
+    asked_ = failures.attempt("the answers to other questions", lambda: questions_found(study))
+    scores = failures.attempt("scores of questionnaires", lambda: scores_found(study))
+    levels = failures.attempt("the answers at each level", lambda: levels_found(study))
     moved = failures.attempt("motion and force", lambda: _performance(study, progress))
     return Results(
         decided=study.decided,
@@ -71,6 +88,9 @@ def _evaluated(study: Study, seed: int, failures: Failures, progress: Progress, 
         performance=None if isinstance(moved, Failure) else moved,
         seed=seed,
         failures=tuple(failures.found),
+        questions=() if isinstance(asked_, Failure) else asked_,
+        scores=() if isinstance(scores, Failure) else scores,
+        levels=() if isinstance(levels, Failure) else levels,
     )
 
 
@@ -81,30 +101,32 @@ def _testing(progress: Progress, share: float, what: str) -> None:
 def _block(
     study: Study, block: Block, seed: int, each: Callable[[str], object], failures: Failures, *, planning: bool
 ) -> BlockFound:
-    answers = asked(study, block, seed, each, failures, planning=planning)
-    return found_in(study, answers) if block.revealed else sealed(study, answers)
+    return found_in(study, asked(study, block, seed, each, failures, planning=planning))
 
 
 def found_in(study: Study | None, answers: Asked) -> BlockFound:
-    """Test everything that a block's answers can answer, its settings being known; without a study no measures."""
-    return delays_found(study, answers) if answers.block.kind == "delays" else liquids_found(study, answers)
-
-
-def _without_tests(block: Block, failure: Failure) -> BlockFound:
-    """Return a block of which nothing could be computed."""
-    return BlockFound(
-        id=block.id,
-        title=block.title,
-        kind=block.kind,
-        revealed=block.revealed,
-        n=0,
-        settings=block.settings,
-        names=tuple(block.name(setting) for setting in block.settings),
-        items=block.items,
-        labels=block.labels,
-        measures=(),
-        absent=(NotTested(failure.what, failure.why),),
-    )
+    """Test everything that a block's answers can answer; without a study no measures."""
+    block = answers.block
+    found = facts(study, answers)
+    settings: list[NotTested] = []
+    not_tested: list[NotTested] = []
+    for finding in all_findings():
+        if finding.tests is None:
+            continue
+        if block.kind not in (finding.kinds if block.revealed else finding.sealed):
+            if not block.revealed and block.kind in finding.waits:
+                not_tested.append(NotTested(finding.what, SEALED))
+            continue
+        (value, absent), failed = answers.attempt(
+            finding.what, partial(finding.tests, answers, found), (finding.empty, ())
+        )
+        found = finding.add_to(found, value)
+        if finding.about == "sessions":
+            found = replace(found, absent=(*found.absent, *absent, *failed))
+        else:
+            settings += failed
+            not_tested += absent
+    return replace(found, absent=(*found.absent, *settings, *not_tested))
 
 
 def _performance(study: Study, progress: Progress) -> Performance | None:

@@ -1,4 +1,4 @@
-"""What the analyst's process does with an order; what it finds it tells piece by piece, the quickest first."""
+"""What the worker process for studies does with an order; it answers piece by piece, the quickest first."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from study_app.analysis.worker_messages import (
     Progress,
     ReadStudy,
     SessionsFound,
-    Stopped,
     StudiesFound,
     StudyAt,
     StudyFound,
@@ -34,6 +33,7 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude, exclusions, include
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.participants import participants
+from study_app.workers.messages import Stopped
 
 if TYPE_CHECKING:
     from study_app.analysis.tables.compared_blocks import Block
@@ -43,11 +43,6 @@ if TYPE_CHECKING:
 
 Tell: TypeAlias = Callable[[Answer], object]
 
-TITLES: Final = {
-    "recognition": "What each liquid was named",
-    "movement": "Reaching over added delay",
-    "threshold": "When a delay is noticed",
-}
 EVALUATION: Final = 0.7
 """The share of an evaluation in what comes after the first figures; the rest is drawing."""
 
@@ -125,12 +120,26 @@ def _read(folder: Path, tell: Tell, stop: Callable[[], bool]) -> None:
         else:
             tell(FigureDrawn(_name(study, block), captions.title(block), "No completed session has answers here yet."))
         _go_on(stop)
+    _draw_questions(study, tell, stop)
     if study.revealed and study.n:
         _evaluate(study, tell, stop)
 
 
+def _draw_questions(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
+    """Draw the figures of questions that no block of statements holds."""
+    from study_app.analysis.designs.questions import questions_found  # noqa: PLC0415
+    from study_app.analysis.figures.question_figures import question_pictures  # noqa: PLC0415
+
+    found = questions_found(study)
+    titles = {(one.where, one.item): f"{one.title}: {one.short}" for one in found}
+    for picture in question_pictures(study, found, ("svg",)):
+        title = titles[picture.block, picture.name.removeprefix(f"question-{picture.block}-")]
+        tell(FigureDrawn(picture.name, title, picture.caption, picture.files["svg"]))
+        _go_on(stop)
+
+
 def _study_found(study: Study) -> StudyFound:
-    from study_app.analysis import style  # noqa: PLC0415
+    from study_app import figure_style as style  # noqa: PLC0415
 
     trials: dict[tuple[str, int], dict[int, str]] = {}
     main = study.trials[study.trials["phase"] == "main"]
@@ -144,7 +153,7 @@ def _study_found(study: Study) -> StudyFound:
         name=study.name,
         title=study.title,
         n=study.n,
-        blocks=len(study.blocks),
+        blocks=len(study.blocks) or len(study.others.questions),
         revealed=study.revealed,
         trials={session: tuple(sorted(held.items())) for session, held in trials.items()},
         doubts=tuple(map(str, study.doubts)),
@@ -184,9 +193,11 @@ def _evaluate(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
 
 def _title(study: Study, name: str) -> str:
     from study_app.analysis.figures import captions  # noqa: PLC0415
+    from study_app.analysis.findings import all_findings  # noqa: PLC0415
 
-    blocks = {_name(study, block): captions.title(block) for block in study.blocks}
-    return blocks.get(name) or TITLES.get(name.partition("-")[0], name.capitalize())
+    titles = {_name(study, block): captions.title(block) for block in study.blocks}
+    titles |= {one.figure.name: one.figure.title for one in all_findings() if one.figure is not None}
+    return titles.get(name) or titles.get(name.partition("-")[0], name.capitalize())
 
 
 def _name(study: Study, block: Block) -> str:

@@ -1,4 +1,4 @@
-"""What the analyst's process is asked, and what it tells: orders and answers, as frozen values."""
+"""Orders to the worker process that reads and evaluates studies, and its answers, as frozen values."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from study_app.errors import StudyError
 from study_app.store.exclusions import Exclusion
 
 
 @dataclass(frozen=True, slots=True)
 class FindStudies:
-    """Look which studies there are; told as `StudiesFound`."""
+    """Find the studies; answered by `StudiesFound`."""
 
     results: Path
 
 
 @dataclass(frozen=True, slots=True)
 class ReadStudy:
-    """Read a study and draw its figures; told as `SessionsFound`, `StudyFound`, `FigureDrawn`, and what is going on."""
+    """Read a study and draw its figures; answered by `SessionsFound`, `StudyFound`, `FigureDrawn` and progress."""
 
     folder: Path
 
@@ -149,16 +148,4 @@ class Done:
     warnings: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Refused:
-    """An order could not be carried out, and why; nothing was half-done. ``stopped`` where that was asked for."""
-
-    sentence: str
-    stopped: bool = False
-
-
-Answer: TypeAlias = StudiesFound | SessionsFound | StudyFound | FigureDrawn | Progress | Done | Refused
-
-
-class Stopped(StudyError):
-    """An order was given up because that was asked for, or another order came."""
+Answer: TypeAlias = StudiesFound | SessionsFound | StudyFound | FigureDrawn | Progress | Done

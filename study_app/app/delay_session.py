@@ -20,7 +20,7 @@ from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.termination import ended_from_outside
 from study_app.app.session.windows import open_windows
-from study_app.devices.rig import open_rig
+from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here
 from study_app.gui.display.opengl import WITHOUT_OPENGL
@@ -108,7 +108,7 @@ def delays(seconds: float, load: LoadName, *, tell: Callable[[str], object] = la
 
     Parameters
     ----------
-    load : beside the participant's window alone the same again with "gui": the operator's window plotting, "gui+cpu":
+    load : besides the participant's window alone the same again with "gui": the operator's window plotting, "gui+cpu":
         and a busy process on every core; "none": no more
 
     Raises
@@ -128,10 +128,10 @@ def delays(seconds: float, load: LoadName, *, tell: Callable[[str], object] = la
     shown: list[Shown] = []
     with collecting_here():
         for refresh_hz in rates:
-            for beside in loads:
-                with tempfile.TemporaryDirectory() as folder, busy_cores() if beside == "gui+cpu" else nullcontext():
-                    shown.extend(_Showing(Path(folder), seconds, refresh_hz, beside).hold())
-                tell(f"{shown[-1].screen}, {BESIDE[beside]}")
+            for each in loads:
+                with tempfile.TemporaryDirectory() as folder, busy_cores() if each == "gui+cpu" else nullcontext():
+                    shown.extend(_Showing(Path(folder), seconds, refresh_hz, each).hold())
+                tell(f"{shown[-1].screen}, {BESIDE[each]}")
     return Delayed(machine_here(), seconds, SIZE_PX, tuple(shown))
 
 
@@ -160,7 +160,7 @@ class _Showing:
 
     def hold(self) -> tuple[Shown, ...]:
         """Hold the session and return what was shown in it."""
-        machine = open_rig(self._chosen.device, self._protocol, random=self._chosen.tremor())
+        machine = open_rig(self._chosen.device, study_settings(self._protocol, self._chosen.tremor()))
         schedule = build_schedule(self._protocol, self._chosen.participant, self._chosen.seed)
         try:
             with open_store(self._chosen, self._protocol, self._source, machine, {}) as store:

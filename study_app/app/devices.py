@@ -1,4 +1,4 @@
-"""The devices: where their place, a look at the machine in a thread, and a Falcon's diagnosis meet."""
+"""The devices: where their place, a look at the machine in a thread, and a diagnosis meet."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.workstation import WorkstationController
-from study_app.devices.backends import Backend, backends
-from study_app.devices.registry import kind_of
+from study_app.devices.backends import backends
+from study_app.devices.descriptor import Backend
+from study_app.devices.registry import descriptor_of
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.theme.theme import Theme
@@ -19,8 +20,8 @@ from study_app.viewmodels.device_list import DeviceShown, device_named, devices_
 
 PATIENCE_S = 5.0
 HELD = (
-    "This session holds the device, so that it cannot be claimed a second time: that is to be expected. To have "
-    "everything looked at, end the session first; it can go on later."
+    "This session uses the device, so some checks cannot run. For a full diagnosis, end the session first; you can "
+    "resume it later."
 )
 
 
@@ -43,8 +44,8 @@ class DevicesController(QObject):
 
     def __init__(self, desk: WorkstationController, look: Callable[[], Sequence[Backend]] = backends) -> None:
         super().__init__()
-        self._desk, self._look = desk, look
-        self._thread: threading.Thread | None = None
+        self._desk, self.backends = desk, look
+        self.looking: threading.Thread | None = None
         self._ended = False
         self.shown: tuple[DeviceShown, ...] = ()
         self.place: DevicesPlace | None = None
@@ -62,29 +63,29 @@ class DevicesController(QObject):
         place = self.place = DevicesPlace()
         place.look_asked.connect(self.look)
         place.chosen.connect(lambda name: self._desk.change({"device": name}))
-        place.firmware_chosen.connect(lambda path: self._desk.change({"firmware": path}))
+        place.option_chosen.connect(lambda name, path: self._desk.change({name: path}))
         place.diagnose_asked.connect(self.diagnose)
         place.left.connect(self.end_diagnosis)
         self._show()
         return place
 
     def look(self) -> None:
-        """Look at the machine, beside the windows."""
-        if self._thread is not None or self._ended:
+        """Look at the machine, in the background."""
+        if self.looking is not None or self._ended:
             return
         if self.place is not None:
             self.place.show_looking(True)
-        self._thread = threading.Thread(target=self._see, name="looking for devices", daemon=True)
-        self._thread.start()
+        self.looking = threading.Thread(target=self._see, name="looking for devices", daemon=True)
+        self.looking.start()
 
-    def end(self) -> None:
+    def end(self, patience_s: float = PATIENCE_S) -> None:
         """Look no more, wait for a look that is under way, and show nothing of it: the windows go."""
         self._ended = True
-        if self._thread is not None:
-            self._thread.join(PATIENCE_S)
+        if self.looking is not None:
+            self.looking.join(min(patience_s, PATIENCE_S))
 
     def diagnose(self, name: str) -> None:
-        """Open the diagnosis of a Falcon; a serial number that is preferred is taken along."""
+        """Open the diagnosis of a device; a serial number that is preferred is taken along."""
         settings = self._desk.settings
         asked = settings.device if settings.device.partition(":")[0] == name else name
         assert self.place is not None  # noqa: S101 - it has just asked
@@ -103,19 +104,19 @@ class DevicesController(QObject):
 
     def _see(self) -> None:
         try:
-            made: object = devices_shown(self._look())
-        except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
+            made: object = devices_shown(self.backends())
+        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
         self._done.emit(made)
 
     def _end(self, made: object) -> None:
-        self._thread = None
+        self.looking = None
         if self._ended:
             return
         if self.place is not None:
             self.place.show_looking(False)
         if isinstance(made, Exception):
-            self.troubled.emit("This machine could not be looked at", f"{made}.")
+            self.troubled.emit("This machine could not be examined", f"{made}.")
             return
         assert isinstance(made, tuple)  # noqa: S101 - what _see makes
         self.shown = made
@@ -125,15 +126,15 @@ class DevicesController(QObject):
     def _show(self) -> None:
         if self.place is not None:
             self.place.show_devices(self.shown, self._desk.settings.device)
-            self.place.show_firmware(self._desk.settings.firmware)
+            self.place.show_options(self._desk.settings.device_options)
 
 
 def diagnosis(
     parent: QWidget, theme: Theme, name: str, settings: MachineSettings, *, held: bool = False
 ) -> DiagnosisDialog:
-    """Return the diagnosis of a Falcon, begun; ``held`` where a session has it open."""
-    firmware = settings.firmware_file if kind_of(name) == "falcon" else None
-    made = DiagnosisDialog(parent, theme, name, firmware=firmware, note=HELD if held else "")
+    """Return the diagnosis of a device, begun; ``held`` where a session has it open."""
+    options = descriptor_of(name).window_values(settings.device_options)
+    made = DiagnosisDialog(parent, theme, name, options=options, note=HELD if held else "")
     made.finished.connect(made.deleteLater)
     if settings.sound:
         made.over.connect(lambda _well: QApplication.beep())

@@ -4,41 +4,35 @@ from __future__ import annotations
 
 from study_app.devices.registry import list_devices
 from study_app.evaluation.appraisal import Costs, Errors
-from study_app.gui.home.device_options import DEVICE_LABELS
-from study_app.lab.parameters import EFFECT_WORDS
-from study_app.viewmodels.device_list import TITLES
+from study_app.haptics.model.effects import NAMED
+from study_app.viewmodels.device_list import device_label
 from study_app.viewmodels.lab import CostRow, ErrorRow
 
 SMALLEST_N = 0.001
 
 
 def cost_rows(costs: Costs) -> tuple[CostRow, ...]:
-    """Return what each part of a tick takes, the dearest first, then what is not there, and why."""
-    there = [CostRow(EFFECT_WORDS[it.effect], it.ns) for it in costs.effects if it.ns is not None]
+    """Return what each part of a tick takes, the most expensive first, then what is not there, and why."""
+    there = [CostRow(NAMED[it.effect].label, it.ns) for it in costs.effects if it.ns is not None]
     there.append(CostRow("Servo alone", costs.rest_ns))
-    absent = (CostRow(EFFECT_WORDS[it.effect], None, it.why) for it in costs.effects if it.ns is None)
+    absent = (CostRow(NAMED[it.effect].label, None, it.why) for it in costs.effects if it.ns is None)
     return (*sorted(there, key=lambda row: -(row.ns or 0.0)), *absent)
 
 
 def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
     """Return how far a setting is from the definition."""
-    without = ", ".join(EFFECT_WORDS[it].lower() for it in errors.left_out)
+    without = ", ".join(NAMED[it].label.lower() for it in errors.left_out)
     note = f"of drag and wake; no reference for {without}" if without else "along programmed paths"
     return (
         ErrorRow("Wake, of Σ|e|/S", "no wake" if errors.wake is None else _tiny(errors.wake), note),
         ErrorRow("Force, largest", "no drag" if errors.force_n is None else _newtons(errors.force_n), note),
-        ErrorRow("Lag of the velocity filter", f"{1e3 * errors.lag_s:.1f} ms", "while the speed grows evenly"),
+        ErrorRow("Lag of the velocity filter", f"{1e3 * errors.lag_s:z.1f} ms", "at constant acceleration"),
     )
 
 
 def device_choices() -> tuple[tuple[str, str], ...]:
     """Return every device's name, and the words to choose it by."""
-    return tuple((name, DEVICE_LABELS.get(name, name)) for name in list_devices())
-
-
-def title_of(device: str) -> str:
-    """Return what a device is called."""
-    return TITLES.get(device, device)
+    return tuple((name, device_label(name)) for name in list_devices())
 
 
 def _tiny(share: float) -> str:

@@ -9,8 +9,8 @@ from PySide6.QtCore import QEventLoop, QObject, QTimer
 
 from study_app.app.devices import DevicesController
 from study_app.app.session.garbage_collection import collecting_here
-from study_app.app.session.live_session import BUG, LiveSession
-from study_app.app.session.termination import ended_from_outside
+from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
+from study_app.app.session.termination import BY_SIGNAL_S, Patience, ended_from_outside
 from study_app.app.workstation import WorkstationController, theme_named
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
@@ -55,7 +55,8 @@ def home(results: Path | None = None) -> int:
 
 def _prepare_lab() -> InitialSettings:
     """Load the lab's modules and its initial settings."""
-    import study_app.app.lab.controller  # noqa: F401, PLC0415 - loads pyqtgraph here, not in the window's thread
+    import study_app.app.lab.controller  # noqa: PLC0415 - loads pyqtgraph here, not in the window's thread
+    import study_app.lab.live  # noqa: F401, PLC0415 - and the compiler
     from study_app.app.lab.initial_settings import prepare_initial_settings  # noqa: PLC0415
 
     return prepare_initial_settings()
@@ -104,7 +105,7 @@ class MainController(QObject):
         place(self.window, self.window.screen(), corner=False)
         self.window.show()
         if self.machine.trouble:
-            self.window.tell("This machine's settings are the defaults", f"{self.machine.trouble}.")
+            self.window.tell("The default settings are used", f"{self.machine.trouble}.")
         elif self._follows_machine and chosen_workspace() is None:
             self._ask_for_workspace()
         QTimer.singleShot(LOOK_AFTER_MS, self.devices, self.devices.look)
@@ -121,7 +122,7 @@ class MainController(QObject):
         try:
             create_workspace(Workspace(folder.absolute()))
         except StoreError as error:
-            self.window.tell("This folder cannot be the workspace", f"{error}.")
+            self.window.tell("This folder cannot be used as the workspace", f"{error}.")
             return
         self.machine.change({"workspace": str(folder.absolute())})
 
@@ -170,7 +171,7 @@ class MainController(QObject):
         return self.desk.place
 
     def _prepare_lab(self) -> bool:
-        """Load the lab beside the windows, from when home stands; return whether that is done."""
+        """Load the lab in the background, from when home stands; return whether that is done."""
         if self._lab_first is None and not self._preparing.busy:
             self._preparing.run(_prepare_lab)
         return self._lab_first is not None
@@ -185,18 +186,22 @@ class MainController(QObject):
 
         made = LabPlace()
         settings = self.machine.settings
-        self.lab = compose_lab(made, device=settings.device, firmware=settings.firmware_file, first=self._lab_first)
+        self.lab = compose_lab(made, device=settings.device, options=settings.device_options, first=self._lab_first)
         return made
 
     def end(self) -> None:
-        """Let go of what the places hold, and wait for what is under way in other threads: a device may be opening."""
+        """Let go of what the places hold, and wait for what is under way in other threads: a device may be opening.
+
+        After a signal the program waits for 2 s at most; a device that is still being opened then gets no force.
+        """
+        patience = Patience(BY_SIGNAL_S if self.code else OPENING_PATIENCE_S)
         if self._home_place is not None:
             self._home_place.end()
         if self.lab is not None:
-            self.lab.end()
-        self.devices.end()
+            self.lab.end(patience)
+        self.devices.end(patience.left_s)
         for live in self._called_off:
-            live.wait()
+            live.wait(patience.left_s)
 
     def end_by_signal(self, number: int) -> None:
         """End because the program is being ended from outside."""
@@ -226,10 +231,10 @@ class MainController(QObject):
             self.machine.change({"theme": live.theme.name})
         self.window.come_back()
         if live.error is not None:
-            title = "The session did not go to its end" if live.began else "The session was not begun"
+            title = "The session did not finish" if live.began else "The session did not start"
             self.window.tell(title, f"{live.error}.")
         elif live.code == BUG:
-            self.window.tell("The session was stopped by a mistake in the program", "The terminal shows where.")
+            self.window.tell("A bug in the program stopped the session", "The terminal shows the details.")
 
     def _leave(self) -> None:
         if self.live is None:

@@ -15,7 +15,7 @@ from typing import Any, Final, TypeAlias
 
 from PySide6.QtCore import QObject, QTimer
 
-from study_app.analysis.analyst import AnalysisClient
+from study_app.analysis.worker_client import AnalysisClient, start_analysis_worker
 from study_app.analysis.worker_messages import (
     Answer,
     Done,
@@ -26,7 +26,6 @@ from study_app.analysis.worker_messages import (
     Order,
     Progress,
     ReadStudy,
-    Refused,
     SessionsFound,
     StudiesFound,
     StudyFound,
@@ -40,19 +39,20 @@ from study_app.gui.results.view import ResultsPlace
 from study_app.store.folders import StudyFolder
 from study_app.viewmodels.results import FigureShown, Going, ResultsView, StudyChoice, Trouble
 from study_app.viewmodels.sessions import session_facts
+from study_app.workers.messages import Crashed, Refused
 
 LISTEN_MS: Final = 40
 PATIENCE_S: Final = 0.3
 """What takes longer than this says that it goes on."""
 NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install pyreadstat"
 MISTAKE: Final = Trouble(
-    "The evaluation was ended by a mistake in the program", "The terminal shows where.", "Look again", "again"
+    "A bug in the program stopped the evaluation", "The terminal shows the details.", "Refresh", "again"
 )
 
 Decided: TypeAlias = LeaveOut | TakeBack | OpenKey
 REFUSALS: Final = {
-    LeaveOut: "It was not left out",
-    TakeBack: "It is still left out",
+    LeaveOut: "It was not excluded",
+    TakeBack: "It is still excluded",
     OpenKey: "The study is still blinded",
 }
 
@@ -66,8 +66,8 @@ class ResultsController(QObject):
         Folder that holds the studies' folders; it need not exist.
     opener
         What opens a file or folder for the operator.
-    analyst
-        What begins a process that reads and evaluates.
+    start_worker
+        Starts a process that reads and evaluates.
     """
 
     def __init__(
@@ -75,16 +75,16 @@ class ResultsController(QObject):
         results: Path,
         *,
         opener: Callable[[Path], object] = open_here,
-        analyst: Callable[[], AnalysisClient] = AnalysisClient,
+        start_worker: Callable[[], AnalysisClient] = start_analysis_worker,
     ) -> None:
         super().__init__()
-        self._analyst = analyst
+        self._start_worker = start_worker
         self.results = results
         no_sav = "" if importlib.util.find_spec("pyreadstat") else NO_SAV
         self.place = ResultsPlace(handed_to=results.resolve().parent, no_sav=no_sav)
         self.view = ResultsView()
         self._opener = opener
-        self._reader: AnalysisClient | None = None
+        self.reader: AnalysisClient | None = None
         self._writer: AnalysisClient | None = None
         self._orders: dict[int, Order] = {}
         self._since_s = 0.0
@@ -103,13 +103,13 @@ class ResultsController(QObject):
         place.left.connect(self.close)
         place.study_asked.connect(self._choose)
         place.remedy_asked.connect(self._mend)
-        place.leave_out_asked.connect(self._leave_out)
-        place.take_back_asked.connect(self._take_back)
-        place.unblind_asked.connect(self._unblind)
-        place.tables_asked.connect(self._write_tables)
-        place.report_asked.connect(self._write_report)
+        place.leave_out_asked.connect(lambda asked: self._decide("leaving out", LeaveOut, *asked))
+        place.take_back_asked.connect(lambda asked: self._decide("taking the exclusion back", TakeBack, *asked))
+        place.unblind_asked.connect(lambda by, reason: self._decide("opening the key", OpenKey, by, reason))
+        place.tables_asked.connect(lambda to, extras: self._write(WriteTables, to, extras))
+        place.report_asked.connect(lambda to, _extras: self._write(WriteReport, to))
         place.stop_asked.connect(self._stop_writing)
-        place.open_asked.connect(self._open)
+        place.open_asked.connect(self._opener)
 
     @property
     def busy(self) -> bool:
@@ -121,7 +121,7 @@ class ResultsController(QObject):
         self.results = results
         self.view = ResultsView()
         self.place.hand_to(results.resolve().parent)
-        if self._reader is not None:
+        if self.reader is not None:
             self.look()
 
     def look(self) -> None:
@@ -135,42 +135,38 @@ class ResultsController(QObject):
     def close(self) -> None:
         """End the processes, whatever they are doing."""
         self._listening.stop()
-        for process in (self._reader, self._writer):
+        for process in (self.reader, self._writer):
             if process is not None:
                 process.close()
-        self._reader = self._writer = None
+        self.reader = self._writer = None
         self._orders = {}
         if self.place.writing is not None:
             self.place.writing.stopped()
         self._show(drawing=None, testing=None)
 
     def _ask(self, order: Order, what: str) -> None:
-        if self._reader is None or not self._reader.works:
-            if self._reader is not None:
-                self._reader.close()
-            self._reader = self._analyst()
+        if self.reader is None or not self.reader.works:
+            if self.reader is not None:
+                self.reader.close()
+            self.reader = self._start_worker()
             self._orders = {}
-        self._orders[self._reader.order(order)] = order
+        self._orders[self.reader.order(order)] = order
         self._since_s = time.monotonic()
         self._going = Going(what, 0.0)
         self._listening.start()
 
     def _listen(self) -> None:
-        """Take what was told since, of the last thing that was asked for; say what goes on where that takes long."""
-        if self._reader is not None and self._orders:
-            works = self._reader.works  # asked before: what a process told before it ended is still heard
-            for number, answer in self._reader.answers():
+        """Take the answers to the last request; say what goes on where that takes long."""
+        if self.reader is not None and self._orders:
+            for number, answer in self.reader.answers():
                 self._take(number, answer)
-            if not works and self._orders:
-                self._orders = {}
-                self._show(trouble=MISTAKE, figures=(), drawing=None, testing=None)
-            elif self._orders and time.monotonic() - self._since_s > PATIENCE_S:
+            if self._orders and time.monotonic() - self._since_s > PATIENCE_S:
                 self._show_going()
         self._listen_to_writer()
         if not self.busy:
             self._listening.stop()
 
-    def _take(self, number: int, answer: Answer) -> None:
+    def _take(self, number: int, answer: Answer | Refused | Crashed) -> None:
         order = self._orders.get(number)
         if order is None:
             return
@@ -179,12 +175,15 @@ class ResultsController(QObject):
             case Done():
                 del self._orders[number]
                 if isinstance(order, OpenKey) and answer.warnings:
-                    self.place.told.emit("Some tables are as they were", "\n".join(answer.warnings))
+                    self.place.message.emit("Some tables were not updated", "\n".join(answer.warnings))
                 self._end(order, newest=newest)
             case Refused():
                 del self._orders[number]
                 if newest or isinstance(order, Decided):
                     self._refused(order, answer)
+            case Crashed():
+                self._orders = {}
+                self._show(trouble=MISTAKE, figures=(), drawing=None, testing=None)
             case Progress() if newest:
                 self._going = Going(answer.what, answer.share)
             case StudiesFound() if newest:
@@ -207,8 +206,8 @@ class ResultsController(QObject):
         if chosen is None and there:
             chosen = max(found.studies, key=lambda one: one.newest_s).folder
         if chosen is None:
-            sentence = f"The first session of a study makes its folder in {self.results}."
-            self.view = ResultsView(trouble=Trouble("No study yet", sentence, "Go to home", "home"))
+            sentence = f"The first session of a study creates its folder in {self.results}."
+            self.view = ResultsView(trouble=Trouble("No studies yet", sentence, "Go to Home", "home"))
             self.place.show_view(self.view)
             return
         self._show(studies=studies)
@@ -243,7 +242,7 @@ class ResultsController(QObject):
 
     def _take_study(self, found: StudyFound) -> None:
         self._blocks = found.blocks
-        nothing = Trouble("Nothing to draw", "This study asks no statements.", "Look again", "again")
+        nothing = Trouble("No figures", "This study has no questionnaire.", "Refresh", "again")
         self._show(
             trials=found.trials,
             doubts=found.doubts,
@@ -270,22 +269,22 @@ class ResultsController(QObject):
     def _refused(self, order: Order, refused: Refused) -> None:
         sentence = f"{refused.sentence}."
         if isinstance(order, Decided):
-            self.place.told.emit(REFUSALS[type(order)], sentence)
+            self.place.message.emit(REFUSALS[type(order)], sentence)
             self._read(order.folder)  # it may have changed meanwhile, and what was being read was given up
         elif refused.stopped:
             all_drawn = self._blocks and len(self._redrawn) >= self._blocks
-            trouble = None if all_drawn else Trouble("Stopped", "The figures are not drawn yet.", "Go on", "read")
+            trouble = None if all_drawn else Trouble("Stopped", "There are no figures yet.", "Go on", "read")
             self._show(untested=bool(all_drawn), trouble=trouble, drawing=None, testing=None)
         elif isinstance(order, FindStudies):
-            trouble = Trouble("The results folder cannot be read", sentence, "Look again", "again")
+            trouble = Trouble("The results folder cannot be read", sentence, "Refresh", "again")
             self.view = ResultsView(trouble=trouble)
             self.place.show_view(self.view)
         elif self._listed and not self.view.sessions:
-            sentence = "Results appear once the first session has begun."
-            trouble = Trouble("No session yet", sentence, "Go to home", "home")
+            sentence = "Results appear after the first session has started."
+            trouble = Trouble("No sessions yet", sentence, "Go to Home", "home")
             self._show(trouble=trouble, figures=(), drawing=None, testing=None)
         else:
-            trouble = Trouble("The study cannot be read", sentence, "Look again", "again")
+            trouble = Trouble("The study cannot be read", sentence, "Refresh", "again")
             self._show(trouble=trouble, figures=(), drawing=None, testing=None)
 
     def _show_going(self) -> None:
@@ -302,39 +301,25 @@ class ResultsController(QObject):
 
     def _mend(self, remedy: str) -> None:
         if remedy == "stop":
-            if self._reader is not None:
-                self._reader.stop()
+            if self.reader is not None:
+                self.reader.stop()
         elif remedy == "read" and self.view.chosen is not None:
             self._read(self.view.chosen)
         else:
             self._show(trouble=None)
             self.look()
 
-    def _leave_out(self, asked: tuple[str, int, int | None, str, str]) -> None:
+    def _decide(self, what: str, order: Callable[..., Decided], *details: Any) -> None:
         if self.view.chosen is not None:
-            self._ask(LeaveOut(self.view.chosen, *asked), "leaving out")
+            self._ask(order(self.view.chosen, *details), what)
 
-    def _take_back(self, asked: tuple[str, int, int | None, str, str]) -> None:
+    def _write(self, make: Callable[..., WriteTables | WriteReport], *details: Any) -> None:
         if self.view.chosen is not None:
-            self._ask(TakeBack(self.view.chosen, *asked), "taking the exclusion back")
-
-    def _unblind(self, by: str, reason: str) -> None:
-        if self.view.chosen is not None:
-            self._ask(OpenKey(self.view.chosen, by, reason), "opening the key")
-
-    def _write_tables(self, to: Path, extras: tuple[str, ...]) -> None:
-        if self.view.chosen is not None:
-            self._write(WriteTables(self.view.chosen, to, extras))
-
-    def _write_report(self, to: Path, _extras: tuple[str, ...]) -> None:
-        if self.view.chosen is not None:
-            self._write(WriteReport(self.view.chosen, to))
-
-    def _write(self, order: WriteTables | WriteReport) -> None:
-        self._writer = self._analyst()
-        self._writer.order(order)
-        self._opens = partial(_what_to_open, order)
-        self._listening.start()
+            order = make(self.view.chosen, *details)
+            self._writer = self._start_worker()
+            self._writer.order(order)
+            self._opens = partial(_what_to_open, order)
+            self._listening.start()
 
     def _stop_writing(self) -> None:
         if self._writer is not None:
@@ -345,13 +330,14 @@ class ResultsController(QObject):
         dialog = self.place.writing
         if self._writer is None:
             return
-        works = self._writer.works
-        last: Done | Refused | None = None if works else Refused("the program that writes was ended by a mistake in it")
+        last: Done | Refused | None = None
         for _, answer in self._writer.answers():
             if isinstance(answer, Progress) and dialog is not None:
                 dialog.show_progress(answer.what, answer.share)
             elif isinstance(answer, (Done, Refused)):
                 last = answer
+            elif isinstance(answer, Crashed):
+                last = Refused(f"a bug ended the process that writes the files: {answer.sentence}")
         if last is None:
             return
         self._writer.close()
@@ -364,9 +350,6 @@ class ResultsController(QObject):
             dialog.stopped()
         else:
             dialog.show_refused(last.sentence)
-
-    def _open(self, path: Path) -> None:
-        self._opener(path)
 
 
 def _what_to_open(order: WriteTables | WriteReport, files: tuple[Path, ...]) -> Path:

@@ -22,9 +22,9 @@ def opened(reveal: Mapping[str, str]) -> Opened:
     return Opened(_time(reveal.get("at")), by, reason)
 
 
-def _time(told: object) -> datetime | None:
-    """Return a time that a file tells, None where it tells none: people may have changed it."""
+def _time(text: object) -> datetime | None:
+    """Return the time in a file, None where there is none: people may have changed it."""
     try:
-        return datetime.fromisoformat(str(told))
+        return datetime.fromisoformat(str(text))
     except ValueError:
         return None

@@ -6,21 +6,22 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from random import Random
 from typing import TypeVar
 
 import numpy as np
 from PySide6.QtCore import QCoreApplication, QEventLoop, QObject, Qt, QTimer, Signal
 
 from study_app.app.session.garbage_collection import collecting_here
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.rig import open_rig, study_settings
+from study_app.devices.simulated.hand_commands import hand_of
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.haptics.runtime.clocks.clock import VirtualClock
-from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load, load_scene
-from study_app.protocol.trials.task import Explore
+from study_app.protocol.trials.tasks.explore import Explore
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage
 from study_app.session.tasks import TaskView
@@ -119,7 +120,7 @@ class WindowsThread(QObject):
         self._asked.emit(asked)
         while not asked.done.wait(PATIENCE_S):
             if not self._working:
-                raise RuntimeError("the windows' thread waits for nobody: call timer from what it runs")
+                raise RuntimeError("call timer only from the work that the windows' thread runs")
         if asked.error is not None:
             raise asked.error
         return asked.start_ns
@@ -147,18 +148,19 @@ class WindowsThread(QObject):
 class Painting(QObject):
     """Both windows of a session, painting as in a trial: the ball 60 times a second, the hand's traces 30 times.
 
-    What they show is a servo of their own in virtual time, so that they do the same whatever is timed beside them.
+    What they show is a servo of their own in virtual time, so that they do the same whatever is timed with them.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.frames = 0
-        self._device = ScriptedDevice()
+        settings = study_settings(load("rek2024"), Random(0))  # noqa: S311 - a hand trembles, it keeps no secrets
+        self._rig = open_rig("scripted", settings, clock=VirtualClock())
+        hand = hand_of(self._rig.device)
+        assert hand is not None  # noqa: S101 - the scripted device has one
         t_s = np.arange(0, 3600, 0.02)
-        self._device.follow(
-            t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.01 * np.cos(5 * t_s), 0.02 * np.cos(4 * t_s)))
-        )
-        self._servo = Servo(self._device, clock=VirtualClock())
+        hand.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.01 * np.cos(5 * t_s), 0.02 * np.cos(4 * t_s))))
+        self._servo = self._rig.servo
         self._servo.load(load_scene("rek2024", "water"))
         self._reader = self._servo.telemetry.reader()
         self._servo.advance(1)
@@ -201,7 +203,7 @@ class Painting(QObject):
         """Close the windows; their objects end here, in their thread."""
         for timer in self._timers:
             timer.stop()
-        self._servo.stop()
+        self._rig.stop()
         self.participant.may_close = self.operator.may_close = True
         for window in (self.participant, self.operator):
             window.close()
@@ -238,5 +240,5 @@ class Painting(QObject):
 
 
 def lend(load_name: LoadName) -> WindowsThread:
-    """Return this thread with its event loop, painting unless nothing is to go on beside what is timed."""
+    """Return this thread with its event loop, painting unless there is to be no load."""
     return WindowsThread(paints=load_name != "none")

@@ -9,7 +9,7 @@ from typing import Any, Final
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QScreen
 
-from study_app.devices.registry import kind_of
+from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError, StoreError
 from study_app.gui.display.frame_clock import BY_CLOCK, LOCKED
 from study_app.gui.display.opengl import has_card
@@ -38,7 +38,7 @@ def settings_here() -> tuple[MachineSettings, str]:
     """Return what is set, and in a line why it is the defaults where the file cannot be used ("" where it can)."""
     settings, trouble = workstation.load_or_default()
     try:
-        kind_of(settings.device)
+        descriptor_of(settings.device)
     except DeviceError as error:
         return settings.model_copy(update={"device": DEFAULTS.device}), f"{settings_file()}: {error}"
     return settings, trouble
@@ -139,7 +139,7 @@ class WorkstationController(QObject):
         try:
             workstation.save(settings)
         except StoreError as error:
-            self.troubled.emit("This machine's settings could not be kept", f"{error}.")
+            self.troubled.emit("This machine's settings could not be saved", f"{error}.")
         self._show()
         self.changed.emit(settings)
 

@@ -13,8 +13,8 @@ import sys
 import click
 
 from study_app import __version__
-from study_app.cli import data, falcon, identify, listing, model, power, report, screenshots, study, validate
-from study_app.cli.devices import devices
+from study_app.cli import data, identify, listing, model, power, report, screenshots, study, validate
+from study_app.cli.devices import devices, emulate_falcon
 from study_app.cli.evidence import accuracy, cfd, soak, stability, timing
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands
 from study_app.errors import StudyError
@@ -27,8 +27,8 @@ def commands(context: click.Context) -> None:
     """Run, record and analyse studies of how liquids feel.
 
     Without a command the home window opens. FILE is a protocol or scene file, or the name of one in the workspace or
-    shipped (rek2024, physical_liquids, demo); RESULTS is a study folder, or its name in the workspace; SESSION is a
-    ses-NN folder, or a name that the command sessions lists.
+    shipped (rek2024, physical_liquids, physical2, demo); RESULTS is a study folder, or its name in the workspace;
+    SESSION is a ses-NN folder, or a name that the command sessions lists.
     """
     if context.invoked_subcommand is None:
         from study_app import app
@@ -51,7 +51,6 @@ MODULES = (
     soak,
     timing,
     screenshots,
-    falcon,
 )
 
 for module in MODULES:
@@ -59,10 +58,11 @@ for module in MODULES:
         if isinstance(command, click.Command):
             commands.add_command(command)
 commands.add_command(devices)  # with commands of its own
+commands.add_command(emulate_falcon)
 
 
 def main() -> None:
-    """Run a command; turn what the user can mend into one line and exit code 2, and log what else fails."""
+    """Run a command; turn what the user can fix into one line and exit code 2, and log what else fails."""
     from study_app.store.program_log import keep_log
 
     keep_log()

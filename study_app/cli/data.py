@@ -8,21 +8,22 @@ from pathlib import Path
 import click
 
 from study_app.cli.options import BY, EXIT_FOUND, Target, takes_session, takes_study
+from study_app.cli.progress import progress
 
 
 @click.command()
 @takes_study
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 @click.option(
-    "--wide", is_flag=True, help="Also the answers with a row a participant, a column a statement and setting."
+    "--wide",
+    is_flag=True,
+    help="Also the answers as a wide table: one row per participant, one column per statement and setting.",
 )
 @click.option("--parquet", is_flag=True, help="Also every table as Parquet.")
 @click.option(
     "--sav", is_flag=True, help="Also the answers, long and wide, for SPSS, jamovi and JASP; needs pyreadstat."
 )
-@click.option(
-    "--psych-ds", is_flag=True, help="Also a folder of all tables that keeps the rules of Psych-DS, to share."
-)
+@click.option("--psych-ds", is_flag=True, help="Also a folder of all tables for sharing, which follows Psych-DS.")
 def export(results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psych_ds: bool) -> None:
     """Write the tidy tables of all participants, with a codebook."""
     from study_app.analysis.export.export import Extra
@@ -30,7 +31,10 @@ def export(results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psy
 
     asked: dict[Extra, bool] = {"wide": wide, "parquet": parquet, "sav": sav, "psych-ds": psych_ds}
     extras = [name for name, wanted in asked.items() if wanted]
-    for written in export_study(results, to, extras=extras, warn=partial(click.echo, err=True)):
+    with progress() as show:
+        show("writing the tables")
+        files = export_study(results, to, extras=extras, warn=partial(click.echo, err=True))
+    for written in files:
         click.echo(written)
 
 
@@ -39,24 +43,29 @@ def export(results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psy
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def plot(results: Path, to: Path) -> None:
     """Draw the responses: by code until unblinded, by name after."""
-    from study_app.analysis.figures.answer_figures import plot as plot_study
+    from study_app.analysis.figures.plotting import plot as plot_study
 
-    for written in plot_study(results, to, warn=partial(click.echo, err=True)):
+    with progress() as show:
+        show("drawing the responses")
+        files = plot_study(results, to, warn=partial(click.echo, err=True))
+    for written in files:
         click.echo(written)
 
 
 @click.command()
 @takes_study
 @BY
-@click.option("--reason", required=True, metavar="TEXT", help="Why; recorded with the time.")
+@click.option("--reason", required=True, metavar="TEXT", help="Reason; recorded with the time.")
 def unblind(results: Path, by: str, reason: str) -> None:
-    """Open the sealed key of a study, and write the sealed columns; who, when and why are recorded."""
+    """Open the sealed key of a study and write the sealed columns; name, time and reason are recorded."""
     from study_app.store.blinded.unblinding import unblind as unblind_study
 
     found = unblind_study(results, by=by, reason=reason)
     for block, codes in found.codes.items():
         for code, condition in codes.items():
-            click.echo(f"{block}  {code}  {condition}")
+            standard, of_track, _ = condition.partition("/")
+            shown = f"standard {standard}" if standard else "all levels"
+            click.echo(f"{block}  {code}  {shown if of_track else condition}")
     for sentence in found.left:
         click.echo(f"warning: {sentence}", err=True)
 
@@ -69,7 +78,7 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @BY
 @click.option("--reason", required=True, metavar="TEXT")
 def exclude(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
-    """Leave a session or a trial out of the analysis, with a reason; nothing is deleted."""
+    """Exclude a session or a trial from the analysis, with a reason; nothing is deleted."""
     from study_app.store.exclusions import exclude as exclude_from
     from study_app.store.exclusions import named
 
@@ -80,11 +89,11 @@ def exclude(results: Path, participant: str, session: int, trial: int | None, by
 @takes_study
 @click.option("--participant", required=True, metavar="ID")
 @click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True)
-@click.option("--trial", type=click.IntRange(1), help="Only this trial, if it was left out alone.")
+@click.option("--trial", type=click.IntRange(1), help="Only this trial, if it was excluded alone.")
 @BY
 @click.option("--reason", required=True, metavar="TEXT")
 def include(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
-    """Take an exclusion back: the session or trial counts again; who, when and why are recorded."""
+    """Reverse an exclusion: the session or trial counts again; name, time and reason are recorded."""
     from study_app.store.exclusions import include as include_in
     from study_app.store.exclusions import named
 
@@ -94,31 +103,32 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
 @click.command()
 @takes_session
 def rebuild(session: Path) -> None:
-    """Make a session's tables again from its journal."""
+    """Rebuild a session's tables from its journal."""
     from study_app.store.sessions.rebuild import rebuild as rebuild_session
 
     made = rebuild_session(session)
     for path in made.rewritten:
         click.echo(f"rewritten  {path}")
     for path in made.swept:
-        click.echo(f"removed    {path}, left half-written")
+        click.echo(f"removed    {path}, an incomplete file")
     if made.torn_bytes:
-        click.echo(f"the journal ends in {made.torn_bytes} bytes of a line that was never finished; left as they are")
+        click.echo(f"the journal ends with {made.torn_bytes} bytes of an incomplete line; they are kept")
     if not (made.rewritten or made.swept):
-        click.echo("nothing to do: every table is what the journal says")
+        click.echo("nothing to do: every table agrees with the journal")
 
 
 @click.command()
 @takes_session
 def reproduce(session: Path) -> None:
-    """Make a session's orders again from its receipt and compare them with those that were run."""
+    """Recompute a session's orders and levels and compare them with the recorded ones."""
     from study_app.store.verification.reproduction import reproduced
 
-    differences = reproduced(session)
-    for difference in differences:
-        click.echo(difference)
-    click.echo("the orders differ" if differences else "reproduced: trials and statements came in the receipt's order")
-    if differences:
+    found = reproduced(session)
+    for line in (*found.differences, *found.followed):
+        click.echo(line)
+    same = "reproduced: trials and statements have the order of the receipt"
+    click.echo("orders or levels differ" if found.differences else same)
+    if found.differences:
         click.get_current_context().exit(EXIT_FOUND)
 
 
@@ -134,7 +144,9 @@ def verify(results: Path, fingerprints: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings, Psych-DS."""
     from study_app.store.verification.verify_study import verify as verify_study
 
-    found = verify_study(results, fingerprints)
+    with progress() as show:
+        show("checking every file")
+        found = verify_study(results, fingerprints)
     for kind, findings in (
         ("error", (*found.errors, *found.psychds.errors)),
         ("warning", (*found.warnings, *found.psychds.warnings)),
@@ -151,10 +163,10 @@ def verify(results: Path, fingerprints: Path | None) -> None:
 @click.command()
 @takes_session
 def replay(session: Path) -> None:
-    """Compute every force again from the recording, with the same kernel, and name the seconds that differ.
+    """Recompute every force from the recording, with the same kernel, and list the seconds that differ.
 
-    Names the trials whose recordings are lost, missing or not comparable, too. Ends with exit code 3 where a force
-    differs, a recording is missing, or nothing could be compared, which proves nothing.
+    Also lists the trials whose recordings are lost, missing or not comparable. Ends with exit code 3 if a force
+    differs, a recording is missing, or nothing could be compared.
     """
     from study_app.evaluation.replay import replay as replay_session
 
@@ -163,14 +175,14 @@ def replay(session: Path) -> None:
         click.echo(sentence)
     if not (found.recordings or found.missing or found.uncompared):
         click.echo("the session kept no recordings")
-    verdict = "forces differ" if found.differences else "every force compared is the same"
+    verdict = "forces differ" if found.differences else "all compared forces are equal"
     if not found.seconds:
-        verdict = "no force was compared, so nothing is proved"
+        verdict = "no force was compared, so the result is not proved"
     if found.recordings:
         pace = found.lasted_s / found.computed_s if found.computed_s else 0.0
         many, ran = ("1 recording", "it") if found.recordings == 1 else (f"{found.recordings} recordings", "they")
         click.echo(
-            f"{many}, {found.lasted_s:.1f} s, computed again {pace:.0f} times as fast as {ran} ran "
+            f"{many}, {found.lasted_s:.1f} s, recomputed {pace:.0f} times as fast as {ran} ran "
             f"({found.took_s:.1f} s in all): {verdict}"
         )
     else:

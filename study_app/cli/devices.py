@@ -1,20 +1,23 @@
-"""The commands about what is felt with: what is connected, what is wrong with it, and how strong it is."""
+"""The commands about devices: what is connected, what is wrong with it, how strong a Falcon is, and emulating one."""
 
 from __future__ import annotations
 
 import os
 import queue
+import signal
 import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
 from math import degrees
 from pathlib import Path
+from random import Random
 from textwrap import fill
 from typing import TYPE_CHECKING
 
 import click
 
+from study_app.cli.device_options import TakesDeviceOptions, given
 from study_app.cli.options import EXIT_FOUND
 
 if TYPE_CHECKING:
@@ -25,47 +28,53 @@ if TYPE_CHECKING:
 
 _WIDTH = 100
 _PREPARING = "Preparing …"
-FIRMWARE = click.option("--firmware", type=click.Path(path_type=Path), metavar="PATH", help="Its program.")
-DEVICE = click.option("--device", "name", default="falcon", show_default=True, metavar="NAME", help="Which Falcon.")
+FIRMWARE = click.option("--firmware", type=click.Path(path_type=Path), metavar="PATH", help="Firmware file.")
+DEVICE = click.option("--device", "name", default="falcon", show_default=True, metavar="NAME", help="Which one.")
 
 
 @click.group(invoke_without_command=True)
 @click.pass_context
 def devices(context: click.Context) -> None:
-    """List what can be felt with; look a Falcon over; calibrate it."""
+    """List the devices; examine one; calibrate a Falcon."""
     if context.invoked_subcommand is None:
         context.invoke(list_devices)
 
 
 @devices.command("list")
 def list_devices() -> None:
-    """List every device, what of it is connected, what it can do, and why it cannot be used."""
+    """List every device: whether it is connected, what it can do, and why it cannot be used."""
     from study_app.devices.backends import backends
+    from study_app.devices.registry import discover
 
+    of = {
+        device.name: f"; {device.kind}, {device.degrees_of_freedom} degrees of freedom" for device in discover().devices
+    }
     for backend in backends():
-        click.echo(f"{backend.name:<19} {backend.state}  ({backend.by})")
+        about = f"{backend.by}{of.get(backend.name.partition(':')[0], '')}"
+        click.echo(f"{backend.name:<19} {backend.state}  ({about})")
         for line in (backend.can, backend.why):
             if line:
                 click.echo(_indented(line, 20))
 
 
-@devices.command()
+@devices.command(cls=TakesDeviceOptions)
 @DEVICE
-@FIRMWARE
-@click.option("--fault", "faults", multiple=True, metavar="NAME", help="Of falcon-emulated: frozen, drop=0.01 …")
-@click.option("--to", type=click.Path(path_type=Path), metavar="FILE", help="Write a zip file for whoever helps.")
-def doctor(name: str, firmware: Path | None, faults: tuple[str, ...], to: Path | None) -> None:
-    """Look a Falcon over: find, open, load, home and turn it, without force; say what is wrong, why, and the cure.
+@click.option("--fault", "faults", multiple=True, metavar="NAME", help="Fault of falcon-emulated: frozen, drop=0.01 …")
+@click.option("--to", type=click.Path(path_type=Path), metavar="FILE", help="Write a zip file for support.")
+def doctor(name: str, faults: tuple[str, ...], to: Path | None, **device_options: str | Path | None) -> None:
+    """Examine a device: find, open, load, home and turn a Falcon without force; say what is wrong, why, and the cure.
 
-    NAME is falcon, falcon:SERIAL, falcon-emulated or falcon-socket:PATH. Exit code 3 where something is wrong. The zip
-    file holds this report, versions, settings, log and last error; no participant's id, no answer, no liquid's value.
+    NAME is a device that has a doctor: falcon, falcon:SERIAL, falcon-emulated or falcon-socket:PATH. Exit code 3 where
+    something is wrong. The zip file holds this report, versions, settings, log and last error; no participant's id, no
+    answer, no liquid's value.
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
     from study_app.devices.doctor_report import lines
-    from study_app.devices.falcon.doctor.examine import examine
-    from study_app.devices.falcon.doctor.failure_report import report
+    from study_app.devices.registry import check_options, doctor_of
 
-    found = report(examine(name, firmware=firmware, faults=faults, tell=click.echo))
+    options = given(device_options)
+    check_options(name, options)
+    found = doctor_of(name).examine(name, options=options, faults=faults, progress=click.echo)
     for line in lines(found):
         click.echo(line)
     if to is not None:
@@ -80,17 +89,17 @@ def doctor(name: str, firmware: Path | None, faults: tuple[str, ...], to: Path |
 @devices.command()
 @DEVICE
 @FIRMWARE
-@click.option("--grams", type=click.FloatRange(110, 600), metavar="G", help="Hang a weight, 110 to 600.")
-@click.option("--scale", is_flag=True, help="Pull with a luggage scale instead.")
+@click.option("--grams", type=click.FloatRange(110, 600), metavar="G", help="Use a weight of 110 to 600 grams.")
+@click.option("--scale", is_flag=True, help="Use a luggage scale instead.")
 @click.option("--geometry", metavar="NAME", help="libnifalcon (default), zm-redux or martin-hillier.")
 def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: bool, geometry: str | None) -> None:
-    """Measure how many motor units a newton takes, with a known weight or a luggage scale; kept by serial number.
+    """Calibrate a Falcon's force with a known weight or a luggage scale; stored by serial number.
 
-    The Falcon holds its grip at five places, first with nothing on it, then with the weight. Exit code 3 where what was
-    weighed does not fit together: then nothing is kept.
+    The Falcon holds its grip at five positions, first without load, then with the weight. Exit code 3 if the
+    measurements are inconsistent: then nothing is saved.
     """
     if scale == (grams is not None):
-        raise click.UsageError("calibrate needs either --grams G, a weight to hang on the grip, or --scale")
+        raise click.UsageError("calibrate needs either --grams G (a weight to hang on the grip) or --scale")
     click.echo(_PREPARING)
     from study_app.devices.falcon.doctor import weighing
     from study_app.devices.falcon.mechanics import calibration
@@ -101,17 +110,19 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     with device:
         grip = weighing.Grip(device, virtual=emulator is not None)
         weight_n = (grams or 0.0) / 1000 * weighing.GRAVITY_MPS2
-        ask = _Terminal(sys.stdin.fileno()).ask if emulator is None else _ask_emulator(emulator, weight_n)
+        ask = Terminal(sys.stdin.fileno()).ask if emulator is None else _ask_emulator(emulator, weight_n)
         notes = weighing.pull(grip, ask) if grams is None else weighing.hang(grip, weight_n, ask)
         serial = device.describe()["serial"]
     found = calibration.fit(measures, notes.counts, notes.forces_n, notes.units)
     for line in _calibrated(found, notes):
         click.echo(line)
     if found.residual_n > calibration.MOST_RESIDUAL_N:
-        click.echo(f"More than {calibration.MOST_RESIDUAL_N} N is unexplained: nothing was kept. Weigh again.")
+        click.echo(
+            f"More than {calibration.MOST_RESIDUAL_N} N is unexplained, so nothing was saved. Repeat the calibration."
+        )
         click.get_current_context().exit(EXIT_FOUND)
     if name.startswith("falcon-socket"):
-        click.echo("Nothing is kept of what answers at a socket.")
+        click.echo("A device at a socket is not calibrated permanently: nothing was saved.")
     else:
         click.echo(f"Kept in {calibration.save(serial or '', found)}.")
 
@@ -121,16 +132,16 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
     from study_app.devices.falcon.device import FalconDevice
     from study_app.devices.falcon.emulated import EmulatedFalcon
     from study_app.devices.falcon.emulator.emulator import Emulator
-    from study_app.devices.registry import kind_of
+    from study_app.devices.registry import descriptor_of
     from study_app.errors import DeviceError
 
-    kind = kind_of(name)
+    kind = descriptor_of(name).name
     if not kind.startswith("falcon"):
-        raise DeviceError(f"'{name}' has no motors to calibrate: only a Falcon has")
+        raise DeviceError(f"'{name}' has no motors to calibrate: only a Falcon has motors")
     if kind != "falcon-emulated":
         return FalconDevice(name, firmware=firmware, tell=click.echo), None
     if grams is None:
-        raise DeviceError("nobody pulls an emulated Falcon with a scale: hang a weight on it with --grams")
+        raise DeviceError("an emulated Falcon cannot be pulled with a scale: use a weight with --grams")
     # A serial number of its own: no rehearsal shall find this calibration.
     emulator = Emulator(running=firmware is None, serial="EMULATED-WEIGHED")
     return EmulatedFalcon(firmware=firmware, tell=click.echo, emulator=emulator), emulator
@@ -148,14 +159,14 @@ def _calibrated(found: Calibration, notes: Notes) -> list[str]:
     share = found.units_per_nm / UNCALIBRATED_UNITS_PER_NM
     lines += [
         "",
-        f"{found.units_per_nm:.0f} motor units for a newton metre, {share:.2f} times those of one without calibration",
+        f"{found.units_per_nm:.0f} motor units per newton metre, {share:.2f} times those of one without calibration",
         f"arms' offset {degrees(found.arm_offset_rad):+.2f} degrees; the grip's own weight {found.own_weight_n:.2f} N",
-        f"unexplained {found.residual_n:.3f} N in the mean square, friction for the most part",
+        f"unexplained {found.residual_n:.3f} N RMS, mostly friction",
     ]
     return lines
 
 
-class _Terminal:
+class Terminal:
     """Lines that the operator types while the grip is held.
 
     Read without Python's own buffer, whose lock a thread that still waits at the program's end would keep.
@@ -211,3 +222,62 @@ def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
 def _indented(words: str, by: int) -> str:
     space = " " * by
     return fill(words, _WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
+
+
+@click.command("emulate-falcon")
+@click.option("--socket", required=True, type=click.Path(path_type=Path), metavar="PATH", help="Unix socket to serve.")
+@click.option("--fault", "faults", multiple=True, metavar="NAME", help="frozen, drop=0.01 …; repeatable.")
+@click.option("--running", is_flag=True, help="Start with the firmware already loaded.")
+@click.option("--geometry", metavar="NAME", help="libnifalcon (default), zm-redux or martin-hillier.")
+@click.option("--serial", default="EMULATED", show_default=True, metavar="TEXT", help="Serial number of the bridge.")
+@click.option("--seed", default=0, show_default=True, metavar="N", help="Seed of tremor and faults.")
+def emulate_falcon(
+    socket: Path, faults: tuple[str, ...], running: bool, geometry: str | None, serial: str, seed: int
+) -> None:
+    """Serve an emulated Falcon to other programs, in real time, until Ctrl-C.
+
+    It emulates the USB bridge, from the boot loader on, with the frames that
+    study_app/devices/falcon/transport/socket_frames.py describes; --device falcon-socket:PATH connects our own driver.
+    Lights, homing and torques are printed as they change, on a terminal only.
+    """
+    from study_app.devices.falcon.emulator.emulator import Emulator
+    from study_app.devices.falcon.emulator.socket_server import EmulatorServer
+    from study_app.devices.falcon.mechanics.geometry import DEFAULT_GEOMETRY
+
+    random = Random(seed)  # noqa: S311 - tremor and faults keep no secrets
+    emulator = Emulator(random, geometry=geometry or DEFAULT_GEOMETRY, running=running, serial=serial)
+    for fault in faults:
+        emulator.take(fault)
+    server = EmulatorServer(emulator, socket)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: server.stop())
+    click.echo(f"An emulated Falcon at {socket}; press Ctrl-C to end it.")
+    server.serve(_teller(emulator) if sys.stdout.isatty() else None)
+
+
+def _teller(emulator: Emulator) -> Callable[[], None]:
+    """Return what prints the state when it has changed."""
+    printed = ""
+
+    def tell() -> None:
+        nonlocal printed
+        state = state_of(emulator)
+        if state != printed:
+            printed = state
+            click.echo(state)
+
+    return tell
+
+
+def state_of(emulator: Emulator) -> str:
+    """Return lights, homing and torques in a line."""
+    from study_app.devices.falcon.wire import constants
+
+    names = {constants.FLAG_RED: "red", constants.FLAG_GREEN: "green", constants.FLAG_BLUE: "blue"}
+    lights = ", ".join(name for flag, name in names.items() if emulator.lights & flag) or "none"
+    torques = ", ".join(str(torque) for torque in emulator.torques)
+    if not emulator.powered:
+        return "no power"
+    if not emulator.running:
+        return f"no program yet, {emulator.loaded} bytes of it"
+    return f"lights {lights} | arms homed {emulator.homed.bit_count()} of 3 | torques {torques}"

@@ -8,6 +8,7 @@ import click
 
 from study_app.cli.model import assignment
 from study_app.cli.options import SCENE_FILE, Target
+from study_app.cli.progress import progress
 
 
 @click.command()
@@ -15,19 +16,19 @@ from study_app.cli.options import SCENE_FILE, Target
 @click.option("--measured", required=True, type=click.Path(path_type=Path), metavar="CSV", help="Motion and force.")
 @click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
 @click.option("--fit", "names", required=True, metavar="NAMES", help="Parameters, such as drag_coefficient,length.")
-@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Begin elsewhere, or fix a parameter.")
+@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter.")
 @click.option(
     "--velocity",
     type=click.Choice(["centred", "scene"]),
     default="centred",
     show_default=True,
-    help="Where the CSV has no velocities: without lag, as a real force follows them, or by the scene's filter.",
+    help="If the CSV has no velocities: estimate them without lag (centred), or with the scene's filter (scene).",
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for preset, residuals and figure.")
 def identify(
     measured: Path, scene: str, liquid: str, names: str, changes: tuple[str, ...], velocity: str, to: Path | None
 ) -> None:
-    """Fit a liquid's parameters to measured motion and force, with intervals and a warning where they mean little.
+    """Fit a liquid's parameters to measured motion and force, with intervals and warnings.
 
     CSV has columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the ball), and vx_mps,
     vy_mps, vz_mps where they are known; or t_s, velocity_mps, force_n for a motion along one line.
@@ -41,7 +42,9 @@ def identify(
     chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))
     read = measurements.read(measured)
     motion = measurements.centred(read.motion) if velocity == "centred" else read.motion
-    found = fit(chosen, liquid, [name.strip() for name in names.split(",")], motion, read.force_n)
+    with progress() as show:
+        show(f"fitting {names}")
+        found = fit(chosen, liquid, [name.strip() for name in names.split(",")], motion, read.force_n)
     click.echo(identified.text(found))
     for written in identified.write(found, to, measured) if to is not None else ():
         click.echo(written)

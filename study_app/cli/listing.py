@@ -30,7 +30,7 @@ def workspace(folder: Path | None) -> None:
 
 @click.command()
 def studies() -> None:
-    """List the protocols at hand, and the studies in the workspace's results."""
+    """List the known protocols and the studies in the workspace."""
     from study_app.errors import ProtocolError
     from study_app.protocol.load import at_hand, is_scene_file, load
     from study_app.store.folders import StudyFolder
@@ -38,7 +38,7 @@ def studies() -> None:
     from study_app.workspace import workspace as workspace_here
 
     here = workspace_here()
-    click.echo(f"Protocols in {here.protocols.absolute()}, shipped, and opened last")
+    click.echo(f"Protocols in {here.protocols.absolute()}, shipped ones, and recently opened ones")
     for name in (*at_hand(), *recent_protocols()):
         try:
             if is_scene_file(name):
@@ -58,7 +58,7 @@ def studies() -> None:
 @click.argument("named", metavar="[RESULTS]", required=False)
 @RESULTS
 def sessions(named: str | None, results: Path | None) -> None:
-    """List the sessions of a study, or of every study in the workspace, as commands take them for SESSION."""
+    """List the sessions of a study, or of every study in the workspace, with the names that commands accept."""
     from study_app.store.exclusions import exclusions
     from study_app.store.folders import StudyFolder
     from study_app.store.tables.participants import participants
@@ -73,7 +73,7 @@ def sessions(named: str | None, results: Path | None) -> None:
             who, number = row["participant"], row["session"]
             name = f"{place}/{who}/{number}" if place == folder.name else f"{place}/sub-{who}/ses-{number:02d}"
             started = str(row["session_started_at"] or "")[:STARTED].replace("T", " ")
-            mark = "  left out" if (who, number, None) in left_out else ""
+            mark = "  excluded" if (who, number, None) in left_out else ""
             click.echo(f"{name}  {started}  {row['status']}{mark}")
 
 

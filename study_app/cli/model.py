@@ -14,11 +14,11 @@ from study_app.cli.options import SCENE_FILE, Target
 @click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
 @click.option("--path", required=True, metavar="PATH", help="Motion CSV, or a programmed path: circle, line, stop …")
 @click.option("--to", required=True, type=Target(), metavar="CSV", help="File to write.")
-@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Override a parameter; may come again.")
+@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Override a parameter; repeatable.")
 def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, ...]) -> None:
     """Compute the force along a motion, with the servo's own tick, without a device or a clock.
 
-    Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz says otherwise).
+    Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz differs).
     """
     from study_app.haptics.model import motion, paths
     from study_app.haptics.model.overrides import override_all
@@ -44,9 +44,9 @@ def assignment(change: str) -> tuple[str, str]:
 
 @click.command()
 @SCENE_FILE
-@click.option("--liquid", metavar="NAME", help="Only this one; default: every liquid of the file.")
+@click.option("--liquid", metavar="NAME", help="Only this liquid; default: every liquid of the file.")
 def scene(scene: str, liquid: str | None) -> None:
-    """Print which effects a scene calls for, why, the measured cost of each, and how wrong the force is to expect."""
+    """Print the effects that a scene needs and why, the measured cost of each, and the expected force error."""
     from study_app.evaluation.cost import report
     from study_app.evaluation.expected_error import foretold
     from study_app.protocol.load import load_scene, load_scenes
@@ -58,7 +58,7 @@ def scene(scene: str, liquid: str | None) -> None:
 @click.command()
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def figures(to: Path) -> None:
-    """Draw the thesis' Figs 3 to 8 anew: force over time on programmed paths, with captions."""
+    """Redraw the thesis' Figs 3 to 8: force over time on programmed paths, with captions."""
     from study_app.validation.thesis_figures import figures as draw
 
     for written in draw(to):

@@ -45,13 +45,13 @@ class Target(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path."""
         if not str(value):
-            self.fail("is empty: name a file or folder, . for this one", param, ctx)
+            self.fail("is empty: name a file or folder (. is the current folder)", param, ctx)
         return super().convert(value, param, ctx)
 
 
 FILE = click.argument("protocol", metavar="FILE")
 SCENE_FILE = click.argument("scene", metavar="FILE")
-BY = click.option("--by", required=True, metavar="NAME", help="Who decides: a name, initials, or a rule.")
+BY = click.option("--by", required=True, metavar="NAME", help="Name or initials of the person, or a rule.")
 RESULTS = click.option(
     "--results", type=Target(), metavar="DIR", help="Study folder; default: results/<study> of the workspace."
 )

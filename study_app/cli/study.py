@@ -7,31 +7,35 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from study_app.cli.device_options import DeviceName, TakesDeviceOptions, given
 from study_app.cli.options import FILE, RESULTS, Target, keep_offered_workspace, takes_session
+from study_app.devices.names import DEFAULT_DEVICE
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, MOST_DELAY
 
 SEED = click.IntRange(0, 2**31 - 1)
 WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
 SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
-FIRMWARE = click.option(
-    "--firmware",
-    type=click.Path(path_type=Path),
-    metavar="PATH",
-    help="Program of a Falcon that was switched on since it last ran: its owner has the file.",
-)
-OPERATOR = click.option("--by", "operator", default="", metavar="INITIALS", help="Who runs the session.")
+OPERATOR = click.option("--by", "operator", default="", metavar="INITIALS", help="Name or initials of the operator.")
 
 
 @click.command()
 @click.argument("protocol", metavar="FILE", required=False)
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of protocol files instead.")
-def check(protocol: str | None, *, schema: bool) -> None:
-    """Print the study or the scenes in words, or every problem of the file with line and hint."""
+@click.option(
+    "--delay-ticks",
+    type=click.IntRange(1, MOST_DELAY),
+    default=BELIEVED_TICKS,
+    show_default=True,
+    help="Delay of the device's forces, in ticks, that levels are checked for; the pre-flight uses the measured one.",
+)
+def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
+    """Describe the study or the scenes, or list every problem of the file with line and hint."""
     from study_app.protocol import describe, load
 
     if schema:
         import json
 
-        from study_app.protocol.model import schema as protocol_schema
+        from study_app.protocol.source.json_schema import schema as protocol_schema
 
         click.echo(json.dumps(protocol_schema(), indent=2, ensure_ascii=False))
         return
@@ -40,7 +44,7 @@ def check(protocol: str | None, *, schema: bool) -> None:
     if load.is_scene_file(protocol):
         click.echo(describe.describe_scenes(load.load_scenes(protocol)))
     else:
-        click.echo(describe.describe(load.load(protocol)))
+        click.echo(describe.describe(load.load(protocol, delay_ticks=delay_ticks)))
 
 
 @click.command()
@@ -48,32 +52,26 @@ def check(protocol: str | None, *, schema: bool) -> None:
 @click.option("--participants", type=click.IntRange(1, 9999), required=True)
 @click.option("--seed", type=SEED, default=1, show_default=True)
 def design(protocol: str, participants: int, seed: int) -> None:
-    """Count positions and carry-over of the orders of N participants, before anyone is invited."""
+    """Count positions and carry-over in the orders of N participants, before the study starts."""
     from study_app.protocol.load import load
-    from study_app.protocol.orders.balance import balance, describe_balance, numbered
+    from study_app.protocol.orders.balance import balances, describe_balance, numbered
 
-    click.echo(describe_balance(balance(load(protocol), numbered(participants), seed)))
+    judged = balances(load(protocol), numbered(participants), seed)
+    click.echo("\n\n".join(map(describe_balance, judged)))
 
 
-@click.command()
+@click.command(cls=TakesDeviceOptions)
 @FILE
 @click.option("--participant", metavar="ID", required=True, help="Letters and digits, such as P007.")
 @click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
-@click.option("--seed", type=SEED, help="Default: drawn, shown and recorded.")
-@click.option(
-    "--device",
-    default="mouse",
-    show_default=True,
-    metavar="NAME",
-    help="mouse, falcon, falcon:SERIAL, spacemouse, scripted, falcon-emulated or falcon-socket:PATH; see devices.",
-)
-@FIRMWARE
-@click.option("--language", metavar="LANG", help="Default: the protocol's first.")
+@click.option("--seed", type=SEED, help="Default: drawn at random, shown and recorded.")
+@click.option("--device", cls=DeviceName, default=DEFAULT_DEVICE, show_default=True)
+@click.option("--language", metavar="LANG", help="Default: the first language of the protocol.")
 @OPERATOR
 @WINDOWED
 @SCREEN
-@click.option("--pilot", is_flag=True, help="Try it out: windowed, marked, kept apart in results/<study>-pilot.")
-@click.option("--no-recordings", is_flag=True, help="Keep answers and trial rows only, not every sample and frame.")
+@click.option("--pilot", is_flag=True, help="Pilot session: in a window, marked, stored in results/<study>-pilot.")
+@click.option("--no-recordings", is_flag=True, help="Store answers and trial rows only, not every sample and frame.")
 @RESULTS
 def run(
     protocol: str,
@@ -81,7 +79,6 @@ def run(
     session: int,
     seed: int | None,
     device: str,
-    firmware: Path | None,
     language: str | None,
     operator: str,
     *,
@@ -90,6 +87,7 @@ def run(
     pilot: bool,
     no_recordings: bool,
     results: Path | None,
+    **device_options: str | Path | None,
 ) -> None:
     """Run a session with a participant, without dialogs."""
     from study_app import app
@@ -102,7 +100,7 @@ def run(
         session=session,
         seed=seed,
         device=device,
-        firmware=firmware,
+        device_options=given(device_options),
         language=language,
         operator=operator,
         windowed=windowed,
@@ -119,14 +117,16 @@ def run(
 @FILE
 @click.option("--participants", type=click.IntRange(1, 99_999), default=1, show_default=True)
 @click.option("--seed", type=SEED, default=1, show_default=True)
-@click.option("--device", default="scripted", show_default=True, metavar="NAME", help="scripted or falcon-emulated.")
-@click.option("--no-recordings", is_flag=True, help="Keep answers and trial rows only, not every sample and frame.")
+@click.option("--device", cls=DeviceName, only_moving=True, default="scripted", show_default=True)
+@click.option("--no-recordings", is_flag=True, help="Store answers and trial rows only, not every sample and frame.")
 @click.option(
     "--answers-only",
     is_flag=True,
-    help="Thousands of participants in seconds, to try an analysis: four sessions are rehearsed and kept nowhere, then "
-    "everybody answers by what was felt in one of them. Nothing is measured: those columns say n/a. Sessions are "
-    "written whole, without waiting for the disk.",
+    help=(
+        "Thousands of participants in seconds, to try an analysis: four sessions are rehearsed without being "
+        "stored, then every participant answers from the features of one of them. Nothing is measured, so the "
+        "columns of measurements are n/a. Sessions are written without waiting for the disk."
+    ),
 )
 @click.option(
     "--results",
@@ -146,12 +146,12 @@ def rehearse(
     answers_only: bool,
     results: Path | None,
 ) -> None:
-    """Run whole sessions with simulated participants, faster than real time; every row says simulated."""
+    """Run complete sessions with simulated participants, faster than real time; every row is marked as simulated."""
     if results is None:
         keep_offered_workspace()
     if answers_only:
         if context.get_parameter_source("device") is not ParameterSource.DEFAULT:
-            raise click.UsageError("--answers-only needs no device: leave out --device")
+            raise click.UsageError("--answers-only uses no device: omit --device")
         from study_app.session.simulated.answers_only import rehearse_answers
 
         folder = rehearse_answers(protocol, participants=participants, seed=seed, results=results, progress=click.echo)
@@ -170,11 +170,10 @@ def rehearse(
     click.echo(f"{folder}: {participants} simulated participant{'s' if participants > 1 else ''}")
 
 
-@click.command()
+@click.command(cls=TakesDeviceOptions)
 @takes_session
-@click.option("--protocol", metavar="FILE", help="Its protocol; default: looked for among those at hand.")
-@click.option("--device", metavar="NAME", help="Default: the one it began with.")
-@FIRMWARE
+@click.option("--protocol", metavar="FILE", help="Protocol of the session; default: found among the known protocols.")
+@click.option("--device", cls=DeviceName, help="Default: the device of the interrupted session.")
 @OPERATOR
 @WINDOWED
 @SCREEN
@@ -182,20 +181,20 @@ def resume(
     session: Path,
     protocol: str | None,
     device: str | None,
-    firmware: Path | None,
     operator: str,
     *,
     windowed: bool,
     screen: int | None,
+    **device_options: str | Path | None,
 ) -> None:
-    """Go on with a session whose program was ended: same order and seed, at the interrupted trial."""
+    """Resume an interrupted session: same order and seed, at the interrupted trial."""
     from study_app import app
 
     code = app.resume(
         session,
         protocol=protocol,
         device=device,
-        firmware=firmware,
+        device_options=given(device_options),
         operator=operator,
         windowed=windowed,
         screen=screen,

@@ -2,61 +2,70 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 
 import click
 
 from study_app.cli.options import EXIT_FOUND, Target
+from study_app.cli.progress import progress
+from study_app.workers.executors import open_executor
 
 EXIT_UNDECIDED = 4
 
 
 @click.command("validate-report")
 @click.option(
-    "--studies", type=click.IntRange(1, 1_000_000), default=1000, show_default=True, help="In each cell, at first."
+    "--studies",
+    type=click.IntRange(1, 1_000_000),
+    default=1000,
+    show_default=True,
+    help="Initial number of studies per cell.",
 )
-@click.option("--jobs", type=click.IntRange(-1), default=-1, metavar="N", help="At once; default: one a core.")
+@click.option(
+    "--jobs", type=click.IntRange(-1), default=-1, metavar="N", help="Parallel processes; default: one per core."
+)
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
 def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None:
-    """Simulate empty, partially empty and full studies, and say how often the report's verdicts are wrong.
+    """Measure how often the report's verdicts are wrong, on studies simulated with no, some or all effects.
 
     Studies of rek2024 with 5, 12 and 24 participants, by the rehearsals' answer model and by an ordinal probit model
     with random effects, go through the report's own tests. Of every rate the Wilson interval is printed, and whether
-    it keeps to its limit: "at most 5 %" holds if the interval reaches down to 5 % and ends below 7.5 %. A cell with an
-    undecided rate is continued with further studies, up to four times as many. Ctrl-C ends with what was simulated
-    until then. Ends with exit code 3 where a rate is beyond its limit by its 99.9 % interval, else with 4 where the
+    it keeps to its limit: "at most 5 %" holds if the interval reaches down to 5 % and ends below 7.5 %. A cell with
+    an undecided rate is continued with further studies, up to four times as many. Ctrl-C ends with the results so
+    far. Ends with exit code 3 if a rate exceeds its limit by its 99.9 % interval, else with 4 where the
     studies are too few to decide about one.
     """
     if jobs == 0:
-        raise click.BadParameter("0 jobs do nothing: give 1 or more, or -1 for one a core", param_hint="--jobs")
+        raise click.BadParameter("0 jobs cannot run: give 1 or more, or -1 for one per core", param_hint="--jobs")
     from study_app.analysis.power.plan import plan
     from study_app.protocol.load import load
     from study_app.session.simulated.trial_features import feelings
     from study_app.store.output_files import write_files
+    from study_app.validation.report_rates.known_effects import simulated
     from study_app.validation.report_rates.rate_tables import markdown, table
     from study_app.validation.report_rates.rates import Rate
-    from study_app.validation.report_rates.simulated_studies import simulated
     from study_app.validation.report_rates.simulation import validate
 
-    protocol = load("rek2024")
-    studied = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))
     rates: tuple[Rate, ...] = ()
     begun, done = time.monotonic(), 0
-    clear = "\r\033[K" if sys.stderr.isatty() else ""
 
-    def line(text: str) -> None:
-        click.echo(f"{clear}{time.monotonic() - begun:.0f} s: {text}", err=True)
+    def say(text: str) -> None:
+        click.echo(f"{time.monotonic() - begun:.0f} s: {text}", err=True)
 
-    try:
-        for done, so_far in validate(studied, studies, seed, jobs=jobs, progress=line):
-            rates = so_far
-            if clear:
-                click.echo(f"{clear}{done} studies", err=True, nl=False)
-    except KeyboardInterrupt:
-        click.echo("ended early", err=True)
+    with progress() as show:
+        show("rehearsing every condition")
+        protocol = load("rek2024")
+        studied = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))
+        begun = time.monotonic()
+        try:
+            with open_executor("processes", jobs) as executor:
+                for done, so_far in validate(studied, studies, executor, seed=seed, progress=say):
+                    rates = so_far
+                    show(f"{done} studies")
+        except KeyboardInterrupt:
+            click.echo("ended early", err=True)
     words = f"{done} studies in {time.monotonic() - begun:.0f} s\n\n{markdown(rates)}"
     click.echo(words, nl=False)
     if to is not None:
@@ -74,9 +83,9 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
 def _summary(beyond: int, undecided: int, limited: int) -> str:
     """Return how many of the rates that have a limit are beyond it, or may be."""
     if not limited:
-        return "nothing was counted"
+        return "no rate was counted"
     if beyond:
-        return f"{beyond} of {limited} rates beyond their limits, {undecided} undecided"
+        return f"{beyond} of {limited} rates exceed their limits, {undecided} undecided"
     if undecided:
         return f"{undecided} of {limited} rates undecided: simulate more studies"
-    return "every rate keeps to its limit"
+    return "every rate is within its limit"

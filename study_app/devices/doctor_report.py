@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     pass
 
 
-State = Literal["ok", "found", "not looked at"]
-ORDER: Final[tuple[State, ...]] = ("found", "not looked at", "ok")
+State = Literal["ok", "found", "not checked"]
+ORDER: Final[tuple[State, ...]] = ("found", "not checked", "ok")
 WIDTH: Final = 100
-NOTHING_WRONG: Final = "Nothing is wrong with it."
+NOTHING_WRONG: Final = "No problem was found."
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Report:
     @property
     def unseen(self) -> tuple[Finding, ...]:
         """What could not be looked at."""
-        return tuple(finding for finding in self.findings if finding.state == "not looked at")
+        return tuple(finding for finding in self.findings if finding.state == "not checked")
 
     @property
     def well(self) -> bool:
@@ -76,27 +76,27 @@ class Report:
         if not self.well:
             return f"Found: {len(self.found)}."
         if self.unseen:
-            return f"Nothing wrong was found. Not looked at: {'; '.join(one.tested for one in self.unseen)}."
+            return f"Nothing wrong was found. Not checked: {'; '.join(one.tested for one in self.unseen)}."
         return NOTHING_WRONG
 
 
 def lines(found: Report) -> list[str]:
     """Return a report as text of 100 columns; what is to be pasted stands in one line."""
-    told = ["", *(f"seen: {words}" for words in found.seen), ""]
+    lines = ["", *(f"seen: {words}" for words in found.seen), ""]
     for finding in found.in_order:
         word = "FOUND" if finding.state == "found" else finding.state
-        told.append(f"{finding.number:>2}  {word:<13}  {finding.words}")
+        lines.append(f"{finding.number:>2}  {word:<13}  {finding.words}")
         if finding.state == "found" and not finding.says_itself:
-            told.append(_indented(f"cause: {finding.cause}", 19))
-            told.append(_indented(f"cure: {finding.cure}", 19))
-            told.append(_indented(f"known by: {finding.known_by}", 19))
+            lines.append(_indented(f"cause: {finding.cause}", 19))
+            lines.append(_indented(f"cure: {finding.cure}", 19))
+            lines.append(_indented(f"known by: {finding.known_by}", 19))
             if finding.paste:
-                told += ["", finding.paste, ""]  # in one line, to be copied
-    told.append("")
+                lines += ["", finding.paste, ""]  # in one line, to be copied
+    lines.append("")
     if found.failure is not None:
-        told.append(_indented(found.failure, 0))
-    told.append(_indented(found.conclusion, 0))
-    return told
+        lines.append(_indented(found.failure, 0))
+    lines.append(_indented(found.conclusion, 0))
+    return lines
 
 
 def _indented(words: str, by: int) -> str:

@@ -31,7 +31,7 @@ class PointedDevice(SimulatedDevice):
     ) -> None:
         handle = new_handle(mass_kg=MASS_KG, stiffness_npm=STIFFNESS_NPM, damping_nspm=DAMPING_NSPM)
         super().__init__(handle, workspace_m, force_limit_n)
-        self._state.hand.lag_s = LAG_S
+        self.state.hand.lag_s = LAG_S
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
         """Say where the pointer is [m, hand frame]; a place outside the workspace counts as its border."""

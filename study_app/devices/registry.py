@@ -1,83 +1,161 @@
-"""The devices by name: what each is, and opening one."""
+"""The devices by name: found in the folder ``descriptors`` and at entry points, described, and opened.
+
+Naming the devices loads neither compiler nor driver.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Container, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, cast
+from importlib.metadata import EntryPoint, entry_points
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Any, Final
 
-from study_app.errors import DeviceNotFound
+from study_app.devices import descriptors as folder
+from study_app.devices.descriptor import DeviceDescriptor, Doctor, OpenRequest
+from study_app.devices.names import DEFAULT_DEVICE
+from study_app.errors import DeviceError, DeviceNotFound
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
 
+ENTRY_POINTS: Final = "liquid_study.devices"
 
-# Loaded only when asked for: naming the devices must not load a compiler or a driver.
-_DEVICES = {
-    "mouse": ("study_app.devices.mouse", "MouseDevice"),
-    "falcon": ("study_app.devices.falcon.device", "FalconDevice"),
-    "spacemouse": ("study_app.devices.spacemouse.device", "SpaceMouseDevice"),
-    "scripted": ("study_app.devices.scripted", "ScriptedDevice"),
-    "falcon-emulated": ("study_app.devices.falcon.emulated", "EmulatedFalcon"),
-}
-_SOCKET = "falcon-socket"  # and the path of its socket
-_MOVED_BY_PROGRAM = ("scripted", "falcon-emulated")
+
+@dataclass(frozen=True, slots=True)
+class BrokenEntryPoint:
+    """A device of another package that cannot be used: its ``name``, the ``package``, and the ``reason`` in a line."""
+
+    name: str
+    package: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Discovery:
+    """All descriptors, the default first and simulated devices last, and what could not be loaded."""
+
+    devices: tuple[DeviceDescriptor, ...]
+    broken: tuple[BrokenEntryPoint, ...]
+
+
+@cache
+def discover() -> Discovery:
+    """Import every descriptor, once."""
+    found = {device.name: device for device in _shipped()}
+    broken = []
+    for point in entry_points(group=ENTRY_POINTS):
+        try:
+            device = _load(point, found)
+            found[device.name] = device
+        except Exception as error:  # noqa: BLE001 - code of another package: it must not end this program
+            package = point.dist.name if point.dist is not None else point.module
+            reason = " ".join(str(error).split()) or type(error).__name__
+            broken.append(BrokenEntryPoint(point.name, package, reason))
+    devices = sorted(found.values(), key=lambda device: (device.name != DEFAULT_DEVICE, device.simulated))
+    return Discovery(tuple(devices), tuple(broken))
+
+
+def _shipped() -> Iterator[DeviceDescriptor]:
+    for module in iter_modules(folder.__path__):
+        yield from import_module(f"{folder.__name__}.{module.name}").DEVICES
+
+
+def _load(point: EntryPoint, known: Container[str]) -> DeviceDescriptor:
+    """Return the descriptor at an entry point; a name that is ``known`` already is refused."""
+    device = point.load()
+    if not isinstance(device, DeviceDescriptor):
+        raise DeviceError(f"{point.value} is no DeviceDescriptor but a {type(device).__name__}")
+    if device.name in known:
+        raise DeviceError(f"a device named '{device.name}' exists already: give it another name")
+    return device
 
 
 def list_devices() -> tuple[str, ...]:
     """Return the names that ``open_device`` takes as they are, the default first."""
-    return tuple(_DEVICES)
+    return tuple(device.name for device in discover().devices if not device.argument_required)
 
 
-def kind_of(name: str) -> str:
-    """Return which kind of device ``name`` means, without what tells one of the kind from others.
+def descriptor_of(name: str) -> DeviceDescriptor:
+    """Return the descriptor of a device, by its name with or without what follows the colon.
 
     Raises
     ------
     DeviceNotFound
         No device has this name.
     """
-    kind, _, which = name.partition(":")
-    if kind == _SOCKET and which:
-        return kind
-    if kind == _SOCKET:
-        raise DeviceNotFound("falcon-socket needs the path of its socket: falcon-socket:PATH")
-    if kind not in _DEVICES or (which and kind != "falcon"):
-        known = ", ".join((*_DEVICES, f"{_SOCKET}:PATH"))
+    kind, _, argument = name.partition(":")
+    found = {device.name: device for device in discover().devices}.get(kind)
+    if found is None or (argument and not found.argument):
+        known = ", ".join(device.usage for device in discover().devices)
         raise DeviceNotFound(f"device '{name}' is not known; choose one of: {known}")
-    return kind
+    if found.argument_required and not argument:
+        raise DeviceNotFound(f"device '{kind}' needs more than its name: give it as {found.usage}")
+    return found
 
 
-def is_falcon(name: str) -> bool:
-    """Return whether ``name`` is a Falcon or an emulated one, which takes ``firmware`` and ``tell``."""
-    return kind_of(name).startswith("falcon")
+def title_of(name: str) -> str:
+    """Return what people read for a device; for one that is not known, its name."""
+    kind = name.partition(":")[0]
+    return next((device.title for device in discover().devices if device.name == kind), name)
 
 
-def moves_by_itself(name: str) -> bool:
-    """Return whether the program holds the handle of ``name``: it then has ``random`` tremor and takes orders."""
-    return kind_of(name) in _MOVED_BY_PROGRAM
+def open_device(name: str, **request: Any) -> Device:
+    """Return the device ``name``, open; ``request`` are the fields of an `OpenRequest` but its argument.
 
-
-def is_simulated(name: str) -> bool:
-    """Return whether no participant feels ``name``."""
-    return moves_by_itself(name) or kind_of(name) == _SOCKET
-
-
-def open_device(name: str, **options: Any) -> Device:
-    """Return the device ``name``, opened; ``options`` are those of its class.
-
-    ``name`` is one of `list_devices`, ``falcon:SERIAL`` or ``falcon-socket:PATH``.
+    ``name`` is one of `list_devices`, or with what follows the colon, such as ``falcon:SERIAL``.
 
     Raises
     ------
     DeviceNotFound
         No device has this name, or none is connected.
     DeviceError
-        It is there, and cannot be used.
+        It is there, and cannot be used; or it does not take an option.
     """
-    kind = kind_of(name)
-    if kind in {"falcon", _SOCKET}:
-        options["bridge"] = name
-    module, of_kind = _DEVICES["falcon" if kind == _SOCKET else kind]
-    device = cast("Device", getattr(import_module(module), of_kind)(**options))
-    device.open()
-    return device
+    device = descriptor_of(name)
+    asked = OpenRequest(**request)
+    check_options(name, asked.options)
+    return device.open(replace(asked, argument=name.partition(":")[2]))
+
+
+def doctor_of(name: str) -> Doctor:
+    """Return what examines a device.
+
+    Raises
+    ------
+    DeviceNotFound
+        No device has this name.
+    DeviceError
+        Nothing examines it.
+    """
+    doctor = descriptor_of(name).doctor
+    if doctor is None:
+        examined = ", ".join(device.usage for device in discover().devices if device.doctor is not None)
+        raise DeviceError(
+            f"the doctor looks at {examined}, and '{name}' is none of these: see 'liquid-study devices list'"
+        )
+    return doctor
+
+
+def check_options(name: str, options: Iterable[str]) -> None:
+    """Refuse options that a device does not take.
+
+    Parameters
+    ----------
+    options : their names
+
+    Raises
+    ------
+    DeviceNotFound
+        No device has this name.
+    DeviceError
+        It does not take one of them.
+    """
+    taken = {option.name for option in descriptor_of(name).options}
+    for option in options:
+        if option not in taken:
+            takers = [device.title for device in discover().devices if option in {one.name for one in device.options}]
+            only = f"; only these do: {', '.join(takers)}" if takers else ""
+            raise DeviceError(f"device '{name}' takes no {option}{only}: leave --{option} out")

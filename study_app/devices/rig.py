@@ -1,33 +1,35 @@
-"""Device and servo of a session, opened at rest and let go of in the order of safety."""
+"""Device and servo, opened together at rest and let go of in the order of safety: the one place that does so."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
-from typing import TYPE_CHECKING, Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
-from study_app.devices.registry import is_falcon, moves_by_itself, open_device
+from study_app.devices.registry import open_device
+from study_app.errors import DeviceError
 from study_app.protocol.model import Protocol
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
+    from study_app.haptics.runtime.clocks.clock import Clock
     from study_app.haptics.runtime.servo import Servo
 
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """Device and servo, running at rest."""
+    """Device and servo; as a context manager it stops them at the end."""
 
     device: Device
     servo: Servo
 
     @property
     def described(self) -> dict[str, Any]:
-        """What the receipt may say: the size of the servo's wake would name a parameter of a liquid."""
-        told = {name: value for name, value in self.servo.describe().items() if name != "elements"}
-        return self.device.describe() | told
+        """What the receipt says of device and servo."""
+        return self.device.describe() | self.servo.describe()
 
     def reconnect(self) -> dict[str, Any]:
         """Open a device that failed again, home it, and start the servo at zero force; return what describes it now.
@@ -53,36 +55,92 @@ class Rig:
         finally:
             self.device.close()
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RigSettings:
+    """What device and servo are opened for.
+
+    Attributes
+    ----------
+    workspace_m : whole extents of where the hand reaches [m]
+    force_limit_n : the greatest force the device may be asked for [N]
+    rate_hz : ticks a second
+    elements : the most wake elements that a scene may call for
+    random : where the tremor of a device that moves by itself is drawn from
+    options : values of the device's options, by name
+    """
+
+    workspace_m: tuple[float, float, float]
+    force_limit_n: float
+    rate_hz: float = 1000.0
+    elements: int
+    random: Random
+    options: Mapping[str, str | Path] = field(default_factory=dict)
+
+
+def study_settings(study: Protocol, random: Random, options: Mapping[str, str | Path] | None = None) -> RigSettings:
+    """Return the settings for the sessions of a protocol."""
+    from study_app.haptics.runtime.pack import elements_needed  # noqa: PLC0415 - the compiler: only once it is needed
+
+    return RigSettings(
+        workspace_m=study.device.workspace_m,
+        force_limit_n=study.device.force_limit_n,
+        rate_hz=study.device.rate_hz,
+        elements=max(elements_needed(study.scene_for(condition)) for condition in study.conditions),
+        random=random,
+        options=options or {},
+    )
+
 
 def open_rig(
     name: str,
-    study: Protocol,
+    settings: RigSettings,
     *,
-    random: Random,
-    firmware: Path | None = None,
-    tell: Callable[[str], object] | None = None,
+    clock: Clock | None = None,
+    progress: Callable[[str], object] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Rig:
     """Open the device and start the servo at rest; compiling takes a minute the first time.
 
-    ``random`` draws the tremor of a device that moves by itself; ``firmware`` is the file of a Falcon's program.
-    ``tell`` is given what a device asks for while it is opened, a line at a time; it gives up when ``cancelled``.
-    """
-    from study_app.haptics.runtime.pack import elements_needed  # noqa: PLC0415 - the compiler: only once it is needed
-    from study_app.haptics.runtime.servo import Servo  # noqa: PLC0415
+    Parameters
+    ----------
+    clock : default: the system's; on a virtual one the servo is not started, but advanced by its user
+    progress : is given what a device asks for while it is opened, a line at a time
+    cancelled : is asked whether to give up opening it
 
-    x, y, z = study.device.workspace_m
-    options: dict[str, Any] = {"workspace_m": (x / 2, y / 2, z / 2), "force_limit_n": study.device.force_limit_n}
-    if moves_by_itself(name):
-        options["random"] = random
-    if is_falcon(name):
-        options |= {"firmware": firmware, "tell": tell, "cancelled": cancelled}
-    device = open_device(name, **options)
+    Raises
+    ------
+    StudyError
+        It cannot be opened; then nothing of it is left open.
+    """
+    from study_app.haptics.runtime.servo import Servo  # noqa: PLC0415 - the compiler: only once it is needed
+
+    x, y, z = settings.workspace_m
+    device = open_device(
+        name,
+        workspace_m=(x / 2, y / 2, z / 2),
+        force_limit_n=settings.force_limit_n,
+        random=settings.random,
+        progress=progress,
+        cancelled=cancelled,
+        options=settings.options,
+    )
+    if cancelled is not None and cancelled():
+        device.close()
+        raise DeviceError(f"opening the device '{name}' was cancelled")
     try:
-        elements = max(elements_needed(study.scene_for(condition)) for condition in study.conditions)
-        servo = Servo(device, rate_hz=study.device.rate_hz, elements=elements)
-        servo.start()
+        rig = Rig(device, Servo(device, clock=clock, rate_hz=settings.rate_hz, elements=settings.elements))
+        if clock is None or clock.runs:
+            rig.servo.start()
     except BaseException:
         device.close()
         raise
-    return Rig(device, servo)
+    return rig

@@ -9,7 +9,8 @@ import numpy as np
 from study_app.evaluation import reference_model
 from study_app.evaluation.appraisal import Costs, EffectCost, Errors
 from study_app.evaluation.cost import measure
-from study_app.haptics.model.gate import ORDER, calls_for, resolve
+from study_app.haptics.model.effects import NAMED
+from study_app.haptics.model.gate import calls_for, resolve
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.paths import path
 from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
@@ -32,13 +33,13 @@ def costs(scene: Scene, *, batches: int = BATCHES) -> Costs:
     asked = scene.liquids[0].effects != "auto"
     bounds_n = {verdict.effect: verdict.bound_n for verdict in calls_for(scene)}
     rows = []
-    for effect in ORDER:
+    for effect in NAMED:
         ns = found.effects_ns.get((liquid.id, effect))
         if effect in liquid.effects and ns is not None:
             rows.append(EffectCost(effect, max(ns, 0.0)))
         else:
-            out = f"out, {bounds_n[effect]:.2f} N" if effect in bounds_n else "not asked for"
-            rows.append(EffectCost(effect, None, "not asked for" if asked else out))
+            out = f"out, {bounds_n[effect]:.2f} N" if effect in bounds_n else "not used"
+            rows.append(EffectCost(effect, None, "not used" if asked else out))
     return Costs(found.scene_ns, found.rest_ns, tuple(rows))
 
 

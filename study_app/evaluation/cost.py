@@ -13,6 +13,7 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.model.bounds import bounds
+from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.motion import Floats
@@ -22,13 +23,12 @@ from study_app.haptics.runtime.pack import pack
 BATCH: Final = 1_000
 BATCHES: Final = 200
 WARM_UP: Final = 10_000
-_THROUGH_DRAG: Final = ("wake", "local_wake", "current")
 
 
 class Cost(NamedTuple):
     """Medians over batches of 1,000 ticks [ns a tick]: the scene, the scene without liquids, and each effect.
 
-    An effect's cost is what it adds to its liquid without effects; what acts through drag, to the liquid with drag.
+    An effect's cost is what it adds to its liquid without effects, or with the one that it acts through.
     """
 
     scene_ns: float
@@ -41,7 +41,7 @@ def measure(scene: Scene, *, batches: int = BATCHES) -> Cost:
     scene = resolve(scene)
     rest = scene.model_copy(update={"liquids": ()})
     pairs = _pairs(scene)
-    benches = {it: _Bench(it) for it in dict.fromkeys([scene, rest, *(it for pair in pairs.values() for it in pair)])}
+    benches = {it: Bench(it) for it in dict.fromkeys([scene, rest, *(it for pair in pairs.values() for it in pair)])}
     for _ in range(batches):
         for bench in benches.values():
             bench.batch()
@@ -54,9 +54,9 @@ def report(scene: Scene, *, batches: int = BATCHES) -> str:
     """Return which effects a scene calls for, why, and what each costs, as text."""
     cost = measure(scene, batches=batches)
     percent = 100 * cost.scene_ns * 1e-9 * scene.rate_hz
-    whole = f"one tick: {cost.scene_ns:.0f} ns, {percent:.2f} % of the time between two"
+    whole = f"one tick: {cost.scene_ns:.0f} ns, {percent:.2f} % of the tick period"
     return "\n".join(
-        (*describe_gate(scene, cost.effects_ns), "", f"{whole}; {cost.rest_ns:.0f} ns of it without any liquid")
+        (*describe_gate(scene, cost.effects_ns), "", f"{whole}; {cost.rest_ns:.0f} ns of it without liquids")
     )
 
 
@@ -67,7 +67,7 @@ def hand(ticks: int = WARM_UP) -> Floats:
     return 0.03 * np.column_stack([np.cos(angle), 0.2 * np.sin(3 * angle), np.sin(angle)])
 
 
-class _Bench:
+class Bench:
     """One scene on the bench: its memory, and the cost of every batch so far."""
 
     def __init__(self, scene: Scene) -> None:
@@ -75,14 +75,16 @@ class _Bench:
         self._positions_m = hand()
         self._ticks = 0
         self.costs_ns: list[float] = []
-        self._run(WARM_UP)
+        self.run(WARM_UP)
 
     def batch(self) -> None:
+        """Take a batch of ticks and keep its cost."""
         began = time.perf_counter_ns()
-        self._run(BATCH)
+        self.run(BATCH)
         self.costs_ns.append((time.perf_counter_ns() - began) / BATCH)
 
-    def _run(self, ticks: int) -> None:
+    def run(self, ticks: int) -> None:
+        """Take so many ticks."""
         _take(self._model, self._safety[0], self._sample[0], self._positions_m, self._ticks, ticks)
         self._ticks += ticks
 
@@ -105,7 +107,7 @@ def _pairs(scene: Scene) -> dict[tuple[str, Effect], tuple[Scene, Scene]]:
     found: dict[tuple[str, Effect], tuple[Scene, Scene]] = {}
     for liquid in scene.liquids:
         for effect in bounds(scene, liquid):
-            others: tuple[Effect, ...] = ("drag",) if effect in _THROUGH_DRAG else ()
+            others: tuple[Effect, ...] = NAMED[effect].through[:1]
             found[liquid.id, effect] = _with(scene, liquid, (*others, effect)), _with(scene, liquid, others)
     return found
 

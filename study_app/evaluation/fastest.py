@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from study_app.haptics.model.device_dynamics import Dynamics
     from study_app.haptics.model.scene import Scene
-    from study_app.protocol.trials.task import Stroke
+    from study_app.protocol.trials.tasks.stroke import Stroke
 
 LASTS_S: Final = 2.0
 

@@ -35,7 +35,7 @@ def respond(scene: Scene, motion: Motion, *, exact: bool = False) -> Response:
     interval_s = np.clip(np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / scene.rate_hz), 0.2e-3, 20e-3)
     interval_s[0] = 1 / scene.rate_hz
     given = motion.velocity_mps if motion.velocity_mps is not None else _filtered(scene, motion, interval_s)
-    velocity_mps = np.array([lowered(row, scene.knee) for row in given])
+    velocity_mps = given if liquid.drag.law == "linear" else np.array([lowered(row, scene.knee) for row in given])
     wake_mps, size_mps = np.zeros_like(velocity_mps), np.zeros(len(velocity_mps))
     if liquid.wake is not None and "wake" in liquid.effects:
         length = max(1, math.floor(liquid.wake.length * scene.rate_hz / 1000))
@@ -61,6 +61,8 @@ def resistance_nspm(scene: Scene, speed_mps: float) -> float:
     """Return |F|/|w| [N·s/m] by the liquid's law of drag, from C_d itself; at rest its limit."""
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     pressure_kg_m = 0.5 * liquid.density_kg_m3 * math.pi * (diameter_m / 2) ** 2
+    if liquid.drag.law == "linear":
+        return float(liquid.drag.damping_nspm / scene.scale)
     if liquid.drag.law == "constant":
         return pressure_kg_m * scene.body.drag_coefficient * speed_mps
     viscosity_pa_s = liquid.viscosity_pa_s or 0.0
@@ -216,7 +218,7 @@ def exact_wakes(
 
 @workings
 def _add(sums: Any, row: int, value: float) -> None:
-    """Add to a sum, whose rounding error is in the column beside it (Neumaier 1974, ZAMM 54:39)."""
+    """Add to a sum, whose rounding error is in the next column (Neumaier 1974, ZAMM 54:39)."""
     total = sums[row, 0] + value
     if abs(sums[row, 0]) >= abs(value):
         sums[row, 1] += (sums[row, 0] - total) + value

@@ -1,24 +1,20 @@
 """What models of a liquid are measured against: motions with the force that belongs to them.
 
 Two kinds, kept apart. *Numerical*: the definition of the model itself, summed without rounding errors. *Physical*: what
-a real sphere meets, as far as that is known: measured steady drag, the exact forces of creeping flow, and tables that a
-fluid solver left in the package (``validation/cfd/*.csv``). None of it shares code with ``haptics.kernels.effects``.
+a real sphere meets, as far as that is known: measured steady drag and the exact forces of creeping flow. None of it
+shares code with ``haptics.kernels.effects``.
 """
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import dataclass
-from importlib import resources
-from importlib.resources.abc import Traversable
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from study_app.errors import StudyError
 from study_app.evaluation.hand_motions import along_x, stroke, vectors_x
 from study_app.evaluation.reference_model import respond
 from study_app.haptics.model.motion import Floats, Motion
@@ -50,7 +46,7 @@ DRAG_POINTS: Final = (
 """(Re, C_d) of smooth spheres by experiment, below the drag crisis: CalcDEMma drag laboratory, Indiana University of
 Pennsylvania. Its lowest point (Re 0.0588, C_d 492) is left out: it is 20 % above Stokes, which is exact there. The next
 two are still 8 to 9 % above Oseen's law, and those around Re 1 to 2 some 4 to 7 % above the fluid solver: differences
-between laws of the Reynolds number that are as small are not told from the scatter of the experiments."""
+between laws of the Reynolds number that are as small cannot be separated from the scatter of the experiments."""
 
 OSEEN_REYNOLDS: Final = 0.5
 CREEPING_REYNOLDS: Final = 0.01
@@ -58,7 +54,6 @@ START_S: Final = 2.0
 UNCOUNTED_S: Final = 0.01  # after a step the force of the added mass is infinite for an instant
 SPEEDS: Final = 60
 CYCLES: Final = 6
-SOLVER_COLUMNS: Final = ["t_s", "velocity_mps", "force_n"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +82,7 @@ class Truth:
 def definition(scene: Scene, motion: Motion) -> Truth:
     """Return drag and wake of the scene's liquid by the letter, for a motion with its velocities."""
     force_n = respond(scene, motion, exact=True).force_n
-    source = "definition of the wake by the letter: full length, full rate, float64, exact sums"
+    source = "exact definition of the wake: full length, full rate, float64, exact sums"
     return Truth("definition", source, (Case(motion, force_n, np.ones(len(force_n), bool)),))
 
 
@@ -184,56 +179,3 @@ def strokes_per_s(scene: Scene) -> float:
     """Return ω [1/s] of a stroke with the greatest speed and acceleration of the scene."""
     box = scene.motion_in(scene.liquids[0])
     return (box.acceleration_mps2 or math.nan) / (box.speed_mps or math.nan)
-
-
-def stored(scene: Scene, folder: Traversable | None = None) -> tuple[Truth, ...]:
-    """Return what a fluid solver found for the scene's liquid and body; empty where nothing of the kind is stored.
-
-    A table is a CSV file of ``t_s,velocity_mps,force_n`` along one axis (the force on the body, so against the motion
-    at first) after comment lines ``# name: value``: ``title``, ``density_kg_m3``, ``viscosity_pa_s``, ``diameter_m``,
-    ``command``, ``machine``, ``computing_s_per_s``. Files with other columns are not for here.
-
-    Raises
-    ------
-    StudyError
-        A table that cannot be understood.
-    """
-    place = folder or resources.files("study_app.validation.cfd")
-    if not place.is_dir():
-        return ()
-    found = []
-    for file in sorted((it for it in place.iterdir() if it.name.endswith(".csv")), key=lambda it: it.name):
-        lines = file.read_text(encoding="utf-8").splitlines()
-        said = dict(line[1:].partition(":")[::2] for line in lines if line.startswith("#"))
-        rows = list(csv.reader(line for line in lines if line and not line.startswith("#")))
-        if rows and rows[0] == SOLVER_COLUMNS:
-            notes = {name.strip(): value.strip() for name, value in said.items()}
-            truth = _solved(file.name, notes, rows[1:], scene)
-            found += [truth] if truth is not None else []
-    return tuple(found)
-
-
-def _solved(name: str, notes: dict[str, str], rows: list[list[str]], scene: Scene) -> Truth | None:
-    """Return one stored table at the scene's rate, or None where it is of another liquid or body."""
-    liquid = scene.liquids[0]
-    try:
-        table = np.array([[float(field) for field in row] for row in rows])
-        of = [float(notes[key]) for key in ("density_kg_m3", "viscosity_pa_s", "diameter_m", "computing_s_per_s")]
-        t_s, velocity_mps, force_n = table.T
-    except (KeyError, ValueError) as error:
-        raise StudyError(
-            f"the stored table {name} cannot be used ({error}): make it again with the solver that wrote it"
-        ) from error
-    ours = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
-    if not np.allclose(of[:3], ours, rtol=0.01, atol=0):
-        return None
-    even_s = np.arange(t_s[0], t_s[-1], 1 / scene.rate_hz)
-    even_mps = np.interp(even_s, t_s, velocity_mps)
-    way_m = np.concatenate([[0.0], np.cumsum((even_mps[1:] + even_mps[:-1]) / 2 * np.diff(even_s))])
-    case = Case(
-        along_x(even_s - even_s[0], way_m, even_mps),
-        vectors_x(np.interp(even_s, t_s, force_n)),
-        np.ones(len(even_s), bool),
-    )
-    title = notes.get("title", name.removesuffix(".csv"))
-    return Truth(title, f"fluid solver: {notes.get('command', name)}", (case,), of[3], notes.get("machine", ""))

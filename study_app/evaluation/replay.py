@@ -2,7 +2,8 @@
 
 The recordings keep the CRC-32 of each second of exact forces; here the forces are computed again and compared with
 that. The same version of the program on the same kind of processor gives the same bits; seconds that differ are named.
-The key is opened in memory alone, and nothing of it is told: who replays a session stays blind.
+What each interval of a trial delivered is computed from its recording again, too, and compared with the journal.
+The key is opened in memory alone, and nothing of it is printed: whoever replays a session stays blind.
 
 A recording begins shortly before its trial, so that the force it begins with is known; one that follows another without
 a pause goes on from where that one was. What cannot be computed again is named: a proof says what it is not about.
@@ -20,20 +21,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import StoreError
+from study_app.evaluation.recorded_delivery import delivered_again, different
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.safety import SCENE_FADE_S, START_FADE_S, begin_scene, new_safety
+from study_app.haptics.kernels.safety import START_FADE_S, begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import Dynamics, dynamics_from
 from study_app.haptics.model.layout import LIMITER_FADE, SAMPLE, records
-from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.scene import FADE_S, Scene
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.recompute import take_sample, was_lost_at_read
 from study_app.protocol.model import Protocol
+from study_app.protocol.trials.answered import presented_by
+from study_app.protocol.trials.presentation import scene_of
 from study_app.store import receipt, recording_files
 from study_app.store.atomic import is_there
 from study_app.store.blinded import blinding
+from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
+from study_app.store.progress import is_of_intervals, named
 
 NAMED_SECONDS = 8
 _FORCES = ("force_n", "command_n", "device_force_n")
@@ -46,7 +53,7 @@ class Replayed:
     """What a replay found.
 
     ``recordings`` were computed again, ``seconds`` of them compared. ``differences`` has a sentence for each recording
-    whose forces came out otherwise, ``missing`` one for each that the journal tells of and that is not there,
+    whose forces came out otherwise, ``missing`` one for each that the journal names and that is missing,
     ``uncompared`` one for each that could not be computed again, or not to its end. ``lasted_s`` is how long the hand
     moved, ``computed_s`` how long its forces took again; ``took_s`` adds reading the files and loading the code.
     """
@@ -72,18 +79,28 @@ def replay(session_folder: Path) -> Replayed:
     Raises
     ------
     StoreError
-        It is no session's folder, or its journal, receipt, key or a recording cannot be read.
+        It is not a session folder, or its journal, receipt, key or a recording cannot be read.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> from study_app.session.simulated.rehearsal import rehearse
+    >>> study = rehearse("demo", participants=1, seed=1, results=Path(mkdtemp(), "demo"))
+    >>> found = replay(study / "data" / "sub-P001" / "ses-01")
+    >>> found.recordings, found.differences, found.proved
+    (4, (), True)
     """
     began = time.perf_counter()
     study, session = locate(session_folder)
-    lines = journal.read(session.journal)
     kept = receipt.read(session.receipt)
     key = blinding.read_key(study.path)
     if key.hash != kept["key_hash"]:
         raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
+    lines = opened(journal.read(session.journal), key)
     protocol, devices = _ran(session.receipt, kept, key, lines)
     _again(records(SAMPLE, 0), Scene(), *devices[None], None)  # loads the compiled code: no part of what is measured
     found = _Found()
+    intervals = {_which(line): line for line in lines if line["event"] == "interval_ended"}
     before: _Before | None = None
     resumed_at: str | None = None
     for started, line, resumed in _presented(lines):
@@ -91,20 +108,24 @@ def replay(session_folder: Path) -> Replayed:
             before, resumed_at = None, resumed
         if resumed not in devices:
             raise StoreError(f"{session.receipt} lacks the device since {resumed}: restore it from a copy")
-        name = f"trial {started['trial']}, attempt {started['attempt']}"
+        name = named(started)
         if line is None or line["event"] == "recording_lost":
-            why = "no line of the journal says why" if line is None else line["reason"]
+            why = "the journal gives no reason" if line is None else line["reason"]
             found.uncompared.append(f"{name}: has no recording: {why}")
             continue
         path = session.path / line["recording"]
         if not is_there(path):
-            found.missing.append(f"{name}: {line['recording']} is missing, though the journal tells of it")
+            found.missing.append(f"{name}: {line['recording']} is missing, but the journal mentions it")
             continue
-        scene = protocol.scene_for(key.condition(started["block"], started["code"]))
+        scene = _scene(protocol, key, started)
         samples, checks = recording_files.read_samples(path), recording_files.read_checks(path)
         start = time.perf_counter()
         before = _again(samples, scene, *devices[resumed], before)
         found.compare(name, samples, before, checks)
+        if (ended := intervals.get(_which(started))) is not None and _until_gap(samples.tick) == len(samples):
+            interval = presented_by(protocol, key.codes, started).intervals[started["interval"] - 1]
+            again = delivered_again(protocol, interval, started["block"], samples, ended)
+            found.differences += [f"{name}: the column {column} differs" for column in different(again, ended)]
         found.computed_s += time.perf_counter() - start
     return found.replayed(time.perf_counter() - began)
 
@@ -128,7 +149,7 @@ def _again(samples: Any, scene: Scene, limit_n: float, dynamics: Dynamics, befor
     """Return the forces of ``samples`` computed again, in a copy; the scene that is theirs is the last one's."""
     out = samples.copy()
     serial = int(out.scene[-1]) if len(out) else 0
-    rest = pack(scene.model_copy(update={"liquids": ()}), dynamics=dynamics)
+    rest = pack(scene.model_copy(update={"liquids": (), "fade_s": FADE_S}), dynamics=dynamics)
     model = pack(scene, dynamics=dynamics)
     first = 0
     shared = _shared(before, out)
@@ -139,7 +160,7 @@ def _again(samples: Any, scene: Scene, limit_n: float, dynamics: Dynamics, befor
         return _Before(serial, model, before.safety, out, before.knows_its_start)
     safety = new_safety(limit_n)
     if len(out) and out.tick[0] != 0:
-        _assume(safety[0], out[0])
+        _assume(safety[0], out)
         first = 1
     knows_its_start = not out.force_n[out.scene != serial].any()
     _run(rest, rest, model, 0, serial, safety[0], out, first)
@@ -159,14 +180,20 @@ def _copy_forces(known: Any, out: Any) -> None:
         out[name] = known[name]
 
 
-def _assume(safety: Any, sample: Any) -> None:
-    """Take the first sample as it was recorded, exactly; a fade under way is over before the trial begins."""
-    fades = bool(sample.limiters & LIMITER_FADE)
+def _assume(safety: Any, out: Any) -> None:
+    """Take the first of the samples ``out`` as it was recorded, exactly.
+
+    Of a fade under way nothing but its length counts, since nothing is felt before the trial's own scene, which begins
+    its fade anew. The start's fade is over where a later sample before the next scene shows no fade.
+    """
+    other = np.flatnonzero(out.scene != out.scene[0])
+    lead = out[: other[0]] if other.size else out[:1]
+    fades = bool((lead.limiters & LIMITER_FADE).all())
     safety.started = 1
-    safety.turn_ns = safety.usable_ns = sample.time_ns
+    safety.tick_ns = safety.usable_ns = out.time_ns[0]
     safety.fade = 0.0 if fades else 1.0
-    safety.fade_s = START_FADE_S if fades else SCENE_FADE_S
-    safety.slewed_n[:] = sample.command_n
+    safety.fade_s = START_FADE_S if fades else 0.0
+    safety.slewed_n[:] = out.command_n[0]
 
 
 @kernel
@@ -219,7 +246,7 @@ class _Found:
             self.uncompared.append(f"{name}: holds no sample")
             return
         if not again.knows_its_start:
-            self.uncompared.append(f"{name}: goes on from the force of a recording that is not there, or has a gap")
+            self.uncompared.append(f"{name}: continues from the force of a recording that is missing or has a gap")
             return
         self.recordings += 1
         self.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9
@@ -281,6 +308,18 @@ def _listed(seconds: list[int]) -> str:
     return f"second {shown}{more}"
 
 
+def _scene(protocol: Protocol, key: blinding.Key, started: Line) -> Scene:
+    """Return what was presented: a condition, or an interval of a trial whose sealed line is opened."""
+    if "interval" not in started:
+        return protocol.scene_for(key.condition(started["block"], started["code"]))
+    due = presented_by(protocol, key.codes, started)
+    return scene_of(protocol, due.intervals[started["interval"] - 1])
+
+
+def _which(line: Line) -> tuple[int, int, int | None]:
+    return line["trial"], line["attempt"], line.get("interval")
+
+
 def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None, str | None]]:
     """Yield the line of each presentation that was to be recorded, and the line about its recording, if there is one.
 
@@ -288,15 +327,20 @@ def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None, str |
     again, last; None before that.
     """
     events = ("recorded", "recording_lost")
-    told = {(line["trial"], line["attempt"]): line for line in lines if line["event"] in events}
+    ends = {_which(line): line for line in lines if line["event"] in events}
     if not lines or not lines[0].get("recordings"):
         return
     resumed_at: str | None = None
+    started: Line = {}
     for line in lines:
         if line["event"] in ("session_resumed", "device_reconnected"):
             resumed_at = line["at"]
+        elif line["event"] == "trial_started" and not is_of_intervals(line):
+            yield line, ends.get(_which(line)), resumed_at
         elif line["event"] == "trial_started":
-            yield line, told.get((line["trial"], line["attempt"])), resumed_at
+            started = line
+        elif line["event"] == "interval_started":
+            yield {**started, "interval": line["interval"]}, ends.get(_which(line)), resumed_at
 
 
 def _ran(
@@ -313,18 +357,10 @@ def _ran(
         devices = {
             at: (float(device.get("force_limit_n", np.inf)), dynamics_from(device)) for at, device in described.items()
         }
-        return _whole(kept["protocol"], key), devices
+        return whole_protocol(kept["protocol"], key), devices
     except KeyError as lacking:
         raise StoreError(f"{path} lacks {lacking}: restore it from a copy") from lacking
     except (AttributeError, TypeError, ValueError):  # said without the reason, which would tell conditions
         raise StoreError(
             f"{path} and the study's key give no protocol that this version can run: restore them from a copy"
         ) from None
-
-
-def _whole(published: Mapping[str, Any], key: blinding.Key) -> Protocol:
-    """Return the protocol of a receipt with what the key keeps of it."""
-    blocks = {name: dict(block) for name, block in published["blocks"].items()}
-    for name, block in blocks.items():
-        block["conditions"] = [key.condition(name, code) for code in block.pop("codes")]
-    return Protocol.model_validate({**published, **key.tables, "blocks": blocks})

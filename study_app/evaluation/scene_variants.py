@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.laws import Law
-from study_app.haptics.model.scene import Drag, Effect, Everywhere, Scene
+from study_app.haptics.model.scene import Effect, Everywhere, Scene
 
 
 def with_wake(scene: Scene, **changes: Any) -> Scene:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
@@ -11,6 +12,9 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.display.display_check import check_display
 from study_app.gui.theme.icons import logo
 from study_app.gui.theme.theme import LIGHT
+
+SWITCH_INTERVAL_S = 0.0005
+"""How long another thread keeps Python's lock from the windows' thread, which takes it again after each call of Qt."""
 
 
 def application_here() -> QApplication:
@@ -26,6 +30,7 @@ def application_here() -> QApplication:
     application.setStyle("Fusion")
     application.setWindowIcon(logo(32, LIGHT.accent, LIGHT.on_accent))
     application.setQuitOnLastWindowClosed(False)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     return application
 
 

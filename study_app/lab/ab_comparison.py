@@ -6,23 +6,19 @@ Nothing here knows a device or a window: whatever changes is a new `Workbench`, 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final, Literal, Protocol, TypeAlias
+from random import Random
+from typing import Final, Literal, TypeAlias
 
 from study_app.errors import StudyError
+from study_app.haptics.model.effect import Value
 from study_app.haptics.model.scene import Scene
 from study_app.lab.changes import changed
-from study_app.lab.parameters import Value, sections, the_liquid, value_of
+from study_app.lab.parameters import sections, the_liquid, value_of
 
 Side: TypeAlias = Literal["A", "B"]
 
 MOST_STEPS: Final = 500
 _SWITCHES_BY_CHANCE: Final = 0.5
-
-
-class Chance(Protocol):
-    """What is drawn from while a comparison is blinded: ``random.Random``, say."""
-
-    def random(self) -> float: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +57,7 @@ class Setting:
 class Workbench:
     """Settings A and B; ``felt`` is the one in the hand.
 
-    While ``blind`` nobody may know which is which: ``first`` is the one called "setting 1", and nothing can be edited.
+    While ``blind`` the assignment is hidden: ``first`` is the one called "setting 1", and nothing can be edited.
     ``held`` is the parameter whose slider is being dragged.
     """
 
@@ -157,7 +153,7 @@ class Workbench:
         """Return this with the other setting in the hand."""
         return replace(self, felt=other(self.felt), held=None)
 
-    def blinded(self, chance: Chance) -> Workbench:
+    def blinded(self, chance: Random) -> Workbench:
         """Return this with nothing to be known: which is setting 1, and which of them is felt now, is drawn."""
         if self.blind:
             return self
@@ -179,7 +175,7 @@ class Workbench:
 
     def _refuse_blind(self, what: str) -> None:
         if self.blind:
-            raise StudyError(f"while the comparison is blind no setting can be {what}: end the blinding first")
+            raise StudyError(f"no setting can be {what} during a blind comparison: end it first")
 
 
 def other(side: Side) -> Side:

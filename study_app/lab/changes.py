@@ -10,31 +10,24 @@ import math
 from typing import Any, Final
 
 from study_app.errors import StudyError
-from study_app.haptics.model.gate import ORDER, resolve
+from study_app.haptics.model.effect import Parameter, Value
+from study_app.haptics.model.effects import EFFECTS, NAMED
+from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Scene
 from study_app.lab.parameters import (
     AUTO,
     AXES,
-    EFFECT_WORDS,
     ON,
-    Parameter,
-    Value,
     parameter,
     read,
     the_liquid,
     value_of,
 )
 
-_WAKE: Final = {"length": 1700, "scaling": 1700.0}  # the thesis' water
-_TABLES: Final[dict[str, dict[str, Any]]] = {
-    "wake": _WAKE,
-    "local_wake": _WAKE,
-    "current": {"kind": "uniform", "velocity_mps": (0.5, 0.0, 0.0)},
-}
-_THROUGH_DRAG: Final = ("wake", "local_wake", "current")
 _HALF_HAND_M: Final = 0.05
-_SPEED_MPS: Final = 0.5
+_KINDS: Final = ("kind", "law")
+"""Fields that decide which others a table has."""
 
 
 def changed(scene: Scene, name: str, value: Value) -> Scene:
@@ -56,13 +49,14 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
         whole = list(read(scene, f"{place}.{field}"))
         whole[AXES.index(axis[0])] = value
         return override_all(scene, {f"{place}.{field}": tuple(whole)})
-    if field == "kind" and place in {"region", "current"}:
+    chosen = place in NAMED and NAMED[place].choose is not None
+    by_hand = _named(scene) if chosen else {}  # the gate would choose another
+    if field in _KINDS and (place == "region" or place in NAMED):
         if value == read(scene, name):
             return scene
-        return override_all(scene, {f"liquid.{place}": _begun(scene, str(value))})
+        return override_all(scene, by_hand | {f"liquid.{place}": _begun(scene, place, str(value))})
     if read(scene, name) is None and value == value_of(scene, name):  # what is left open, and is so already
         return scene
-    by_hand = _named(scene) if name == "drag.law" else {}  # the gate would choose another
     return override_all(scene, by_hand | {name: value})
 
 
@@ -87,35 +81,39 @@ def _with_effect(scene: Scene, effect: str, *, on: bool) -> Scene:
     liquid = the_liquid(scene)
     wanted = set(resolve(scene).liquids[0].effects)
     if on:
-        wanted |= {effect, "drag"} if effect in _THROUGH_DRAG else {effect}
-        wanted -= {"wake": {"local_wake"}, "local_wake": {"wake"}}.get(effect, set())
-    else:
-        wanted -= {effect, *_THROUGH_DRAG} if effect == "drag" else {effect}
-    values = _named(scene) | {"effects": tuple(it for it in ORDER if it in wanted)}
-    if on and effect in _TABLES and getattr(liquid, effect) is None:
-        values[f"liquid.{effect}"] = _TABLES[effect]
+        carriers = NAMED[effect].through
+        wanted |= {effect} if set(carriers) & wanted else {effect, *carriers[:1]}
+        for name in (*carriers, effect):
+            if name in wanted:
+                wanted -= {it.name for it in EFFECTS if name in it.excludes or it.name in NAMED[name].excludes}
+    wanted -= set() if on else {effect}
+    wanted -= {it.name for it in EFFECTS if it.through and not set(it.through) & wanted}
+    values = _named(scene) | {"effects": tuple(it for it in NAMED if it in wanted)}
+    if on and NAMED[effect].model is not None and getattr(liquid, effect) is None:
+        values[f"liquid.{effect}"] = _begun(scene, effect, "")
     try:
         return override_all(scene, values)
     except StudyError as error:
-        words, reason = EFFECT_WORDS[effect], str(error).partition(": ")[2]
-        raise StudyError(f"{words} cannot be turned {'on' if on else 'off'}: {reason}") from error
+        label, reason = NAMED[effect].label, str(error).partition(": ")[2]
+        raise StudyError(f"{label} cannot be turned {'on' if on else 'off'}: {reason}") from error
 
 
 def _named(scene: Scene) -> dict[str, object]:
-    """Return effects and law of drag as the gate takes them, to be set by name."""
+    """Return effects and the tables that the gate chooses, as it takes them, to be set by name."""
     taken = resolve(scene).liquids[0]
-    return {"effects": taken.effects, "drag.law": taken.drag.law}
+    tables = {f"liquid.{it.name}": getattr(taken, it.name).model_dump() for it in EFFECTS if it.choose is not None}
+    return {"effects": taken.effects, **tables}
 
 
-def _begun(scene: Scene, kind: str) -> dict[str, Any]:
-    """Return what a region or a current of a kind begins with: as large as the hand reaches, around its middle."""
+def _begun(scene: Scene, place: str, kind: str) -> dict[str, Any]:
+    """Return what a region or an effect's table begins with: as large as the hand reaches, around its middle."""
     centre_m, reach_m = scene.origin_m, scene.scale * _HALF_HAND_M
+    if place in NAMED:
+        start = NAMED[place].start
+        return {} if start is None else dict(start(kind, centre_m, reach_m))
     begun: dict[str, dict[str, Any]] = {
-        "everywhere": {"kind": kind},
-        "box": {"kind": kind, "centre_m": centre_m, "size_m": (2 * reach_m,) * 3},
-        "cylinder": {"kind": kind, "centre_m": centre_m, "radius_m": reach_m, "height_m": 2 * reach_m},
-        "uniform": {"kind": kind, "velocity_mps": (_SPEED_MPS, 0.0, 0.0)},
-        "channel": {"kind": kind, "centre_m": centre_m, "width_m": 2 * reach_m, "peak_mps": _SPEED_MPS},
-        "vortex": {"kind": kind, "centre_m": centre_m, "core_m": reach_m / 2, "peak_mps": _SPEED_MPS},
+        "everywhere": {},
+        "box": {"centre_m": centre_m, "size_m": (2 * reach_m,) * 3},
+        "cylinder": {"centre_m": centre_m, "radius_m": reach_m, "height_m": 2 * reach_m},
     }
-    return begun[kind]
+    return {"kind": kind, **begun[kind]}

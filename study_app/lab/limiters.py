@@ -29,10 +29,10 @@ WORDS: Final = {
     LIMITER_FADE: "Fade",
     LIMITER_SLOPE: "Slope",
     LIMITER_NORM: "Force",
-    LIMITER_ENERGY: "Energy account",
+    LIMITER_ENERGY: "Passivity controller",
     LIMITER_STALE: "Stale sample",
-    LIMITER_GLITCH: "Refused position",
-    LIMITER_NON_FINITE: "Not a number",
+    LIMITER_GLITCH: "Rejected sample",
+    LIMITER_NON_FINITE: "Non-finite force",
     LIMITER_STOP: "Force stopped",
     LIMITER_ESTIMATOR: "Velocity filter",
 }
@@ -63,7 +63,7 @@ class LimiterCounts:
         while self._batches[0][0] <= newest_ns - SPAN_NS:
             self._batches.popleft()
 
-    def told(self, force_limit_n: float, slew_n: float) -> tuple[Limiter, ...]:
+    def rows(self, force_limit_n: float, slew_n: float) -> tuple[Limiter, ...]:
         """Return every limiter, for these limits of the force and of its change per tick."""
         newest_ns = self._batches[-1][0] if self._batches else 0
         nothing = np.zeros(len(WORDS), np.int64)

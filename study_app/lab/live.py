@@ -6,7 +6,7 @@ asked for telemetry; whatever ends the lab calls `close`, which writes zero forc
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from study_app.devices.registry import is_falcon, moves_by_itself, open_device
+from study_app.devices.registry import descriptor_of
+from study_app.devices.rig import Rig, RigSettings, open_rig
 from study_app.devices.simulated.hand_commands import hand_of
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.limits import slew_limit_n
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.runtime.servo import Servo
 from study_app.lab.ab_comparison import Side, Workbench, other
 from study_app.lab.limiters import Limiter, LimiterCounts
 from study_app.lab.programmed_paths import led_to, programme
@@ -28,7 +28,6 @@ from study_app.lab.wake_tail import Tail
 from study_app.protocol.streams import stream
 
 if TYPE_CHECKING:
-    from study_app.devices.base import Device
     from study_app.haptics.model.motion import Motion
 
 Vector = tuple[float, float, float]
@@ -59,22 +58,22 @@ class Live:
 
     Parameters
     ----------
-    device : an opened device
-    servo : its servo, not started; ``rate_hz`` is the rate of all scenes here
+    rig : an opened device and its servo, whose ``rate_hz`` is the rate of all scenes here
     """
 
-    def __init__(self, device: Device, servo: Servo) -> None:
-        self.device = device
-        self.servo = servo
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self.device = device = rig.device
+        self.servo = servo = rig.servo
         self.path: str | None = None
         rest = Scene(rate_hz=servo.rate_hz)
         self.shadow = Shadow(rest, servo.elements, device.force_limit_n, device.dynamics)
         self._ghost: _Ghost | None = None
         self._reader = servo.telemetry.reader()
         self._dropped = 0
-        self._hand = hand_of(device)
+        self.hand = hand_of(device)
         self._counts = LimiterCounts()
-        self._felt: Workbench | None = None
+        self.felt: Workbench | None = None
         self._due: Workbench | None = None
         self._loaded_ns: int | None = None
         self._closed = False
@@ -85,7 +84,7 @@ class Live:
         self.shadow.prepare()
 
     def feel(self, bench: Workbench, *, anew: bool = False) -> None:
-        """Present the felt setting of ``bench`` from the next tick on, and follow the other beside it.
+        """Present the felt setting of ``bench`` from the next tick on, and compute the other on the same motion.
 
         Numbers change under the hand, whose wake goes on (`Servo.adjust`). What changes more begins with a fade of
         50 ms; if it comes sooner after another it waits for its end, the newest counts. What is felt already goes on as
@@ -96,14 +95,14 @@ class Live:
         StudyError
             The servo cannot present it, or has stopped itself.
         """
-        felt = self._felt
+        felt = self.felt
         goes_on = self._due is None and felt is not None and felt.felt == bench.felt and not anew
         if goes_on and felt is not None and felt.in_hand.scene == bench.in_hand.scene:
             self.servo.check()
             side = other(bench.felt)
-            self._felt = bench
+            self.felt = bench
             for shadow in (self.shadow, *([self._ghost.shadow] if self._ghost is not None else ())):
-                shadow.put_beside(side, self._presentable(bench.setting(side).scene))
+                shadow.put_unfelt(side, self._presentable(bench.setting(side).scene))
             return
         if goes_on and self.servo.may_adjust(self._presentable(bench.in_hand.scene)):
             self._present(bench, goes_on=True)
@@ -134,7 +133,7 @@ class Live:
         if self._ghost is not None:
             self._ghost.follow(self.servo.now_ns())
         self._load_what_is_due()
-        if self.path is not None and self._hand is not None and not self._hand.moving:
+        if self.path is not None and self.hand is not None and not self.hand.moving:
             self._lead()
 
     def play(self, name: str | None) -> None:
@@ -149,18 +148,18 @@ class Live:
         """
         self.path, self._ghost = None, None
         if name is None:
-            if self._hand is not None:
-                self._hand.rest()
+            if self.hand is not None:
+                self.hand.rest()
             return
         motion = self._programme(name)
         self.path = name
-        if self._hand is not None:
+        if self.hand is not None:
             self._lead()
         else:
             self._ghost = _Ghost(motion, self.servo.rate_hz, self.device.force_limit_n, self.servo.now_ns())
-            if self._felt is not None:
-                a, b = (self._presentable(it.scene) for it in (self._felt.a, self._felt.b))
-                self._ghost.begin(self._felt.felt, a, b)
+            if self.felt is not None:
+                a, b = (self._presentable(it.scene) for it in (self.felt.a, self.felt.b))
+                self._ghost.begin(self.felt.felt, a, b)
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
         """Say where the pointer is [m, hand frame], to a device that has one, unless a path moves it."""
@@ -170,8 +169,8 @@ class Live:
 
     def press(self, buttons: int) -> None:
         """Hold down exactly these buttons of a device that has a pointer: button 1 is bit 0."""
-        if self._hand is not None and hasattr(self.device, "point_to"):
-            self._hand.press(buttons)
+        if self.hand is not None and hasattr(self.device, "point_to"):
+            self.hand.press(buttons)
 
     def stop_force(self) -> None:
         """Send zero force from the next tick on, until `fade_in`."""
@@ -183,10 +182,10 @@ class Live:
 
     def limiters(self) -> tuple[Limiter, ...]:
         """Return which limiters acted in the last 10 s."""
-        scene = Scene() if self._felt is None else self._felt.in_hand.scene
+        scene = Scene() if self.felt is None else self.felt.in_hand.scene
         limit_n = min(self.device.force_limit_n, scene.force_limit_n)
         slew_n = slew_limit_n(1 / self.servo.rate_hz, self.device.dynamics, scene.velocity)
-        return self._counts.told(limit_n, slew_n)
+        return self._counts.rows(limit_n, slew_n)
 
     def trace(self) -> Trace | None:
         """Return the last 2.5 s as A and as B have it."""
@@ -215,10 +214,7 @@ class Live:
             return
         self._closed = True
         self.servo.stop_force()
-        try:
-            self.servo.stop()
-        finally:
-            self.device.close()
+        self._rig.stop()
 
     def __enter__(self) -> Self:
         return self
@@ -244,7 +240,7 @@ class Live:
         """Let the servo present what is felt, and the shadows follow."""
         a, b = (self._presentable(it.scene) for it in (bench.a, bench.b))
         serial = (self.servo.adjust if goes_on else self.servo.load)(a if bench.felt == "A" else b)
-        self._felt = bench
+        self.felt = bench
         self.shadow.expect(serial, bench.felt, a, b, goes_on=goes_on)
         if self._ghost is not None:
             self._ghost.begin(bench.felt, a, b, goes_on=goes_on)
@@ -254,18 +250,18 @@ class Live:
         return scene if scene.rate_hz == self.servo.rate_hz else _at_rate(scene, self.servo.rate_hz)
 
     def _programme(self, name: str) -> Motion:
-        scene = Scene() if self._felt is None else self._felt.in_hand.scene
+        scene = Scene() if self.felt is None else self.felt.in_hand.scene
         return programme(name, scene, self.device.workspace_m)
 
     def _lead(self) -> None:
         """Send the hand along the path, from where it is."""
-        assert self.path is not None and self._hand is not None  # noqa: S101, PT018 - called for a path and a hand
-        motion = led_to(self._programme(self.path), self._hand.aim_m)
-        self._hand.follow(motion.t_s, motion.position_m)
+        assert self.path is not None and self.hand is not None  # noqa: S101, PT018 - called for a path and a hand
+        motion = led_to(self._programme(self.path), self.hand.aim_m)
+        self.hand.follow(motion.t_s, motion.position_m)
 
 
 class _Ghost:
-    """A path that nobody's hand goes along: samples as a servo would take them, for a shadow of its own."""
+    """A path without a hand: samples as a servo would take them, for a shadow of its own."""
 
     def __init__(self, motion: Motion, rate_hz: float, limit_n: float, now_ns: int) -> None:
         self.shadow = Shadow(Scene(rate_hz=rate_hz), ELEMENTS, limit_n, alone=True)
@@ -297,32 +293,37 @@ class _Ghost:
 def open_live(
     name: str,
     *,
-    firmware: Path | None = None,
-    tell: Callable[[str], object] | None = None,
+    options: Mapping[str, str | Path] | None = None,
+    progress: Callable[[str], object] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Live:
     """Open a device and start its servo at rest; compiling takes a minute the first time.
 
-    ``tell`` is given what a device asks for while it is opened; it gives up when ``cancelled``.
+    Parameters
+    ----------
+    options : values by name; those that the device takes are used
+    progress : is given what a device asks for while it is opened
+    cancelled : is asked whether to give up opening it
 
     Raises
     ------
     StudyError
         It cannot be opened; then nothing of it is left open.
     """
-    half_m = tuple(extent / 2 for extent in WORKSPACE_M)
-    options: dict[str, Any] = {"workspace_m": half_m, "force_limit_n": FORCE_LIMIT_N}
-    if moves_by_itself(name):
-        options["random"] = stream(1, "lab/tremor")
-    if is_falcon(name):
-        options |= {"firmware": firmware, "tell": tell, "cancelled": cancelled}
-    device = open_device(name, **options)
+    taken = {option.name for option in descriptor_of(name).options}
+    settings = RigSettings(
+        workspace_m=WORKSPACE_M,
+        force_limit_n=FORCE_LIMIT_N,
+        elements=ELEMENTS,
+        random=stream(1, "lab/tremor"),
+        options={option: value for option, value in (options or {}).items() if option in taken},
+    )
+    rig = open_rig(name, settings, progress=progress, cancelled=cancelled)
     try:
-        live = Live(device, Servo(device, elements=ELEMENTS))
+        live = Live(rig)
         live.prepare()
-        live.servo.start()
     except BaseException:
-        device.close()
+        rig.stop()
         raise
     return live
 

@@ -10,52 +10,20 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 from pydantic import BaseModel
 
 from study_app.errors import StudyError
-from study_app.haptics.model.gate import ORDER, resolve
-from study_app.haptics.model.liquid import AddedMass, History, Liquid
+from study_app.haptics.model.effect import LEAST, MOST, Effect, Parameter, Value
+from study_app.haptics.model.effects import EFFECTS, NAMED
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.liquid import Liquid
 from study_app.haptics.model.scene import Given, Scene
 from study_app.protocol.model import MAX_FORCE_N
 
-Value: TypeAlias = "float | str | None"
-Choices: TypeAlias = tuple[tuple[str, str], ...]
-
 AXES: Final = ("x", "y", "z")
 OFF, ON, AUTO = "off", "on", "auto"
-
-_LEAST, _MOST = 0.0, 1.0  # of a parameter that says nothing else: then its model's own range counts
-
-
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    """One parameter: what it is called, and what it may be, SI; as shown it is ``factor`` times as much.
-
-    ``default`` is what its model gives it, or what the scene has where that gives nothing. A parameter with ``choices``
-    (value, words) is one of those, and ``least``, ``most`` mean nothing. ``decimals`` of the shown number are worth
-    telling.
-    """
-
-    name: str
-    label: str
-    unit: str = ""
-    least: float = _LEAST
-    most: float = _MOST
-    default: Value = None
-    logarithmic: bool = False
-    whole: bool = False
-    choices: Choices = ()
-    shown_unit: str = ""
-    factor: float = 1.0
-    decimals: int = 2
-
-    def shown(self, value: float) -> str:
-        """Return a number with its unit, as people read it."""
-        number = f"{value * self.factor:.{self.decimals}f}"
-        number = number.rstrip("0").rstrip(".") if "." in number else number
-        return f"{number} {self.shown_unit}".rstrip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,29 +40,6 @@ _NUMBERS: Final = {
     for it in (
         _P("liquid.density_kg_m3", "Density", "kg/m³", 1.0, logarithmic=True, decimals=1),
         _P("liquid.viscosity_pa_s", "Viscosity", "Pa·s", 1e-5, 1000.0, 1e-3, True, factor=1e3, shown_unit="mPa·s"),
-        _P("wake.length", "Length", "ticks", logarithmic=True, whole=True, decimals=0),
-        _P("wake.scaling", "Scaling", "ticks", 1.0, 1e5, logarithmic=True, decimals=0),
-        _P("wake.exponent", "Exponent", "", 0.05, logarithmic=True),
-        _P("wake.breaking_angle_deg", "Breaking angle", "°", decimals=1),
-        _P("wake.breaking_span_m", "Breaking span", "m", most=0.5, factor=1e3, shown_unit="mm", decimals=1),
-        _P("wake.decay", "Decay", "a tick", 0.99, decimals=6),
-        _P("wake.resolution_m", "Resolution", "m", most=0.05, factor=1e3, shown_unit="mm", decimals=1),
-        _P("local_wake.length", "Length", "ticks", logarithmic=True, whole=True, decimals=0),
-        _P("local_wake.scaling", "Scaling", "ticks", 1.0, 1e5, logarithmic=True, decimals=0),
-        _P("local_wake.exponent", "Exponent", "", 0.05, logarithmic=True),
-        _P("local_wake.decay", "Decay", "a tick", 0.99, decimals=6),
-        _P("local_wake.reach_m", "Reach", "m", 1e-3, 0.5, factor=1e3, shown_unit="mm", decimals=1),
-        _P("local_wake.spreading_m2ps", "Spreading", "m²/s", most=0.1, factor=1e4, shown_unit="cm²/s"),
-        _P("current.velocity_mps", "Speed", "m/s", -5.0, 5.0),
-        _P("current.centre_m", "Centre", "m", -1.0, 1.0, factor=1e3, shown_unit="mm", decimals=0),
-        _P("current.heading_deg", "Heading", "°", decimals=0),
-        _P("current.width_m", "Width", "m", 0.01, 5.0, factor=1e3, shown_unit="mm", logarithmic=True, decimals=0),
-        _P("current.peak_mps", "Peak speed", "m/s", -5.0, 5.0),
-        _P("current.core_m", "Core", "m", 0.01, 2.0, factor=1e3, shown_unit="mm", logarithmic=True, decimals=0),
-        _P("added_mass.coefficient", "Coefficient", "", most=2.0),
-        _P("added_mass.filter_s", "Smoothing", "s", most=0.2, factor=1e3, shown_unit="ms", decimals=1),
-        _P("history.window_s", "Window", "s", factor=1e3, shown_unit="ms", decimals=0),
-        _P("history.smoothing_s", "Smoothing", "s", most=0.2, factor=1e3, shown_unit="ms", decimals=1),
         _P("region.centre_m", "Centre", "m", -1.0, 1.0, factor=1e3, shown_unit="mm", decimals=0),
         _P("region.size_m", "Size", "m", 0.01, 5.0, factor=1e3, shown_unit="mm", logarithmic=True, decimals=0),
         _P("region.radius_m", "Radius", "m", 0.01, 5.0, factor=1e3, shown_unit="mm", logarithmic=True, decimals=0),
@@ -108,8 +53,8 @@ _NUMBERS: Final = {
         _P("knee.threshold_mps", "Speed knee", "m/s", 0.1, 20.0, logarithmic=True),
         _P("scene.scale", "Scale", "", 0.5, 50.0, logarithmic=True, decimals=2),
         _P("scene.force_limit_n", "Force limit", "N", 0.1, MAX_FORCE_N, decimals=1),
-        _P("accuracy.relative", "Share left out", "", factor=100.0, shown_unit="%", decimals=1),
-        _P("accuracy.absolute_n", "Force left out", "N", most=2.0, decimals=3),
+        _P("accuracy.relative", "Negligible share", "", factor=100.0, shown_unit="%", decimals=1),
+        _P("accuracy.absolute_n", "Negligible force", "N", most=2.0, decimals=3),
         _P("motion.speed_mps", "Fastest", "m/s", 0.01, 20.0, logarithmic=True),
         _P("motion.acceleration_mps2", "Hardest", "m/s²", 0.1, 200.0, logarithmic=True, decimals=1),
     )
@@ -117,23 +62,6 @@ _NUMBERS: Final = {
 _CHOICES: Final = {
     it.name: it
     for it in (
-        _P(
-            "drag.law",
-            "Drag law",
-            choices=(
-                ("constant", "Constant (thesis)"),
-                ("schiller-naumann", "Schiller–Naumann"),
-                ("haider-levenspiel", "Haider–Levenspiel"),
-                ("brown-lawler", "Brown–Lawler"),
-            ),
-        ),
-        _P("wake.axes", "Axes", choices=(("xz", "Horizontal (thesis)"), ("xyz", "All three"))),
-        _P("local_wake.axes", "Axes", choices=(("xz", "Horizontal"), ("xyz", "All three"))),
-        _P(
-            "current.kind",
-            "Current",
-            choices=(("uniform", "Uniform"), ("channel", "Channel"), ("vortex", "Vortex")),
-        ),
         _P(
             "region.kind",
             "Region",
@@ -157,18 +85,7 @@ _CHOICES: Final = {
         ),
     )
 }
-_SMOOTHING: Final = ("added_mass.filter_s", "history.smoothing_s")
-"""What follows from the velocity estimator where it is left open."""
-EFFECT_WORDS: Final = {
-    "drag": "Drag",
-    "wake": "Wake",
-    "local_wake": "Local wake",
-    "current": "Current",
-    "buoyancy": "Buoyancy",
-    "surface": "Surface",
-    "added_mass": "Added mass",
-    "history": "History",
-}
+_ROWS: Final = _NUMBERS | _CHOICES | {it.name: it for effect in EFFECTS for it in effect.controls}
 
 
 def sections(scene: Scene) -> tuple[Section, ...]:
@@ -182,11 +99,11 @@ def sections(scene: Scene) -> tuple[Section, ...]:
     liquid = the_liquid(scene)
     effects = resolve(scene).liquids[0].effects
     found = [
-        ("Liquid", ("liquid.density_kg_m3", "liquid.viscosity_pa_s", "drag.law")),
-        *((EFFECT_WORDS[table], _names(scene, table)) for table in _tables_of(liquid, effects)),
+        ("Liquid", ("liquid.density_kg_m3", "liquid.viscosity_pa_s", *_names_with_liquid(scene))),
+        *((it.label, _names(scene, it.name)) for it in EFFECTS if it.name in effects and _has_section(liquid, it)),
         ("Body", _names(scene, "body")),
         ("Filter", (*_names(scene, "velocity"), *_names(scene, "knee"))),
-        ("Effects", ("effects", *(f"effects.{effect}" for effect in ORDER))),
+        ("Effects", ("effects", *(f"effects.{effect.name}" for effect in EFFECTS))),
         ("Accuracy", _accuracy(liquid)),
         ("Region", _names(scene, "region")),
         ("Hand", ("scene.scale", "scene.force_limit_n")),
@@ -220,11 +137,9 @@ def value_of(scene: Scene, name: str) -> Value:
         if not field:
             return AUTO if liquid.effects == "auto" else ON
         return ON if field in resolve(scene).liquids[0].effects else OFF
-    found = resolve(scene).liquids[0].drag.law if name == "drag.law" else read(scene, name)
-    if found is None and name == "local_wake.reach_m":
-        return scene.body.diameter_m
-    if found is None and name in _SMOOTHING:
-        return scene.smoothing_s(getattr(liquid, place))
+    found = read(resolve(scene) if _is_chosen(place) else scene, name)
+    if found is None and place in NAMED and field in NAMED[place].open_values:
+        return NAMED[place].open_values[field](scene)
     if found is None and place == "motion":
         return float(getattr(scene.motion_in(liquid), field))
     return found if found is None or isinstance(found, str) else float(found)
@@ -248,16 +163,25 @@ def the_liquid(scene: Scene) -> Liquid:
         It has none, or several, or its velocities come from a table.
     """
     if len(scene.liquids) != 1:
-        raise StudyError(f"the lab takes one liquid at a time, not {len(scene.liquids)}: choose one of them")
+        raise StudyError(f"the lab opens one liquid at a time, not {len(scene.liquids)}: choose one of them")
     if isinstance(scene.velocity, Given):
         raise StudyError('velocity "given" is for motions from a file: choose an estimator such as "ewma"')
     return scene.liquids[0]
 
 
-def _tables_of(liquid: Liquid, effects: Any) -> tuple[str, ...]:
-    """Return the tables that belong to the effects called for, of those that stand in the liquid."""
-    tables = ("wake", "local_wake", "current", "added_mass", "history")
-    return tuple(it for it in tables if it in effects and getattr(liquid, it) is not None)
+def _has_section(liquid: Liquid, effect: Effect) -> bool:
+    """Return whether an effect's table stands in the liquid, and is shown by itself."""
+    return effect.model is not None and not effect.with_liquid and getattr(liquid, effect.name) is not None
+
+
+def _names_with_liquid(scene: Scene) -> tuple[str, ...]:
+    """Return the names of the effects' parameters that are shown with the liquid's own."""
+    return tuple(name for effect in EFFECTS if effect.with_liquid for name in _names(scene, effect.name))
+
+
+def _is_chosen(place: str) -> bool:
+    """Return whether the gate chooses this table."""
+    return place in NAMED and NAMED[place].choose is not None
 
 
 def _names(scene: Scene, place: str) -> tuple[str, ...]:
@@ -268,9 +192,15 @@ def _names(scene: Scene, place: str) -> tuple[str, ...]:
         name = f"{place}.{field}"
         if isinstance(getattr(table, field), tuple):
             names += [f"{name}.{axis}" for axis in AXES]
-        elif name in _NUMBERS or name in _CHOICES:
+        elif name in _ROWS and _has_value(table, place, field):
             names.append(name)
     return tuple(names)
+
+
+def _has_value(table: BaseModel, place: str, field: str) -> bool:
+    """Return whether a field has a value, or one that follows from the scene or stands in its row."""
+    follows = place in NAMED and field in NAMED[place].open_values
+    return getattr(table, field) is not None or follows or _ROWS[f"{place}.{field}"].default is not None
 
 
 def _accuracy(liquid: Liquid) -> tuple[str, ...]:
@@ -283,12 +213,12 @@ def _accuracy(liquid: Liquid) -> tuple[str, ...]:
 def _parameter(scene: Scene, name: str) -> Parameter:
     """Return a parameter with its range, default and unit as shown."""
     if name == "effects":
-        return Parameter(name, "Chosen", default=ON, choices=((ON, "By hand"), (AUTO, "By the gate (auto)")))
+        return Parameter(name, "Chosen", default=ON, choices=((ON, "Chosen by hand"), (AUTO, "Automatic")))
     if name.startswith("effects."):
-        words = EFFECT_WORDS[name.partition(".")[2]]
-        return Parameter(name, words, default=OFF, choices=((OFF, "Off"), (ON, "On")))
+        label = NAMED[name.partition(".")[2]].label
+        return Parameter(name, label, default=OFF, choices=((OFF, "Off"), (ON, "On")))
     place, field, *axis = name.split(".")
-    row = (_CHOICES | _NUMBERS)[f"{place}.{field}"]
+    row = _ROWS[f"{place}.{field}"]
     default = _default(scene, place, field, row)
     if row.choices:
         return dataclasses.replace(row, default=default)
@@ -319,8 +249,8 @@ def _model(scene: Scene, place: str) -> type[BaseModel]:
 def _default(scene: Scene, place: str, field: str, row: Parameter) -> Any:
     """Return what a field's model gives it; None where it gives nothing."""
     model = _model(scene, place)
-    if row.name in _SMOOTHING:
-        return scene.smoothing_s(AddedMass() if place == "added_mass" else History())
+    if place in NAMED and field in NAMED[place].open_values:
+        return NAMED[place].open_values[field](scene)
     info = model.model_fields[field]
     return row.default if info.is_required() or info.default is None else info.default
 
@@ -329,8 +259,8 @@ def _range(scene: Scene, place: str, field: str, row: Parameter) -> tuple[float,
     """Return the lab's range within the model's."""
     least, most = row.least, row.most
     for bound in _model(scene, place).model_fields[field].metadata:
-        if row.least == _LEAST and getattr(bound, "ge", None) is not None:
+        if row.least == LEAST and getattr(bound, "ge", None) is not None:
             least = float(bound.ge)
-        if row.most == _MOST and getattr(bound, "le", None) is not None:
+        if row.most == MOST and getattr(bound, "le", None) is not None:
             most = float(bound.le)
     return least, most

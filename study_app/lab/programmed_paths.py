@@ -19,7 +19,7 @@ TITLES: Final = {
     "line": "Straight line",
     "stop": "Straight, then a stop",
     "zigzag": "Turns of 90°",
-    "reach": "Reaches to and fro",
+    "reach": "Back-and-forth reaches",
 }
 REACHED: Final = 0.85  # share of the workspace that a path may fill
 APPROACH_MPS: Final = 0.08
@@ -41,7 +41,7 @@ def programme(name: str, scene: Scene, half_m: Vector) -> Motion:
         No such path.
     """
     if name not in TITLES:
-        raise StudyError(f"no programmed path {name!r}: there are {', '.join(TITLES)}")
+        raise StudyError(f"unknown path {name!r}: there are {', '.join(TITLES)}")
     x_m, _, z_m = (REACHED * scene.scale * half for half in half_m)
     radius_m = min(RADIUS_M, x_m, z_m)
     sized: dict[str, dict[str, float]] = {

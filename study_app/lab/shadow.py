@@ -1,4 +1,4 @@
-"""What was felt, computed again beside the servo, and what the other setting would have been on the same motion.
+"""What was felt, recomputed outside the servo, and what the other setting would have been on the same motion.
 
 Telemetry comes in batches; the servo's own tick (``haptics.runtime.recompute``) answers for A and for B, each with a
 state of its own. The felt side shares what survives a change of scene with the servo's safety layer, so that its
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.model.effects.wake import scaled_length
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.pack import adjust_into, pack, pack_into
 from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
-from study_app.haptics.runtime.scene_records import scaled_length
 from study_app.lab.ab_comparison import Side, other
 from study_app.lab.wake_tail import Tail, tail_of
 
@@ -71,7 +71,7 @@ class _Presented:
 
 
 class Shadow:
-    """The two settings beside the servo.
+    """The two settings, computed outside the servo.
 
     Parameters
     ----------
@@ -102,10 +102,10 @@ class Shadow:
             half.restart()
 
     def expect(self, serial: int, felt: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
-        """Say what the servo will present as scene ``serial``, and what beside it; ``goes_on`` if it only adjusts."""
+        """Note what the servo will present as scene ``serial``; ``goes_on`` if it only adjusts."""
         self._expected[serial] = _Presented(felt, {"A": a, "B": b}, goes_on)
 
-    def put_beside(self, side: Side, scene: Scene) -> None:
+    def put_unfelt(self, side: Side, scene: Scene) -> None:
         """Exchange the scene of the side that is not felt; nothing happens where it is that already."""
         for it in self._expected.values():
             it.scenes[side] = scene
@@ -139,16 +139,16 @@ class Shadow:
         self._serial = serial
         missed = [it for number, it in self._expected.items() if number <= serial]  # some may have no sample at all
         presented = self._expected.get(serial)
-        if presented is None:  # rest: a servo that ends, or was told to present nothing
+        if presented is None:  # rest: a servo that ends, or presents nothing
             return
         self._expected = {number: it for number, it in self._expected.items() if number > serial}
-        felt, beside = self._sides[presented.felt], self._sides[other(presented.felt)]
+        felt, unfelt = self._sides[presented.felt], self._sides[other(presented.felt)]
         if self._felt != presented.felt:
-            felt.safety, beside.safety = beside.safety, beside.safety.copy()  # the servo's own goes with what is felt
+            felt.safety, unfelt.safety = unfelt.safety, unfelt.safety.copy()  # the servo's own goes with what is felt
         goes_on = all(it.goes_on for it in missed)
         (felt.go_on if goes_on else felt.begin)(presented.scenes[presented.felt])
-        if beside.scene != presented.scenes[other(presented.felt)]:
-            beside.begin(presented.scenes[other(presented.felt)])
+        if unfelt.scene != presented.scenes[other(presented.felt)]:
+            unfelt.begin(presented.scenes[other(presented.felt)])
         self._felt = presented.felt
 
     def _follow(self, samples: Any) -> None:

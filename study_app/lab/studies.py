@@ -27,7 +27,7 @@ def use_in_study(study: Path, setting: Setting, file: Path | None) -> str:
     Parameters
     ----------
     study : a protocol's file
-    setting : must be saved in ``file``; without one it is saved beside the study first
+    setting : must be saved in ``file``; without one it is first saved in the study's folder
 
     Raises
     ------
@@ -44,7 +44,7 @@ def use_in_study(study: Path, setting: Setting, file: Path | None) -> str:
     after = before + newline.join(lines).encode()
     document.setdefault("liquids", {})[name] = {"file": named}
     if _tables(after) != document:
-        raise StoreError(f"{study} cannot take the table [liquids.{name}] at its end: add it by hand")
+        raise StoreError(f"{study} cannot be extended by the table [liquids.{name}]: add it by hand")
     if file is None:
         save(made, preset_text(setting))
     write_file(study, after)
@@ -63,7 +63,7 @@ def _read(study: Path) -> bytes:
 def _document(study: Path, source: bytes) -> dict[str, Any]:
     document = _tables(source)
     if document is None or "study" not in document:
-        raise StoreError(f"{study} is not a study's file: choose one with a table [study], which is valid TOML")
+        raise StoreError(f"{study} is not a study file: choose a valid TOML file with a table [study]")
     return document
 
 

@@ -1,6 +1,6 @@
 """What was decided about the analysis before the first session; the report holds the results to it.
 
-Nothing here changes what a participant meets. It stands in every receipt, so that nobody can decide it afterwards.
+Nothing here changes what a participant meets. It stands in every receipt, so that it cannot be decided afterwards.
 """
 
 from __future__ import annotations
@@ -47,8 +47,9 @@ class Analysis(Table):
 
 
 def decisions(document: Mapping[str, Any]) -> Iterator[Fault]:
-    """Check that what is decided is about items there are, each once, and that liquids are named by such items."""
-    items = {name for _, name in entries(document, "questionnaires.*.items.*.id") if isinstance(name, str)}
+    """Check that what is decided is about statements there are, each once, and that liquids are named by such items."""
+    found = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
+    items = {item["id"] for item in found if isinstance(item.get("id"), str) and "kind" not in item}
     for key in LISTS:
         yield from _listed(list(entries(document, f"analysis.{key}.*")), items)
     yield from _unknown(entries(document, "analysis.noticed"), items)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self, TypeAlias
+from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, StringConstraints, model_serializer, model_validator
 from pydantic_core import PydanticCustomError
 
+from study_app.haptics.model.liquid import MAX_ID
 from study_app.protocol.order_constraint import Constraint
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id, Localised
@@ -14,6 +15,31 @@ from study_app.protocol.texts import Id, Localised
 Phase: TypeAlias = Literal["main", "practice", "baseline"]
 Order: TypeAlias = Literal["fixed", "shuffled", "constrained", "williams", "latin"]
 Compared: TypeAlias = Literal["liquids", "delays"]
+Kind: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_]*$", max_length=MAX_ID)]
+
+
+LATER: Final = frozenset({"standard", "stimulus", "standards", "design", "method", "until"})
+"""Keys of a block that format 1 does not have."""
+
+
+class Criterion(Table):
+    """A block ends as soon as ``right`` of its last ``of`` answers were correct."""
+
+    right: int = Field(ge=1, le=100, description="How many of the last answers must be correct.")
+    of: int = Field(ge=1, le=100, description="How many of the last answers count.")
+    missed: Literal["go_on", "end"] = Field(
+        default="go_on", description="What happens if the block ends without: the session continues, or ends."
+    )
+
+    @model_validator(mode="after")
+    def _can_be_met(self) -> Self:
+        if self.right > self.of:
+            raise PydanticCustomError(
+                "criterion",
+                "{right} of {of} answers cannot be correct: at most {of}",
+                {"right": self.right, "of": self.of, "place": "right"},
+            )
+        return self
 
 
 class Block(Table):
@@ -29,7 +55,21 @@ class Block(Table):
     title: Localised = Field(description="Name of the block.")
     setting_label: Localised = Field(description="Neutral name of its trials; a number follows: Liquid setting 1.")
     code_prefix: str | None = Field(default=None, pattern=r"^[A-Z]$", description="Letter of the block's codes.")
-    conditions: tuple[Id, ...] = Field(min_length=1, description="What is presented.")
+    conditions: tuple[Id, ...] = Field(default=(), description="What is presented; with a stimulus: left out.")
+    standard: Id | None = Field(
+        default=None, description="The condition that a design compares the block's other conditions with."
+    )
+    stimulus: Id | None = Field(default=None, description="The number that is varied, in place of conditions.")
+    standards: tuple[float, ...] = Field(
+        default=(), max_length=8, description="The stimulus' standards that the block presents; left out: all."
+    )
+    design: Kind | None = Field(
+        default=None, description="How a trial is built: a table of [designs], or a kind with all its defaults."
+    )
+    method: Kind | None = Field(
+        default=None, description="How levels are chosen: a table of [methods], or a kind with all its defaults."
+    )
+    until: Criterion | None = Field(default=None, description="When the block ends early; left out: never.")
     compares: Compared | None = Field(
         default=None,
         description="What the conditions of a main block differ in; left out: delays if all have one liquid and their "
@@ -63,15 +103,42 @@ class Block(Table):
     task: Id = Field(description="What the participant does.")
     questionnaire: Id | None = Field(default=None, description="What is answered after each trial; left out: nothing.")
 
-    @property
-    def trials(self) -> int:
-        """How many trials a participant does."""
-        return len(self.conditions) * self.repetitions
+    @model_serializer(mode="wrap")
+    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Omit the keys of format 2 that are not used: receipts and keys of format 1 keep their bytes."""
+        return {name: value for name, value in plain(self).items() if name not in LATER or value}
 
-    @property
-    def breaks(self) -> int:
-        """How many breaks come between its trials."""
-        return 0 if self.break_every is None else (self.trials - 1) // self.break_every
+    @model_validator(mode="after")
+    def _presents_in_one_way(self) -> Self:
+        if self.stimulus is not None and self.conditions:
+            hint = "give one of the two"
+            raise PydanticCustomError("one_of", "has conditions and a stimulus", _at("stimulus", hint=hint))
+        if self.stimulus is None and not self.conditions:
+            raise PydanticCustomError(
+                "one_of", "has neither conditions nor a stimulus", _at("conditions", hint="give one of the two")
+            )
+        if self.stimulus is not None:
+            self._refuse("a stimulus", "standard", "repetitions", "order", "compares")
+        elif self.design is not None:
+            self._refuse("conditions", "standards", "method", "order", "compares")
+            if self.standard not in self.conditions or len(self.conditions) < 2:
+                raise PydanticCustomError(
+                    "standard",
+                    "must be one of at least two conditions, which the others are compared with",
+                    _at("standard"),
+                )
+        else:
+            self._refuse("conditions and no design", "standard", "standards", "method", "until")
+        return self
+
+    def _refuse(self, what: str, *names: str) -> None:
+        for name in names:
+            if name in self.model_fields_set:
+                instead = (
+                    "give it in the method's table" if (what, name) == ("a stimulus", "repetitions") else "omit it"
+                )
+                message = "does not belong to a block with {what}: {instead}"
+                raise PydanticCustomError("design", message, _at(name, what=what, instead=instead))
 
     @model_validator(mode="after")
     def _codes_where_blinded(self) -> Self:
@@ -94,7 +161,7 @@ class Block(Table):
                 "a {phase} block is not blinded and has no code_prefix",
                 {"phase": self.phase, "place": "code_prefix"},
             )
-        elif len(self.conditions) > 1:
+        elif len(self.conditions) > 1 and self.design is None:
             raise PydanticCustomError(
                 "codes",
                 "a {phase} block has one condition, this one {count}: use one block for each",
@@ -133,18 +200,16 @@ class Block(Table):
         missing = [name for name, value in keys.items() if value is None]
         if len(missing) == 1:
             raise PydanticCustomError("breaks", "is missing: break_every and break_page need each other", _at(*missing))
-        if self.break_every is not None and not self.breaks:
+        trials = len(self.conditions) * self.repetitions
+        if self.break_every is not None and self.design is None and trials <= self.break_every:
+            counted = "1 trial" if trials == 1 else f"{trials} trials"
             raise PydanticCustomError(
                 "breaks",
                 "is {every}, and the block has {trials}: no break would come",
-                _at("break_every", every=self.break_every, trials=_trials(self.trials)),
+                _at("break_every", every=self.break_every, trials=counted),
             )
         return self
 
 
 def _at(place: str, **values: str | int) -> dict[str, str | int]:
     return {"place": place, **values}
-
-
-def _trials(count: int) -> str:
-    return "1 trial" if count == 1 else f"{count} trials"

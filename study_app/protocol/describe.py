@@ -7,17 +7,22 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.scene import Scene
 from study_app.protocol import liquid_summary
-from study_app.protocol.model import Block, Explore, Protocol, Questionnaire
+from study_app.protocol.checks.level_warnings import level_warnings
+from study_app.protocol.groups.own_protocol import Variant, variants
+from study_app.protocol.groups.steps import sessions_differ
+from study_app.protocol.model import Block, Condition, Protocol, Questionnaire, Reach
+from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.latin_squares import row_count
-from study_app.protocol.orders.schedule import block_codes
-from study_app.protocol.trials.task import Task
+from study_app.protocol.questions.question import Context, Question
+from study_app.protocol.trials.limits import Limits
+from study_app.protocol.trials.summary import design_rows
+from study_app.protocol.trials.tracks import design_of
 
 READING_WORDS_PER_S = 3.0
 PAGE_S = 5.0
 ANSWER_S = 6.0
-MOVE_S = 1.5
 """How long people take, for the expected duration [choice]: read (180 words a minute) and turn a page, answer one
-statement, move from one target to the next."""
+statement."""
 
 
 BLINDINGS = {
@@ -31,7 +36,7 @@ def describe(protocol: Protocol) -> str:
     language = protocol.study.languages[0]
     sections = (
         _head(protocol, language),
-        _titled("Session", _session(protocol, language)),
+        *(_titled(_title(one), _session(one.protocol, language)) for one in variants(protocol)),
         *(_block(protocol, block, language) for block in protocol.blocks_in_order),
         _titled("Liquids", _liquids(protocol)),
         ("Effects in each liquid", *(f"  {line}".rstrip() for line in liquid_summary.effects(protocol))),
@@ -62,12 +67,19 @@ def describe_scenes(scenes: Mapping[str, Scene]) -> str:
 def expected_duration_s(protocol: Protocol) -> float:
     """Return how long a session will take [s], between the shortest and the longest it can be."""
     language = protocol.study.languages[0]
-    return sum(
-        _reading_s(protocol, step, language)
-        if step in protocol.pages
-        else _block_s(protocol, protocol.blocks[step], language)
-        for step in protocol.sequence
-    )
+    return sum(_step_s(protocol, step, language) for step in protocol.steps)
+
+
+def _step_s(protocol: Protocol, step: str, language: str) -> float:
+    if step in protocol.pages:
+        return _reading_s(protocol, step, language)
+    if step in protocol.forms:
+        return _answering_s(protocol.forms[step])
+    return _block_s(protocol, protocol.blocks[step], language)
+
+
+def _answering_s(questionnaire: Questionnaire) -> float:
+    return PAGE_S + ANSWER_S * len(questionnaire.items)
 
 
 def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
@@ -77,17 +89,15 @@ def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
 
 def _block_s(protocol: Protocol, block: Block, language: str) -> float:
     questionnaire = protocol.questionnaire_of(block.id)
-    answering = 0.0 if questionnaire is None else PAGE_S + ANSWER_S * len(questionnaire.items)
-    resting = 0.0 if block.break_page is None else block.breaks * _reading_s(protocol, block.break_page, language)
-    return block.trials * (_task_s(protocol.tasks[block.task]) + answering) + resting
-
-
-def _task_s(task: Task) -> float:
-    if isinstance(task, Explore):
-        return (task.min_s + task.max_s) / 2
-    if task.count is not None:
-        return min(task.timeout_s, task.count * (task.dwell_s + MOVE_S))
-    return task.duration_s or 0.0
+    answering = 0.0 if questionnaire is None else _answering_s(questionnaire)
+    order = order_of(protocol, block)
+    resting = 0.0 if block.break_page is None else order.breaks * _reading_s(protocol, block.break_page, language)
+    task_s = protocol.tasks[block.task].expected_s
+    if block.design is not None:
+        design = design_of(protocol, block)
+        answering = ANSWER_S + design.between_s + design.feedback_s * design.shows_feedback(block.phase == "practice")
+        task_s = design.intervals * task_s + (design.intervals - 1) * design.pause_s
+    return order.trials * (task_s + answering) + resting
 
 
 def _counted(count: int, noun: str) -> str:
@@ -109,12 +119,16 @@ def _head(protocol: Protocol, language: str) -> Iterable[str]:
     study, device, scene = protocol.study, protocol.device, protocol.scene
     sizes = " × ".join(f"{size:g}" for size in device.workspace_mm)
     ball_mm = scene.body.diameter_m * 1000
+    sessions = [one.protocol for one in variants(protocol)]
+    counts = [orders_of(one).answers for one in sessions]
+    minutes = [round(expected_duration_s(one) / 60) for one in sessions]
     rows = [
         ("Languages", ", ".join(study.languages)),
         ("Parts", f"{protocol.parts}"),
-        ("Answers", f"{protocol.responses_per_participant()} per participant"),
+        *(("Group", f"{name}, share {group.share}") for name, group in protocol.groups.items()),
+        ("Answers", f"{spread(counts)} per {'session' if sessions_differ(protocol) else 'participant'}"),
         ("Blinding", BLINDINGS[study.blinding]),
-        ("Expected duration", f"about {expected_duration_s(protocol) / 60:.0f} min"),
+        ("Expected duration", f"about {spread(minutes)} min"),
         ("Force limit", f"{device.force_limit_n:g} N"),
         ("Servo", f"{device.rate_hz:g} Hz"),
         ("Tank", f"{sizes} mm of the hand, drawn and felt {scene.scale:g} times as large"),
@@ -123,40 +137,77 @@ def _head(protocol: Protocol, language: str) -> Iterable[str]:
     return (f"{protocol.text(study.title, language)} ({study.name}, version {study.version})", *_aligned(rows))
 
 
+def spread(numbers: Sequence[int]) -> str:
+    """Return the number that all kinds of sessions have, or the least and the largest."""
+    least, largest = min(numbers), max(numbers)
+    return f"{least}" if least == largest else f"{least} to {largest}"
+
+
+def _title(one: Variant) -> str:
+    """Return the heading of a session's steps: with group, number, duration and answers where sessions differ."""
+    if not one.name:
+        return "Session"
+    minutes = f"about {expected_duration_s(one.protocol) / 60:.0f} min"
+    return f"{one.name[0].upper()}{one.name[1:]} ({minutes}, {_counted(orders_of(one.protocol).answers, 'answer')})"
+
+
 def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
     rows: list[tuple[str, str, str]] = []
-    for number, step in enumerate(protocol.sequence, start=1):
+    for number, step in enumerate(protocol.steps, start=1):
         if step in protocol.pages:
             page = protocol.pages[step]
             rows.append((f"{number:>2}", page.kind, protocol.text(page.title, language)))
+        elif step in protocol.forms:
+            rows.append((f"{number:>2}", "form", f"{step}: {_counted(len(protocol.forms[step].items), 'question')}"))
         else:
             block = protocol.blocks[step]
             title = protocol.text(block.title, language)
-            rows.append((f"{number:>2}", f"{block.phase} trials", f"{title}: {_counted(block.trials, 'trial')}"))
+            rows.append(
+                (
+                    f"{number:>2}",
+                    f"{block.phase} trials",
+                    f"{title}: {_counted(order_of(protocol, block).trials, 'trial')}",
+                )
+            )
     return rows
 
 
 def _block(protocol: Protocol, block: Block, language: str) -> Iterable[str]:
     part = "" if block.part is None else f"Part {block.part}: "
-    questionnaire = protocol.questionnaire_of(block.id)
+    questionnaire, compared = protocol.questionnaire_of(block.id), protocol.compared_in(block.id)
     rows = [
-        ("Trials", _presentation(block)),
+        ("Trials", _presentation(protocol, block)),
         *_beside_the_trials(protocol, block, language),
-        ("Shown as", f"{protocol.text(block.setting_label, language)}{' 1, 2, …' if block.trials > 1 else ''}"),
-        ("Recorded as", ", ".join(block_codes(block))),
-        ("Conditions", ", ".join(block.conditions)),
-        *([] if (compared := protocol.compared_in(block.id)) is None else [("Compared", compared)]),
-        ("Task", _task(protocol.tasks[block.task])),
-        ("Asked", "nothing" if questionnaire is None else _asked(questionnaire, str(block.questionnaire))),
+        (
+            "Shown as",
+            protocol.text(block.setting_label, language) + (" 1, 2, …" if order_of(protocol, block).trials > 1 else ""),
+        ),
+        ("Recorded as", ", ".join(block_codes(protocol, block))),
+        ("Conditions", ", ".join(protocol.conditions_in(block.id))),
+        *([] if block.design is not None or compared is None else [("Compared", compared)]),
+        *(design_rows(protocol, block) if block.design is not None else ()),
+        *(
+            [("Duration", f"about {_block_s(protocol, block, language) / 60:.0f} min")]
+            if block.design is not None
+            else []
+        ),
+        ("Task", protocol.tasks[block.task].summary),
     ]
+    if block.design is None:
+        rows.append(("Asked", "nothing" if questionnaire is None else _asked(questionnaire, str(block.questionnaire))))
     return _titled(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
 
 
-def _presentation(block: Block) -> str:
-    words = _counted(block.trials, "trial")
+def _design(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
+    yield from design_rows(protocol, block)
+    yield "Duration", f"about {_block_s(protocol, block, language) / 60:.0f} min"
+
+
+def _presentation(protocol: Protocol, block: Block) -> str:
+    words = _counted(order_of(protocol, block).trials, "trial")
     if block.repetitions > 1:
         words += f", every condition {block.repetitions} times"
-    return words if len(block.conditions) == 1 else f"{words}, {_order(block)}"
+    return words if len(block.conditions) < 2 else f"{words}, {_order(block)}"
 
 
 def _order(block: Block) -> str:
@@ -188,22 +239,16 @@ def _beside_the_trials(protocol: Protocol, block: Block, language: str) -> Itera
         yield "Rows", "dealt by the number in the participant's id: P007 is number 7, whatever the seed"
     if block.break_page is not None:
         title = protocol.text(protocol.pages[block.break_page].title, language)
-        yield "Breaks", f"{block.breaks}, after every {_counted(block.break_every or 0, 'trial')}: {title}"
-
-
-def _task(task: Task) -> str:
-    if isinstance(task, Explore):
-        return f"explore for {task.min_s:g} to {task.max_s:g} s"
-    end = f"until {task.count} are reached" if task.count is not None else f"for {task.duration_s:g} s"
-    return (
-        f"reach for {len(task.targets_mm)} targets of {task.radius_mm:g} mm in turn, {task.dwell_s:g} s in each, "
-        f"{end}, at most {task.timeout_s:g} s"
-    )
+        yield (
+            "Breaks",
+            f"{order_of(protocol, block).breaks}, after every {_counted(block.break_every or 0, 'trial')}: {title}",
+        )
 
 
 def _asked(questionnaire: Questionnaire, name: str) -> str:
     order = "in the order written" if questionnaire.item_order == "fixed" else "in another order each time"
-    return f"{_counted(len(questionnaire.items), 'statement')} (questionnaire {name}), {order}"
+    noun = "statement" if len(questionnaire.statements) == len(questionnaire.items) else "question"
+    return f"{_counted(len(questionnaire.items), noun)} (questionnaire {name}), {order}"
 
 
 def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
@@ -215,31 +260,58 @@ def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
         numbers = ("–", "–", "–") if wake is None else (f"{wake.length}", f"{wake.scaling:g}", f"{wake.exponent:g}")
         unused = "" if name in used else "in no condition"
         viscosity = "" if liquid.viscosity_pa_s is None else f", {liquid.viscosity_pa_s:g} Pa·s"
-        density = f"{liquid.density_kg_m3:g} kg/m³{viscosity}"
+        damper = liquid.drag.damping_nspm
+        density = f"{liquid.density_kg_m3:g} kg/m³{viscosity}" if damper is None else f"{damper:g} N·s/m at the hand"
         rows.append((name, density, ", ".join(effects) or "none", *numbers, unused))
     return rows
 
 
 def _conditions(protocol: Protocol) -> list[tuple[str, str, str]]:
     return [
-        (name, " + ".join(condition.liquid_ids), f"seen {condition.delay_ms:g} ms late" if condition.delay_ms else "")
+        (name, " + ".join(condition.liquid_ids), ", ".join(_drawn(condition)))
         for name, condition in protocol.conditions.items()
     ]
 
 
+def _drawn(condition: Condition) -> Iterator[str]:
+    """Yield what is unusual of how a condition is drawn."""
+    if condition.delay_ms:
+        yield f"seen {condition.delay_ms:g} ms late"
+    if condition.ball == "hidden":
+        yield "ball hidden"
+
+
 def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
     questionnaire = protocol.questionnaires[name]
-    scale = protocol.scales[questionnaire.scale]
-    labels = scale.labels[language]
-    off_scale = "" if scale.cannot_judge is None else f', or "{protocol.text(scale.cannot_judge, language)}"'
+    context = questionnaire.context(protocol.scales, language)
+    title = f"Questions of {name}"
+    if len(questionnaire.statements) == len(questionnaire.items):
+        scale = protocol.scales[questionnaire.scale or ""]
+        labels = scale.labels[language]
+        off_scale = "" if scale.cannot_judge is None else f', or "{protocol.text(scale.cannot_judge, language)}"'
+        title = f"Statements of {name}, from 1 ({labels[0]}) to {len(labels)} ({labels[-1]}){off_scale}"
     rows = [
-        (item.id, protocol.text(item.text, language), "" if item.required else "(may be left out)")
+        (
+            item.id,
+            *(() if title.startswith("Statements") else (_kind(item, context),)),
+            protocol.text(item.text, language),
+            "" if item.required else "(may be left out)",
+        )
         for item in questionnaire.items
     ]
-    return (
-        f"Statements of {name}, from 1 ({labels[0]}) to {len(labels)} ({labels[-1]}){off_scale}",
-        *_aligned(rows),
-    )
+    scores = f"  Scores: {', '.join(questionnaire.scores)}" if questionnaire.scores else ""
+    return (title, *_aligned(rows), *([scores] if scores else []))
+
+
+def _kind(item: Question, context: Context) -> str:
+    """Return what kind of question it is, with its answers or their bounds."""
+    levels, bounds = item.levels(context), item.bounds(context)
+    if levels:
+        answers = f" ({', '.join(levels)})" if item.value_type == "text" else f" of {len(levels)} points"
+    else:
+        answers = "" if bounds is None else f" from {bounds[0]:g} to {bounds[1]:g}"
+    condition = "" if item.show_if is None else f", if {item.show_if.item} asks for it"
+    return f"{item.kind_id}{answers}{condition}"
 
 
 def _analysis(protocol: Protocol) -> list[tuple[str, str]]:
@@ -266,8 +338,36 @@ def _points(points: float) -> str:
 
 def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:
     """Yield what to think over, if there is anything."""
-    if told := liquid_summary.warnings(protocol):
-        yield "Warnings", *(f"  {warning}" for warning in told)
+    if warnings := (
+        *liquid_summary.warnings(protocol),
+        *level_warnings(protocol),
+        *_incomplete(protocol),
+    ):
+        yield "Warnings", *(f"  {warning}" for warning in warnings)
+
+
+def _incomplete(protocol: Protocol) -> Iterator[str]:
+    """Yield the reaching tasks whose trials are valid without any target reached; format 1 is frozen."""
+    if protocol.format == 1 or protocol.limits.targets_percent is not None:
+        return
+    for name in dict.fromkeys(block.task for block in protocol.main_blocks):
+        if isinstance(protocol.tasks[name], Reach):
+            yield (
+                f"tasks.{name}: a trial that ends without any target reached is valid: set limits.targets_percent to "
+                "the least share of targets that counts"
+            )
+
+
+def _delivered(limits: Limits) -> Iterator[tuple[str, str]]:
+    """Yield what an interval must deliver."""
+    for value, unit, what in (
+        (limits.level_error_percent, " %", "error of an interval's delivered level"),
+        (limits.level_error_ms, " ms", "error of a trial's delivered difference of delays"),
+        (limits.pace_error_percent, " %", "error of the hand's RMS speed against the target's"),
+        (limits.attempts, "", "attempts at a trial of intervals, until it is delivered as requested"),
+    ):
+        if value is not None:
+            yield f"{value:g}{unit}", what
 
 
 def _limits(protocol: Protocol) -> list[tuple[str, str]]:
@@ -280,4 +380,5 @@ def _limits(protocol: Protocol) -> list[tuple[str, str]]:
         (f"{limits.frame_gap_ms:g} ms", "before the first frame, and between two"),
         (f"{limits.withheld_percent:g} %", "of the force withheld by the passivity controller and the slew limit"),
         *([] if least is None else [(f"{least:g} %", "of the targets reached, at least")]),
+        *_delivered(limits),
     ]

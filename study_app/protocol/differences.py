@@ -39,7 +39,7 @@ def _tables(protocol: Protocol | Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(protocol, Protocol):
         tables = protocol.model_dump(mode="json")
         for name, block in protocol.blocks.items():
-            tables["blocks"][name]["codes"] = list(block_codes(block))
+            tables["blocks"][name]["codes"] = list(block_codes(protocol, block))
             tables["blocks"][name]["compares"] = protocol.compared_in(name)
         return tables
     blocks = {name: dict(block) for name, block in protocol.get("blocks", {}).items()}

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from study_app.haptics.model.bounds import bounds, fastest_mps, lowered_mps, resistance_n
+from study_app.haptics.model.bounds import Extremes
+from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import Box, Everywhere, Liquid, MotionBox, Scene
 from study_app.protocol.model import DeviceNeeds, SceneDefaults
-from study_app.protocol.trials.task import Stroke
+from study_app.protocol.trials.tasks.stroke import Stroke
 
 LEAST_N: Final = 0.01
 """Less is not felt: a tenth of the force that a hand at rest notices. [choice]"""
@@ -32,13 +33,8 @@ def force_n(scene: Scene, stroke: Stroke) -> float:
 
 
 def _liquid_n(scene: Scene, liquid: Liquid) -> float:
-    speed_mps = lowered_mps(scene.motion.speed_mps or 0.0, scene.knee)
-    if liquid.current is not None and "current" in liquid.effects:
-        speed_mps += fastest_mps(liquid.current)
-    most = bounds(scene, liquid)
-    exerted = {name: most[name] for name in ("buoyancy", "added_mass", "history") if name in most}
-    exerted["drag"] = resistance_n(scene, liquid, speed_mps, liquid.drag.law)
-    return sum(newtons for name, newtons in exerted.items() if name in liquid.effects)
+    exerted_n = Extremes(scene, liquid).exerted_n
+    return sum(newtons for effect, newtons in exerted_n.items() if effect in liquid.effects)
 
 
 def _in_range(value: float) -> float:
@@ -65,7 +61,7 @@ def numbers(liquid: Liquid) -> dict[str, Any]:
     said = liquid.model_dump(exclude={"id"})
     if liquid.effects != "auto":
         said["effects"] = sorted(liquid.effects)
-        for table in ("drag", "wake", "local_wake", "current", "added_mass", "history"):
-            if table not in liquid.effects:
-                said.pop(table)
+        for effect in EFFECTS:
+            if effect.name not in liquid.effects:
+                said.pop(effect.name, None)
     return said

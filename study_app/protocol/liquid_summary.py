@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
+from study_app.haptics.model.bounds import met_mps
+from study_app.haptics.model.effects.drag import REFERENCE, resistance_n
 from study_app.haptics.model.gate import describe_gate
 from study_app.haptics.model.steady_state import HAND_MPS, Steady, steady
 from study_app.protocol.model import Protocol
 
 TELLING = 0.39
 """Twice the difference of viscosity that people just tell, 19 % (Jones, Hunter & Lafontaine 1997): what two liquids
-need to be told apart reliably; the thesis' water and honey differ by 40 %."""
+need for reliable discrimination; the thesis' water and honey differ by 40 %."""
 
 
 def effects(protocol: Protocol) -> tuple[str, ...]:
@@ -25,14 +27,22 @@ def effects(protocol: Protocol) -> tuple[str, ...]:
 def warnings(protocol: Protocol) -> tuple[str, ...]:
     """Return what is permitted and may still be a mistake, a sentence each."""
     felt = {name: steady(protocol.scene_of(name)) for name in protocol.liquids}
-    return (*_alike(protocol, felt), *_clipped(felt), *_practised(protocol), *_told_by_size(protocol))
+    return (
+        *_alike(protocol, felt),
+        *_clipped(felt),
+        *_lawless(protocol),
+        *_practised(protocol),
+        *_told_by_size(protocol),
+    )
 
 
 def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
     """Yield the pairs of liquids of a block that are hard to tell apart."""
     seen: set[frozenset[str]] = set()
     for block in protocol.main_blocks:
-        names = dict.fromkeys(name for it in block.conditions for name in protocol.conditions[it].liquid_ids)
+        names = dict.fromkeys(
+            name for it in protocol.conditions_in(block.id) for name in protocol.conditions[it].liquid_ids
+        )
         for one, other in combinations(names, 2):
             pair = frozenset((one, other))
             if _differ(felt[one].force_n, felt[other].force_n) or pair in seen:
@@ -62,10 +72,29 @@ def _clipped(felt: dict[str, Steady]) -> Iterator[str]:
             )
 
 
+def _lawless(protocol: Protocol) -> Iterator[str]:
+    """Yield the liquids with a viscosity whose drag does not depend on it, and how wrong that is."""
+    for name in protocol.liquids:
+        scene = protocol.scene_of(name)
+        (liquid,) = scene.liquids
+        if liquid.viscosity_pa_s is None or "drag" not in liquid.effects or liquid.drag.law != "constant":
+            continue
+        speed_mps = met_mps(scene, liquid, scene.scale * HAND_MPS)
+        named_n, true_n = (resistance_n(scene, liquid, speed_mps, law) for law in ("constant", REFERENCE))
+        if abs(named_n - true_n) > max(scene.accuracy.relative * true_n, scene.accuracy.absolute_n):
+            yield (
+                f"{name} has a viscosity, but its constant drag coefficient ignores it: at {HAND_MPS:g} m/s of the "
+                f"hand its drag is {named_n:.2f} instead of {true_n:.2f} N, an error of {abs(named_n - true_n):.2f} N: "
+                f'write effects = "auto" or drag = {{ law = "{REFERENCE}" }}'
+            )
+
+
 def _practised(protocol: Protocol) -> Iterator[str]:
     """Yield the liquids that are practised in and judged in another block."""
     used = {
-        block.id: dict.fromkeys(name for it in block.conditions for name in protocol.conditions[it].liquid_ids)
+        block.id: dict.fromkeys(
+            name for it in protocol.conditions_in(block.id) for name in protocol.conditions[it].liquid_ids
+        )
         for block in protocol.blocks_in_order
     }
     judged = {name: block.id for block in reversed(protocol.main_blocks) for name in used[block.id]}
@@ -81,7 +110,7 @@ def _practised(protocol: Protocol) -> Iterator[str]:
 def _told_by_size(protocol: Protocol) -> Iterator[str]:
     """Yield the blocks whose conditions show balls of different sizes, by which participants can tell them apart."""
     for block in protocol.main_blocks:
-        sizes = {1000 * protocol.scene_for(it).body.diameter_m for it in block.conditions}
+        sizes = {1000 * protocol.scene_for(it).body.diameter_m for it in protocol.conditions_in(block.id)}
         if len(sizes) > 1:
             listed = ", ".join(f"{size:g}" for size in sorted(sizes))
             yield (

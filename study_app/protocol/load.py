@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path as File
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
 from study_app.errors import Problem, ProtocolError
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.haptics.model.scene import Liquid, RateHz, Scene
+from study_app.protocol import formats
 from study_app.protocol.checks.consistency import check
-from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults, schema
-from study_app.protocol.source.document import entries
+from study_app.protocol.checks.designs import designs
+from study_app.protocol.checks.not_supported import not_supported
+from study_app.protocol.checks.pace import paced
+from study_app.protocol.instruments.instrument import with_instruments
+from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults
+from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.files import at_hand, protocol_hash, shipped, source_bytes
+from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.line_numbers import Places
 from study_app.protocol.source.liquid_files import TABLE
 from study_app.protocol.source.problems import Fault, did_you_mean, faults_of
@@ -55,19 +62,34 @@ class SceneFile(Table):
     liquids: Named[Liquid] = Field(min_length=1)
 
 
-def load(name_or_path: str | Path) -> Protocol:
+def load(name_or_path: str | File, *, delay_ticks: int = BELIEVED_TICKS) -> Protocol:
     """Return the protocol of a file, or of a name (see ``files.find``).
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        The file or name.
+    delay_ticks : int
+        Levels are checked for a device whose forces act so many ticks late.
 
     Raises
     ------
     ProtocolError
         Every problem of the file, with line and hint.
+
+    Examples
+    --------
+    >>> protocol = load("rek2024")
+    >>> protocol.study.languages
+    ('en', 'nl')
+    >>> list(protocol.liquids)
+    ['water', 'honey', 'light_oil', 'syrup']
     """
-    return parse(source_bytes(name_or_path), str(name_or_path))
+    return parse(source_bytes(name_or_path), str(name_or_path), delay_ticks=delay_ticks)
 
 
-def parse(source: bytes, name: str) -> Protocol:
-    """Return the protocol written in ``source``; ``name`` is what messages call it.
+def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Protocol:
+    """Return the protocol written in ``source``; ``name`` is what messages call it, ``delay_ticks`` is as in `load`.
 
     Raises
     ------
@@ -76,15 +98,40 @@ def parse(source: bytes, name: str) -> Protocol:
     """
     document, places = _document(source, name)
     document, faults = _with_liquids_of_files(document)
+    if formats.is_second(document):
+        document, missing = with_instruments(formats.completed(document))
+        faults += missing
     broken = [fault.path[:2] for fault in faults]
-    faults += [fault for fault in _faults(Protocol, document) if fault.path[:2] not in broken]
-    if not _future_format(document):
-        faults += check(document, [fault.path for fault in faults])
+    if formats.is_second(document):
+        unsupported = list(not_supported(document))
+        broken += [_of_table(fault.path) for fault in unsupported]
+        faults += unsupported
+    if not formats.is_second(document) and not formats.is_later(document):
+        newer = list(formats.newer_keys(document))
+        broken += [fault.path for fault in newer]
+        faults += newer
+    faults += _outside(broken, _faults(Protocol, document))
+    if not formats.is_later(document):
+        unfilled = [path for path in broken if path[0] == "questionnaires" or path[-1] in {"method", "design"}]
+        faults += _outside(unfilled, check(document, [fault.path for fault in faults]))
     _raise(name, faults, places)
-    return Protocol.model_validate(document, strict=True)
+    protocol = Protocol.model_validate(document, strict=True)
+    _raise(name, list(designs(protocol)) or list(paced(protocol, delay_ticks)), places)
+    return protocol
 
 
-def load_scene(name_or_path: str | Path, liquid_id: str) -> Scene:
+def _of_table(path: Path) -> Path:
+    """Return the place of a whole table whose kind is not supported: its other keys are unknown, too."""
+    return path[:-1] if path[-1] == "kind" else path
+
+
+def _outside(broken: Iterable[Path], faults: Iterable[Fault]) -> list[Fault]:
+    """Return the faults that are not within places that are broken already."""
+    known = list(broken)
+    return [fault for fault in faults if not any(fault.path[: len(path)] == path for path in known)]
+
+
+def load_scene(name_or_path: str | File, liquid_id: str) -> Scene:
     """Return the scene of one liquid of a protocol, or of a file with only ``[scene]`` and ``[liquids.*]``.
 
     Raises
@@ -100,7 +147,7 @@ def load_scene(name_or_path: str | Path, liquid_id: str) -> Scene:
     return scenes[liquid_id]
 
 
-def load_scenes(name_or_path: str | Path) -> dict[str, Scene]:
+def load_scenes(name_or_path: str | File) -> dict[str, Scene]:
     """Return a scene of each liquid of a protocol or scene file by its name, those of no condition too.
 
     Raises
@@ -114,12 +161,24 @@ def load_scenes(name_or_path: str | Path) -> dict[str, Scene]:
     if _holds_study(document):
         protocol = parse(source, name)
         return {liquid: protocol.scene_of(liquid) for liquid in protocol.liquids}
-    _raise(name, _faults(SceneFile, document), places)
-    file = SceneFile.model_validate(document, strict=True)
-    return {name: Scene(**dict(file.scene), liquids=(liquid,)) for name, liquid in file.liquids.items()}
+    file = SceneFile.model_validate(_sound_scene(document, name, places), strict=True)
+    return {
+        name: Scene(**dict(file.scene), liquids=(liquid,), format=file.format) for name, liquid in file.liquids.items()
+    }
 
 
-def is_scene_file(name_or_path: str | Path) -> bool:
+def _sound_scene(document: dict[str, Any], name: str, places: Places) -> dict[str, Any]:
+    """Return the document of a scene file, completed; raises what is wrong with it."""
+    faults: list[Fault] = []
+    if formats.is_second(document):
+        document = formats.with_densities(document)
+    elif not formats.is_later(document):
+        faults = [fault for fault in formats.newer_keys(document) if fault.path[0] in SceneFile.model_fields]
+    _raise(name, faults + _outside([fault.path for fault in faults], _faults(SceneFile, document)), places)
+    return document
+
+
+def is_scene_file(name_or_path: str | File) -> bool:
     """Return whether a file holds liquids and nothing of a study.
 
     Raises
@@ -169,11 +228,11 @@ def _liquid_of_file(file: Any, texts: Mapping[str, str]) -> dict[str, Any]:
         raise _LiquidFileFault("must be a string", "the path of a liquid file, relative to this file")
     if file not in texts:
         raise _LiquidFileFault(
-            f'there is no UTF-8 text file "{file}" beside this file', "give the path of the liquid file"
+            f'there is no UTF-8 text file "{file}" in this folder', "give the path of the liquid file"
         )
     try:
         document, places = _document(texts[file].encode(), file)
-        _raise(file, _faults(SceneFile, document), places)
+        document = _sound_scene(document, file, places)
     except ProtocolError as error:
         raise _LiquidFileFault(f"{file}: {error.problems[0]}", f"liquid-study check {file}") from error
     (first, *others) = document["liquids"].values()
@@ -228,8 +287,9 @@ def _shortened(words: str) -> str:
 
 
 def _faults(model: type[M], document: Mapping[str, Any]) -> list[Fault]:
-    if _future_format(document):
-        return [Fault(("format",), f"is {document['format']}, this program reads format 1", "use a newer program")]
+    if formats.is_later(document):
+        known = f"this program reads formats 1 to {formats.LATEST}"
+        return [Fault(("format",), f"is {document['format']}, {known}", "use a newer program")]
     named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
     faults = [Fault(path, "unknown key", "the name of the table is its id") for path in named]
     try:
@@ -237,12 +297,6 @@ def _faults(model: type[M], document: Mapping[str, Any]) -> list[Fault]:
     except ValidationError as error:
         faults += faults_of(error, document, schema(model))
     return faults
-
-
-def _future_format(document: Mapping[str, Any]) -> bool:
-    """Whether the file is of a later format: then nothing else in it can be judged."""
-    stated = document.get("format")
-    return isinstance(stated, int) and stated > 1
 
 
 def _raise(name: str, faults: list[Fault], places: Places) -> None:

@@ -7,11 +7,10 @@ can decide by itself is checked by its class; what needs two tables is in ``refe
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache
-from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
+from functools import cached_property
+from typing import Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import (
-    BaseModel,
     BeforeValidator,
     ConfigDict,
     Field,
@@ -21,16 +20,37 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, Metres, within
-from study_app.haptics.model.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene, SceneScale
+from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, within
+from study_app.haptics.model.scene import (
+    FADE_S,
+    Accuracy,
+    Body,
+    Estimator,
+    Ewma,
+    Knee,
+    Liquid,
+    MotionBox,
+    Scene,
+    SceneScale,
+)
 from study_app.protocol.analysis_plan import Analysis
-from study_app.protocol.blocks import Block, Compared
-from study_app.protocol.questions.questionnaire import Item, Questionnaire
-from study_app.protocol.questions.rating import Scale
+from study_app.protocol.blocks import Block, Compared, Kind
+from study_app.protocol.forms.questionnaire import Questionnaire
+from study_app.protocol.forms.scale import Scale
+from study_app.protocol.groups.group import Group, Sequences, Steps
+from study_app.protocol.groups.steps import every_step
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Body as PageBody
 from study_app.protocol.texts import Description, Id, Language, Localised, text_in
-from study_app.protocol.trials.task import Explore, Reach, Seconds, Task
+from study_app.protocol.trials.asked import asked
+from study_app.protocol.trials.kinds import AnyDesign, AnyMethod, default_design
+from study_app.protocol.trials.limits import Limits
+from study_app.protocol.trials.stimuli import MOST_DELAY_MS, Stimulus
+from study_app.protocol.trials.task import Task
+from study_app.protocol.trials.tasks.explore import Explore
+from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks.reach import Reach
+from study_app.protocol.trials.tasks.stroke import Seconds
 
 __all__ = [
     "Analysis",
@@ -38,7 +58,7 @@ __all__ = [
     "Condition",
     "DeviceNeeds",
     "Explore",
-    "Item",
+    "Follow",
     "Limits",
     "PageText",
     "Protocol",
@@ -47,11 +67,11 @@ __all__ = [
     "Scale",
     "SceneDefaults",
     "StudyHead",
-    "schema",
 ]
 
 MAX_FORCE_N = 8.0
-LIQUID_FILE = "A liquid file with one liquid, in place of the keys of this table: its path, relative to this file."
+LATER: Final = frozenset({"stimuli", "designs", "methods", "sequences", "groups"})
+"""Tables that format 1 does not have."""
 HandForceN: TypeAlias = Annotated[
     float, within(0.1, MAX_FORCE_N, "below 0.1 N a hand feels little; 8 N is the most that is safe")
 ]
@@ -59,11 +79,11 @@ HandForceN: TypeAlias = Annotated[
 
 def _whole(value: Any) -> Any:
     if type(value) is not int:
-        raise PydanticCustomError("format", "must be 1, the number of this format")
+        raise PydanticCustomError("format", "must be 1 or 2, the number of this format")
     return value
 
 
-Format: TypeAlias = Annotated[Literal[1], BeforeValidator(_whole)]
+Format: TypeAlias = Annotated[Literal[1, 2], BeforeValidator(_whole)]
 
 
 class StudyHead(Table):
@@ -91,7 +111,7 @@ class StudyHead(Table):
 class DeviceNeeds(Table):
     """What the study asks of whichever device is used."""
 
-    rate_hz: Annotated[float, within(250, 4000, "no force is stable below, and no tick fits above")] = Field(
+    rate_hz: Annotated[float, within(250, 4000, "below, no force is stable; above, no tick fits")] = Field(
         default=1000, description="Rate of the servo [Hz]."
     )
     force_limit_n: HandForceN = Field(default=MAX_FORCE_N, description="Largest force on the hand [N].")
@@ -122,6 +142,12 @@ class SceneDefaults(Table):
     knee: Knee = Field(default_factory=Knee, description="How high speeds are lowered.")
     motion: MotionBox = Field(default_factory=MotionBox, description="How the ball is expected to move, scene.")
     accuracy: Accuracy = Field(default_factory=Accuracy, description='What effects = "auto" may leave out.')
+    fade_s: FadeS = Field(default=FADE_S, description="How long the force takes to fade in [s].")
+
+    @model_serializer(mode="wrap")
+    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Omit the usual fade: receipts of format 1 keep their bytes."""
+        return {name: value for name, value in plain(self).items() if name != "fade_s" or value != FADE_S}
 
 
 class Condition(Table):
@@ -129,12 +155,20 @@ class Condition(Table):
 
     liquid: Id | None = Field(default=None, description="The liquid; or give liquids.")
     liquids: tuple[Id, ...] = Field(default=(), description="Several liquids; where they overlap the last one counts.")
-    delay_ms: Annotated[float, within(0, 1000, "what is seen more than a second late is no feedback")] = Field(
+    delay_ms: Annotated[float, within(0, MOST_DELAY_MS, "what is seen more than a second late is no feedback")] = Field(
         default=0, description="Delay of everything drawn in the tank [ms]."
     )
     label: Id | None = Field(
         default=None, description="The item of analysis.names that is right for it; left out: none is."
     )
+    ball: Literal["shown", "hidden"] = Field(
+        default="shown", description="A hidden ball is drawn during a task's lead, not while it is felt."
+    )
+
+    @model_serializer(mode="wrap")
+    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Omit a ball that is shown: receipts of format 1 keep their bytes."""
+        return {name: value for name, value in plain(self).items() if name != "ball" or value != "shown"}
 
     @property
     def liquid_ids(self) -> tuple[str, ...]:
@@ -175,35 +209,6 @@ class PageText(Table):
         return self
 
 
-class Limits(Table):
-    """What a trial may show at most, and what it must show at least, and still be valid."""
-
-    lateness_ms: Annotated[float, within(0.01, 1000, "no servo is more punctual, and 1 s is a failure")] = Field(
-        default=2, description="99th percentile of the lateness of ticks [ms]."
-    )
-    worst_gap_ms: Annotated[float, within(0.25, 1000, "from a tick at 4 kHz to a second, which is a failure")] = Field(
-        default=20, description="Longest time between two ticks [ms]."
-    )
-    delay_error_ms: Annotated[float, within(1, 1000, "no screen is more punctual, and 1 s is a failure")] = Field(
-        default=25, description="95th percentile of achieved − requested delay [ms]."
-    )
-    frame_gap_ms: Annotated[float, within(1, 1000, "no screen is faster, and 1 s is a failure")] = Field(
-        default=250,
-        description="Longest time before the first frame or between two, or before the trial's end [ms].",
-    )
-    withheld_percent: Annotated[float, within(0.01, 100, "a share of the force; none withheld at all is rare")] = Field(
-        default=5, description="Share of the force that passivity controller and slew limit withhold [%]."
-    )
-    targets_percent: Annotated[float, within(0.01, 100, "a share of the targets; left out, any is enough")] | None = (
-        Field(default=None, description="Least share of a reaching task's targets that must be reached [%].")
-    )
-
-    @model_serializer(mode="wrap")
-    def _without_what_is_not_asked(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave a completeness that is not asked for out of files: those of earlier versions do not know it."""
-        return {name: value for name, value in plain(self).items() if value is not None}
-
-
 class OwnBody(Table):
     """The ball in one liquid: what is left out is as in the scene's body."""
 
@@ -236,13 +241,14 @@ class StudyLiquid(Liquid):
         )
 
 
-def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[StudyLiquid]) -> Scene:
-    """Return a scene of some liquids; they have one ball (`checks.balls`)."""
+def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[StudyLiquid], form: Literal[1, 2]) -> Scene:
+    """Return a scene of some liquids, of a file's format; they have one ball (`checks.balls`)."""
     return Scene(
         **dict(scene) | {"body": liquids[0].body_in(scene)},
         rate_hz=device.rate_hz,
         liquids=tuple(liquid.alone for liquid in liquids),
         force_limit_n=device.force_limit_n,
+        format=form,
     )
 
 
@@ -272,10 +278,20 @@ class Protocol(Table):
     scales: dict[Id, Scale] = Field(default_factory=dict)
     questionnaires: dict[Id, Questionnaire] = Field(default_factory=dict)
     pages: dict[Id, PageText] = Field(default_factory=dict)
+    stimuli: dict[Id, Stimulus] = Field(default_factory=dict)
+    designs: dict[Kind, AnyDesign] = Field(default_factory=dict)
+    methods: dict[Kind, AnyMethod] = Field(default_factory=dict)
     blocks: Named[Block] = Field(min_length=1)
-    sequence: tuple[Id, ...] = Field(min_length=1, description="Pages and blocks in the order of the session.")
+    sequence: Steps = Field(default=(), min_length=1, description="Pages, blocks and forms in order, in every session.")
+    sequences: Sequences = Field(default=(), min_length=1, description="The steps of session 1, 2 … where they differ.")
+    groups: dict[Id, Group] = Field(default_factory=dict)
     limits: Limits = Field(default_factory=Limits)
     analysis: Analysis | None = Field(default=None, description="What was decided before the first session.")
+
+    @model_serializer(mode="wrap")
+    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Omit empty tables of format 2: receipts and keys of format 1 keep their bytes."""
+        return {name: value for name, value in plain(self).items() if name not in LATER or value}
 
     def text(self, value: str | dict[str, str], language: str) -> str:
         """Return a localised text in one of the study's languages."""
@@ -286,8 +302,13 @@ class Protocol(Table):
         return tuple(text_in(value, language).split("\n\n"))
 
     def labels(self, scale_id: str, language: str) -> tuple[str, ...]:
-        """Return the names of the seven points, lowest first."""
+        """Return the names of a scale's points, lowest first."""
         return self.scales[scale_id].labels[language]
+
+    @property
+    def steps(self) -> tuple[str, ...]:
+        """The pages, blocks and forms in the order of the session; of all groups and sessions where these differ."""
+        return every_step(self)
 
     @property
     def main_blocks(self) -> tuple[Block, ...]:
@@ -297,24 +318,46 @@ class Protocol(Table):
     @property
     def blocks_in_order(self) -> tuple[Block, ...]:
         """All blocks in the order of the session."""
-        return tuple(self.blocks[step] for step in self.sequence if step in self.blocks)
+        return tuple(self.blocks[step] for step in self.steps if step in self.blocks)
+
+    @property
+    def forms(self) -> dict[str, Questionnaire]:
+        """The questionnaires that are presented on their own, by name, in the order of the session."""
+        return {step: self.questionnaires[step] for step in self.steps if step in self.questionnaires}
 
     @property
     def parts(self) -> int:
         """How many parts the study has."""
-        return max(block.part or 0 for block in self.blocks.values())
+        return max((block.part or 0 for block in self.blocks_in_order), default=0)
 
     def questionnaire_of(self, block_id: str) -> Questionnaire | None:
-        """Return what is answered after each trial of a block."""
+        """Return what is answered after each trial of a block: its questionnaire, or what its design asks."""
         name = self.blocks[block_id].questionnaire
-        return None if name is None else self.questionnaires[name]
+        return self.design_questions.get(block_id) if name is None else self.questionnaires[name]
+
+    @cached_property
+    def design_questions(self) -> dict[str, Questionnaire]:
+        """What is asked in each block with a design, by the block's id."""
+        designs = {
+            block.id: self.designs.get(block.design) or default_design(block.design)
+            for block in self.blocks.values()
+            if block.design is not None
+        }
+        return {name: asked(design, self.study.languages) for name, design in designs.items()}
 
     def compared_in(self, block_id: str) -> Compared | None:
         """Return what a main block compares, as it says or as follows from its conditions; of other blocks None."""
         block = self.blocks[block_id]
         if block.phase != "main":
             return None
-        return block.compares or compared([self.conditions[name] for name in block.conditions])
+        return block.compares or compared([self.conditions[name] for name in self.conditions_in(block_id)])
+
+    def conditions_in(self, block_id: str) -> tuple[str, ...]:
+        """Return the conditions that a block presents, with a number varied or as they are."""
+        block = self.blocks[block_id]
+        if block.stimulus is None:
+            return block.conditions
+        return (self.stimuli[block.stimulus].condition or next(iter(self.conditions)),)
 
     def scene_for(self, condition_id: str) -> Scene:
         """Return what is felt in a condition."""
@@ -322,34 +365,8 @@ class Protocol(Table):
 
     def scene_of(self, *liquid_ids: str) -> Scene:
         """Return a scene of some of the liquids, those of no condition too."""
-        return scene_with(self.scene, self.device, [self.liquids[name] for name in liquid_ids])
+        return scene_with(self.scene, self.device, [self.liquids[name] for name in liquid_ids], self.format)
 
     def delay_s(self, condition_id: str) -> float:
         """Return by how much everything drawn in the tank is late [s]."""
         return self.conditions[condition_id].delay_ms / 1000
-
-    def responses_per_participant(self) -> int:
-        """Return how many answers a complete session holds, practice included if it asks anything."""
-        return sum(
-            len(block.conditions) * block.repetitions * len(self.questionnaires[block.questionnaire].items)
-            for block in self.blocks.values()
-            if block.questionnaire is not None
-        )
-
-
-@cache
-def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
-    """Return the JSON Schema of a protocol file, for editors that complete and check while one writes."""
-    described = of.model_json_schema()
-    for node in described["properties"].values():
-        if "patternProperties" in node:
-            node["additionalProperties"] = False
-    for table in ("Liquid", "Block"):  # their id is the name of their table
-        for part in described["$defs"].values():
-            if part.get("title") == table:
-                part["properties"].pop("id")
-                part["required"].remove("id")
-                if "body" in part["properties"]:  # a liquid of a study may be that of a file instead
-                    part["properties"]["file"] = {"type": "string", "description": LIQUID_FILE}
-                    part["if"], part["then"] = {"not": {"required": ["file"]}}, {"required": part.pop("required")}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}

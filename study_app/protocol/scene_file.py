@@ -7,7 +7,9 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, TypeAlias
 
-from study_app.haptics.model.scene import Ewma, Given, Kalman, Liquid, Scene
+from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.scene import FADE_S, Ewma, Given, Kalman, Liquid, Scene
+from study_app.protocol.formats import needed_by
 
 Place: TypeAlias = tuple[str, ...]
 
@@ -19,12 +21,16 @@ def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[Place, 
 
     Parameters
     ----------
-    scene : a given velocity is left out, which a file cannot say
-    said : paragraphs that stand above it as comments
-    notes : comments beside single keys, by their place: ``("liquids", "water", "density_kg_m3")``
+    scene : Scene
+        A given velocity is left out, which a file cannot say.
+    said : sequence of str
+        Paragraphs that stand above it as comments.
+    notes : mapping of Place to str, optional
+        Comments of single keys, by their place: ``("liquids", "water", "density_kg_m3")``.
     """
     comments = [f"# {line}" for it in said for line in textwrap.wrap(it, _COMMENT_LETTERS)]
-    lines = [*comments, *([""] if comments else []), "format = 1", *_tables(("scene",), _scene(scene), notes or {})]
+    head = [*comments, *([""] if comments else []), f"format = {needed_by(scene)}"]
+    lines = [*head, *_tables(("scene",), _scene(scene), notes or {})]
     for liquid in scene.liquids:
         lines += _tables(("liquids", liquid.id), _liquid(liquid), notes or {})
     return "\n".join(lines) + "\n"
@@ -38,14 +44,18 @@ def for_new_file(scene: Scene) -> Scene:
 def _scene(scene: Scene) -> Mapping[str, Any]:
     """Return what a scene file says of all liquids alike; it cannot say that velocities are given."""
     given = {"velocity"} if isinstance(scene.velocity, Given) else set()
-    return scene.model_dump(exclude_none=True, exclude={"liquids", *given})
+    usual = {"fade_s"} if scene.fade_s == FADE_S else set()
+    return scene.model_dump(exclude_none=True, exclude={"format", "liquids", *given, *usual})
 
 
 def _liquid(liquid: Liquid) -> Mapping[str, Any]:
     """Return what a scene file says of a liquid: without tables that mean nothing and say nothing new."""
-    idle = {name for name in ("added_mass", "history") if name not in liquid.effects}
-    fields = type(liquid).model_fields
-    idle = {name for name in idle if getattr(liquid, name) == fields[name].default}
+    idle = {
+        effect.name
+        for effect in EFFECTS
+        if effect.default is not None and not effect.with_liquid and effect.name not in liquid.effects
+        if getattr(liquid, effect.name) == effect.default
+    }
     return liquid.model_dump(exclude_none=True, exclude={"id", *idle})
 
 

@@ -77,7 +77,7 @@ _Text: TypeAlias = Annotated[
     Field(description="A text: one string, or one string per language of the study."),
 ]
 Localised: TypeAlias = Annotated[_Text, _not_longer(MAX_TEXT)]
-"""A title, a statement, a label: what fits on a page beside others."""
+"""A title, a statement, a label: what fits on a page with others."""
 Body: TypeAlias = Annotated[_Text, _not_longer(MAX_BODY)]
 """What fills a page or several."""
 

@@ -8,15 +8,37 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from study_app.protocol.model import Explore, Reach
+from study_app.protocol.forms.show_if import Value
+from study_app.protocol.questions.choice import ChoiceView
+from study_app.protocol.questions.number import NumberView
+from study_app.protocol.questions.question import ItemView
+from study_app.protocol.trials.task import AnyTask
+
+__all__ = [
+    "ChoicePage",
+    "DesignPage",
+    "EndPage",
+    "FeedbackPage",
+    "Interval",
+    "ItemView",
+    "NumberPage",
+    "Page",
+    "PausePage",
+    "Progress",
+    "QuestionnairePage",
+    "TaskPage",
+    "TextPage",
+    "TroublePage",
+]
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
     """Where we are: part ``part`` of ``parts``; within it setting ``index`` of ``of`` under a neutral label.
 
-    ``part`` is None outside the parts, as in a practice; a page to read has no label, and the settings before
-    ``index`` are done, all of them where it is ``of + 1``.
+    ``part`` is None outside the parts, as in a practice; a page to read has no label, but for a break among trials of
+    intervals, and the settings before ``index`` are done, all of them where it is ``of + 1``. ``at_most`` says that the
+    block may end before ``of``.
     """
 
     part: int | None
@@ -24,21 +46,37 @@ class Progress:
     label: str
     index: int
     of: int
+    at_most: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """Which interval of a trial is presented, or comes after the rest: ``number`` (from 1) of ``of``.
+
+    ``announced`` is its name, or in the rest that it comes, or that the trial comes once more.
+    """
+
+    number: int
+    of: int
+    resting: bool
+    announced: str
 
 
 @dataclass(frozen=True, slots=True)
 class TaskPage:
     """The tank: move the ball. Nothing of the condition is here: how late the tank is drawn is the runner's to know.
 
-    ``workspace_m`` holds the full sizes of the tank along x, y, z, centred on the device's middle.
+    ``workspace_m`` holds the full sizes of the tank along x, y, z, centred on the device's middle; ``interval`` is None
+    in a trial without a design.
     """
 
     trial: int
     instruction: str
-    task: Explore | Reach
+    task: AnyTask
     workspace_m: tuple[float, float, float]
     body_radius_m: float
     progress: Progress | None
+    interval: Interval | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,30 +101,68 @@ class TextPage:
 
 
 @dataclass(frozen=True, slots=True)
-class ItemView:
-    """One statement of a questionnaire as shown: ``number`` counts from 1 in the order of presentation."""
-
-    id: str
-    number: int
-    text: str
-    required: bool
-
-
-@dataclass(frozen=True, slots=True)
 class QuestionnairePage:
-    """The statements of one setting; ``labels`` name the points of the scale, lowest first.
+    """The questions about one setting, or a form on its own.
 
-    ``chosen`` holds (item id, value) of the choices already made, when the page comes back after a pause.
+    Where all are statements, ``labels`` name the points of their scale, lowest first; otherwise there are none.
+    ``chosen`` holds (item id, value) of the choices already made, when the page comes back after a pause. ``trial`` is
+    None where the page is a ``form``, which is its name.
     """
 
-    trial: int
+    trial: int | None
     title: str
     intro: str
     items: tuple[ItemView, ...]
     labels: tuple[str, ...]
     cannot_judge: str | None
     progress: Progress | None
-    chosen: tuple[tuple[str, int | None], ...] = ()
+    chosen: tuple[tuple[str, Value], ...] = ()
+    form: str | None = None
+
+    @property
+    def stream(self) -> str:
+        """The name of the random stream that simulated answers to it are drawn from."""
+        return f"{self.trial}/answers" if self.form is None else f"form/{self.form}/answers"
+
+
+@dataclass(frozen=True, slots=True)
+class DesignPage:
+    """The one question after a trial of intervals; the first answer is the answer."""
+
+    trial: int
+    item: ItemView
+    progress: Progress | None
+
+    @property
+    def items(self) -> tuple[ItemView, ...]:
+        """The question."""
+        return (self.item,)
+
+    @property
+    def stream(self) -> str:
+        """The name of the random stream that simulated answers to it are drawn from."""
+        return f"{self.trial}/answers"
+
+
+@dataclass(frozen=True, slots=True)
+class ChoicePage(DesignPage):
+    """Two to four answers, in temporal order: one press answers and goes on."""
+
+    item: ChoiceView
+
+
+@dataclass(frozen=True, slots=True)
+class NumberPage(DesignPage):
+    """A number above 0."""
+
+    item: NumberView
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackPage:
+    """Whether the answer was correct; it ends by time."""
+
+    right: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,4 +194,6 @@ class EndPage:
     paragraph: str
 
 
-Page: TypeAlias = TextPage | TaskPage | QuestionnairePage | PausePage | TroublePage | EndPage
+Page: TypeAlias = (
+    TextPage | TaskPage | QuestionnairePage | ChoicePage | NumberPage | FeedbackPage | PausePage | TroublePage | EndPage
+)

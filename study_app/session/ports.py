@@ -44,7 +44,7 @@ class JournalPort(Protocol):
 class RecorderPort(Protocol):
     """What is asked of the recorder (``store.recorder.Recorder``); nothing of it waits for the disk."""
 
-    def start(self, trial: int, attempt: int, rate_hz: float) -> None: ...  # noqa: D102
+    def start(self, trial: int, attempt: int, rate_hz: float, interval: int | None = None) -> None: ...  # noqa: D102
     def append(self, samples: Any) -> None: ...  # noqa: D102
     def frame(self, painted_ns: int, sample_ns: int) -> None: ...  # noqa: D102
     def stop(self) -> None: ...  # noqa: D102
@@ -62,8 +62,8 @@ class KeptSession(JournalPort, Protocol):
 class Ports:
     """The world: ``present`` shows a page, ``clock`` gives seconds since the session's origin.
 
-    ``recorder`` is None where no recordings are kept. Without ``paints`` nobody shows a window: the first frame of a
-    trial is told of, and a later one need not come. ``settled`` says whether all recordings are on the disk, so that
+    ``recorder`` is None where no recordings are kept. Without ``paints`` there is no window: the first frame of a
+    trial is reported, and a later one need not come. ``settled`` says whether all recordings are on the disk, so that
     the session's end waits for none: until then it is put off.
     """
 

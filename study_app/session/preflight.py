@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, UNKNOWN, Dynamics
 from study_app.haptics.model.limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
+from study_app.protocol.checks.pace import beyond_slope_limit, highest_damping
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.latin_squares import enrolment
@@ -24,13 +25,13 @@ if TYPE_CHECKING:
 
 Verdict: TypeAlias = Literal["ok", "warning", "failure"]
 
-LEAST_FRESH = 0.5  # share of turns in which the device had a new sample
+LEAST_FRESH = 0.5  # share of ticks in which the device had a new sample
 RATE_WARNING, RATE_FAILURE = 0.02, 0.5  # relative error of the servo's rate
 LEAST_REFRESH_HZ = 50.0
 SLOW_PROBE_S = 0.1
 TABLES_BYTES = 20_000_000
 RECORDED_BYTES_PER_S = 60e6 / 1800
-DEAR = 0.2  # share of a turn that the force model may take
+MOST_OF_A_TICK = 0.2  # share of a tick that the force model may take
 SPARE = 3  # times what a session of the expected length takes
 
 
@@ -46,15 +47,15 @@ class Screen:
 class Facts:
     """What was measured.
 
-    ``fresh_share`` is the share of the servo's turns in which the device had a new sample, ``sample_age_s`` how old the
+    ``fresh_share`` is the share of the servo's ticks in which the device had a new sample, ``sample_age_s`` how old the
     newest sample was when somebody looked (95th percentile). ``probe_s`` is how long a file took to be on the disk of
     the results, None where it could not be written for the reason ``probe_fault``; ``free_bytes`` None where unknown.
-    ``tick_s`` is what the dearest scene of the study takes of a turn, None where nobody measured it; ``key_hash`` that
-    of the study's sealed key, None before its first session. ``lateness_ns`` (n,) is that of every turn [ns],
+    ``tick_s`` is the time of a tick with the most expensive scene of the study, None if not measured; ``key_hash`` that
+    of the study's sealed key, None before its first session. ``lateness_ns`` (n,) is that of every tick [ns],
     ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
     delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
     the force that passivity controller and slew limit are expected to withhold in the fastest stroke of a task, by
-    liquid; None where nobody computed it.
+    liquid; None where it was not computed.
     """
 
     device: str
@@ -108,6 +109,7 @@ class Check:
 def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
     """Return what is to be said of ``facts``, for a session of ``protocol``."""
     found = [_device(facts), _loop_delay(facts), _rate(facts, protocol), _lateness(facts, protocol), _priority(facts)]
+    found += _levels(facts, protocol)
     found += [
         _delay(facts, protocol),
         _screen(facts),
@@ -125,29 +127,46 @@ def refused(found: Iterable[Check]) -> str:
 
 def _device(facts: Facts) -> Check:
     share = f"{100 * facts.fresh_share:.0f} %"
-    about = f"{facts.device}, a new sample in {share} of the turns"
+    about = f"{facts.device}, a new sample on {share} of ticks"
     if facts.timing.ticks == 0 or facts.fresh_share < LEAST_FRESH:
-        advice = f"{facts.device} has a new sample in {share} of the turns: check its cable and power"
-        return Check("Device", "failure", "silent", about, advice)
-    return Check("Device", "ok", "answers", about)
+        advice = f"{facts.device} sends a new sample on only {share} of ticks: check its cable and power"
+        return Check("Device", "failure", "not responding", about, advice)
+    return Check("Device", "ok", "responding", about)
 
 
 def _loop_delay(facts: Facts) -> Check:
     """Say how late a force acts, which the force's limits follow."""
-    value = f"{facts.delay_ticks} tick{'' if facts.delay_ticks == 1 else 's'}"
+    value = _ticks(facts.delay_ticks)
     if facts.dynamics.delay_s is None:
-        return Check("Loop delay", "ok", value, "assumed: the device does not measure how late a force acts")
-    about = f"until a force acts: {1e3 * facts.dynamics.delay_s:.2f} ms, measured by the device"
+        return Check("Loop delay", "ok", value, "assumed: the device does not measure its delay")
+    about = f"delay until a force acts: {1e3 * facts.dynamics.delay_s:.2f} ms, measured by the device"
     if facts.delay_ticks > BELIEVED_TICKS:
         return Check(
-            "Loop delay", "warning", value, about, "Forces are limited more: connect the device without a hub."
+            "Loop delay", "warning", value, about, "Forces are limited more strictly: connect the device without a hub."
         )
     return Check("Loop delay", "ok", value, about)
 
 
+def _levels(facts: Facts, protocol: Protocol) -> list[Check]:
+    """Say whether every level can be delivered with the device's delay: the highest one, of blocks with a damper."""
+    blocks = [block for block in protocol.blocks_in_order if block.stimulus is not None]
+    highest_nspm = max((highest_damping(protocol, block) for block in blocks), default=0.0)
+    if highest_nspm == 0:
+        return []
+    value, about = f"up to {highest_nspm:g} N·s/m", f"with a delay of {_ticks(facts.delay_ticks)}"
+    for block in blocks:
+        if (beyond := beyond_slope_limit(protocol, block, facts.delay_ticks)) is not None:
+            return [Check("Levels", "failure", value, about, f"{beyond.message}: {beyond.hint}")]
+    return [Check("Levels", "ok", value, about)]
+
+
+def _ticks(count: int) -> str:
+    return f"{count} tick{'' if count == 1 else 's'}"
+
+
 def _rate(facts: Facts, protocol: Protocol) -> Check:
     asked, achieved = protocol.device.rate_hz, facts.timing.rate_hz
-    value, about = f"{achieved:.1f} Hz", f"asked for {asked:g} Hz"
+    value, about = f"{achieved:.1f} Hz", f"requested: {asked:g} Hz"
     unfelt = refuses(asked)
     if unfelt is not None:
         return Check("Servo rate", "failure", value, about, unfelt)
@@ -164,10 +183,10 @@ def _lateness(facts: Facts, protocol: Protocol) -> Check:
     late_ms, gap_ms = timed.lateness_p99_s * 1e3, timed.worst_gap_s * 1e3
     share = max(late_ms / limits.lateness_ms, gap_ms / limits.worst_gap_ms)
     about = (
-        f"99 % of turns, limit {limits.lateness_ms:g} ms; worst gap {gap_ms:.1f} of {limits.worst_gap_ms:g} ms, "
+        f"99 % of ticks, limit {limits.lateness_ms:g} ms; worst gap {gap_ms:.1f} of {limits.worst_gap_ms:g} ms, "
         f"{timed.overruns} overruns"
     )
-    advice = "" if share <= 1 else "Trials would not count: close other programs."
+    advice = "" if share <= 1 else "Trials would be invalid: close other programs."
     verdict: Verdict = "ok" if share <= 1 else "warning"
     return Check("Servo lateness", verdict, f"{late_ms:.2f} ms", about, advice, share)
 
@@ -186,8 +205,8 @@ def _delay(facts: Facts, protocol: Protocol) -> Check:
     limit_ms = protocol.limits.delay_error_ms
     seen_ms = (facts.sample_age_s + 1 / max(facts.screen.refresh_hz, 1.0)) * 1e3
     within = seen_ms <= limit_ms
-    advice = "" if within else "Trials would not count: a screen with more frames a second shows the hand sooner."
-    about = f"beyond the one asked for, limit {limit_ms:g} ms"
+    advice = "" if within else "Trials would be invalid: use a screen with a higher refresh rate."
+    about = f"beyond the requested delay, limit {limit_ms:g} ms"
     verdict: Verdict = "ok" if within else "warning"
     return Check("Visual delay", verdict, f"up to {seen_ms:.1f} ms", about, advice, seen_ms / limit_ms)
 
@@ -195,28 +214,30 @@ def _delay(facts: Facts, protocol: Protocol) -> Check:
 def _screen(facts: Facts) -> Check:
     screen = facts.screen
     well = screen.refresh_hz >= LEAST_REFRESH_HZ and screen.scaling == 1
-    advice = "" if well else "Use 100 % and at least 50 Hz for the participant's screen."
+    advice = "" if well else "Set the participant's screen to 100 % scaling and at least 50 Hz."
     value = f"{screen.refresh_hz:.1f} Hz, {100 * screen.scaling:.0f} %"
-    return Check("Screen", "ok" if well else "warning", value, "the participant's, as the system says", advice)
+    return Check(
+        "Screen", "ok" if well else "warning", value, ("refresh rate and scaling of the participant's screen"), advice
+    )
 
 
 def _folder(facts: Facts) -> Check:
     if facts.probe_s is None:
-        return Check("Results folder", "failure", "not usable", "a file was to be written", facts.probe_fault)
+        return Check("Results folder", "failure", "not usable", "no file could be written", facts.probe_fault)
     slow = facts.probe_s > SLOW_PROBE_S
-    value, about = f"{facts.probe_s * 1e3:.1f} ms", "until a file is on the disk"
+    value, about = f"{facts.probe_s * 1e3:.1f} ms", "time to write a file"
     return Check("Results folder", "warning" if slow else "ok", value, about, "Use a local disk." if slow else "")
 
 
 def _space(facts: Facts, protocol: Protocol) -> Check:
     recorded = RECORDED_BYTES_PER_S * expected_duration_s(protocol) if facts.recordings else 0.0
     needed = SPARE * (TABLES_BYTES + recorded)
-    about = f"a session is given {_megabytes(needed)} MB"
+    about = f"a session needs about {_megabytes(needed)} MB"
     if facts.free_bytes is None:
-        return Check("Free space", "warning", "not known", about, "The system does not say how much room there is.")
+        return Check("Free space", "warning", "not known", about, "The system does not report the free space.")
     value = f"{_megabytes(facts.free_bytes)} MB free"
     if facts.free_bytes < needed:
-        return Check("Free space", "failure", value, about, f"{value}, {about}: make room")
+        return Check("Free space", "failure", value, about, f"{value}, {about}: free disk space")
     return Check("Free space", "ok", value, about)
 
 
@@ -225,17 +246,17 @@ def _blinding(facts: Facts, protocol: Protocol) -> Check:
     blind = f"{protocol.study.blinding}-blind"
     if facts.key_hash is None:
         return Check("Blinding", "ok", blind, "the key is drawn and sealed when the first session begins")
-    return Check("Blinding", "ok", blind, f"the key is sealed, its hash begins with {facts.key_hash[:8]}")
+    return Check("Blinding", "ok", blind, f"the key is sealed; its hash begins with {facts.key_hash[:8]}")
 
 
 def _cost(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
-    """Say what the dearest scene takes of a turn, where somebody measured it."""
+    """Return how much of a tick the most expensive scene takes, if it was measured."""
     if facts.tick_s is None:
         return ()
     share = facts.tick_s * protocol.device.rate_hz
-    value, about = f"{facts.tick_s * 1e9:.0f} ns a tick", f"the dearest scene, {100 * share:.2g} % of the time there is"
-    if share > DEAR:
-        return (Check("Cost of the scenes", "warning", value, about, "Leave out an effect.", share),)
+    value, about = f"{facts.tick_s * 1e9:.0f} ns per tick", f"most expensive scene: {100 * share:.2g} % of each tick"
+    if share > MOST_OF_A_TICK:
+        return (Check("Cost of the scenes", "warning", value, about, "Remove an effect from the scene.", share),)
     return (Check("Cost of the scenes", "ok", value, about, share=share),)
 
 
@@ -249,7 +270,7 @@ def _withheld(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
         about += ": " + ", ".join(f"{name} {100 * of:.1f} %" for name, of in sorted(facts.withheld.items()))
     within = most_percent <= limit_percent
     share = most_percent / limit_percent
-    advice = "" if within else "Trials with such strokes would not count."
+    advice = "" if within else "Trials with such strokes would be invalid."
     verdict: Verdict = "ok" if within else "warning"
     return (Check("Force withheld", verdict, f"at most {most_percent:.1f} %", about, advice, share),)
 
@@ -260,9 +281,9 @@ def _balance(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
         return ()
     number = enrolment(facts.participant)
     if number is None:
-        advice = f"{facts.participant} has no number: its row is drawn, not dealt; use ids such as P007."
+        advice = f"{facts.participant} has no number, so its row is drawn at random; use ids such as P007."
         return (Check("Balance", "warning", "drawn", "the row of the square", advice),)
-    return (Check("Balance", "ok", f"participant number {number}", "takes its row of the square"),)
+    return (Check("Balance", "ok", f"participant number {number}", "determines the row of the square"),)
 
 
 def _megabytes(count: float) -> str:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from random import Random
 
-from study_app.devices.registry import is_simulated, kind_of
+from study_app.devices.registry import descriptor_of
 from study_app.errors import StoreError
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
@@ -27,8 +27,8 @@ MAX_SEED = 999_999
 class NewSession:
     """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
 
-    ``resumes`` is the folder of the session that goes on, None for a new one; ``firmware`` the file of a Falcon's
-    program, where it needs one.
+    ``resumes`` is the folder of the session that goes on, None for a new one; ``device_options`` are the values
+    of the device's options, by name.
     """
 
     source: str
@@ -44,7 +44,7 @@ class NewSession:
     pilot: bool = False
     recordings: bool = True
     resumes: Path | None = None
-    firmware: Path | None = None
+    device_options: Mapping[str, str | Path] = field(default_factory=dict)
 
     def read_source(self) -> bytes:
         """Return the protocol's source; of a session that goes on, with its liquid files as they were sealed."""
@@ -74,14 +74,14 @@ def resumed(
     device: str | None = None,
     windowed: bool = False,
     screen: int | None = None,
-    firmware: Path | None = None,
+    device_options: Mapping[str, str | Path] | None = None,
 ) -> NewSession:
     """Return the choices to go on with the session in a folder: its own, and where its windows open now.
 
     Raises
     ------
     StoreError
-        It cannot go on: it is no session's folder, open in another program, finished, damaged, or of another protocol.
+        It cannot go on: it is not a session folder, open in another program, finished, damaged, or of another protocol.
     SessionError
         No protocol at hand is of its study.
     ProtocolError
@@ -92,7 +92,8 @@ def resumed(
     done = progress(session_folder)
     if done.ended is not None:
         raise StoreError(
-            f"{folder.path} is finished ({done.ended}): it cannot go on; use a new session number for another visit"
+            f"{folder.path} is finished ({done.ended}) and cannot be resumed; use a new session number for another "
+            "visit"
         )
     start = done.start
     read = partial(source_to_resume, session_folder)
@@ -113,16 +114,17 @@ def resumed(
         pilot=start["pilot"],
         recordings=bool(start.get("recordings")),
         resumes=session_folder,
-        firmware=firmware,
+        device_options=device_options or {},
     )
 
 
 def draw_seed() -> int:
-    """Return a seed that nobody chose, short enough to be read aloud."""
+    """Return a random seed, short enough to be read aloud."""
     return secrets.randbelow(MAX_SEED) + 1
 
 
 def study_results(results: Path, study: str, device: str, *, pilot: bool = False) -> Path:
     """Return a study's folder under ``results``; pilots and simulated hands are kept apart from participants' data."""
-    name = f"{study}-{kind_of(device)}" if is_simulated(device) else study
+    used = descriptor_of(device)
+    name = f"{study}-{used.name}" if used.simulated else study
     return study_folder(results, name, pilot=pilot).path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,9 +12,13 @@ from typing import Any
 from study_app.errors import ProtocolError, SessionError
 from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import PageStep, Schedule, Step, Trial
+from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial
+from study_app.protocol.trials.answered import heard_in
+from study_app.protocol.trials.method import Heard
+from study_app.store.blinded.blinding import Key
+from study_app.store.blinded.sealing import opened
 from study_app.store.journals.journal import Line
-from study_app.store.progress import Progress, attempts, progress_of
+from study_app.store.progress import Progress, progress_of
 from study_app.store.sessions.reopen import sealed_source
 from study_app.store.workstation import recent_protocols
 
@@ -22,17 +27,26 @@ REHEARSED_SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 6
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where a session starts: the index of its first step, and how often trials were presented before (by number)."""
+    """Where a session starts: the index of its first step, how often trials were presented before, and what was heard.
+
+    ``presented`` is by trial number; ``heard`` are the answered trials of designs that still count. ``invalid`` counts
+    the attempts at the first step's trial that were not delivered as requested.
+    """
 
     step: int = 0
     presented: Mapping[int, int] = field(default_factory=dict)
+    heard: tuple[Heard, ...] = field(default=(), repr=False)
+    invalid: int = 0
 
 
 FIRST = Start()
 
 
-def resume_at(protocol: Protocol, schedule: Schedule, lines: Iterable[Line]) -> Start:
+def resume_at(protocol: Protocol, schedule: Schedule, lines: Iterable[Line], key: Key | None = None) -> Start:
     """Return where the session with these journal lines goes on.
+
+    The levels of answered trials are those of the journal, opened with the study's ``key``; without it `Start.heard`
+    is empty.
 
     A trial whose answers are not all confirmed is presented again as its next attempt, so that nobody answers what they
     felt before the gap; one that asks nothing and was done is over. With ``resume = "block"`` the whole block is
@@ -43,15 +57,15 @@ def resume_at(protocol: Protocol, schedule: Schedule, lines: Iterable[Line]) -> 
     SessionError
         The journal is not of this schedule.
     """
-    told = list(lines)
-    progress = progress_of(told)
-    step = _next_step(protocol, schedule, progress)
+    lines = list(lines)
+    progress = progress_of(lines)
+    step = reached = _next_step(protocol, schedule, progress)
+    heard = () if key is None else heard_in(protocol, opened(lines, key))
     if protocol.study.resume == "block":
         step = _block_start(schedule, step)
-    presented: dict[int, int] = {}
-    for trial, attempt in attempts(told):
-        presented[trial] = max(attempt, presented.get(trial, 0))
-    return Start(step, presented)
+        before = {trial.number for trial in schedule.steps[:step] if isinstance(trial, Trial)}
+        heard = tuple(one for one in heard if one.trial in before)
+    return Start(step, progress.presented, heard, progress.invalid if step == progress.step == reached else 0)
 
 
 def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:
@@ -67,7 +81,7 @@ def source_to_resume(session_folder: Path, name: str) -> bytes:
     ProtocolError
         There is no such file.
     StoreError
-        It is no session's folder.
+        It is not a session folder.
     """
     return sealed_source(session_folder, source_bytes(name))
 
@@ -79,8 +93,12 @@ def find_protocol(
 
     Parameters
     ----------
-    read : what reads a candidate: `source_to_resume` of a session
-    candidates : where to look: files or names; by default those in the workspace, those that ship, and recent ones
+    start : Line
+        The first line of the session's journal.
+    candidates : iterable of str, optional
+        Where to look: files or names; by default those in the workspace, those that ship, and recent ones.
+    read : callable
+        Returns a candidate's bytes: `source_to_resume` of a session.
 
     Raises
     ------
@@ -98,7 +116,7 @@ def find_protocol(
     for name, source in sources.items():
         if _study_name(name, source) == start["study"]:
             return name
-    raise SessionError(f"no protocol at hand is of the study {start['study']!r}: name its file with --protocol FILE")
+    raise SessionError(f"no known protocol belongs to the study {start['study']!r}: name its file with --protocol FILE")
 
 
 def _study_name(name: str, source: bytes) -> str | None:
@@ -112,11 +130,15 @@ def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> in
     """Return the index of the step that was not left behind, checked against what the journal calls it."""
     steps = schedule.steps
     here = steps[progress.step] if progress.step < len(steps) else None
-    named = here.page_id if isinstance(here, PageStep) else None
+    named = here.page_id if isinstance(here, PageStep) else here.form if isinstance(here, FormStep) else None
     number = here.number if isinstance(here, Trial) else None
     if (progress.page, progress.trial) not in {(None, None), (named, number)}:
-        raise SessionError("the journal does not follow the order that seed and participant give: it cannot go on")
-    asks = isinstance(here, Trial) and protocol.blocks[here.block].questionnaire is not None
+        raise SessionError(
+            "the journal does not follow the order given by seed and participant, so the session cannot be resumed"
+        )
+    if number is not None and progress.invalid >= (protocol.limits.attempts or math.inf):
+        return progress.step + 1  # it was presented as often as permitted
+    asks = isinstance(here, Trial) and protocol.questionnaire_of(here.block) is not None
     return progress.step + 1 if number is not None and progress.task_done and not asks else progress.step
 
 

@@ -17,8 +17,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -26,15 +25,16 @@ from study_app.errors import SessionError, StoreError, StudyError
 from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.protocol.model import Protocol as Study
 from study_app.protocol.orders.schedule import Schedule
+from study_app.protocol.trials.presentation import scene_of
 from study_app.session.ports import Ports
 from study_app.session.resume import FIRST, Start
-from study_app.session.tasks import TaskView
-from study_app.session.transitions import page_builder
+from study_app.session.tasks import Outcome, TaskView
 from study_app.session.transitions.commands import (
     CheckFlushed,
     Command,
     FadeIn,
     Finish,
+    LeaveTask,
     Rest,
     ShowPage,
     StartTrial,
@@ -45,32 +45,31 @@ from study_app.session.transitions.commands import (
 )
 from study_app.session.transitions.events import (
     Broke,
+    Chosen,
     Continue,
     EndAsked,
     Event,
     ForceStopped,
     PauseAsked,
     Reconnected,
+    Submitted,
     TaskDone,
+    TimeUp,
+    WriteCompleted,
+    WriteFailed,
+    WriteRetried,
     broken,
 )
-from study_app.session.transitions.state import FINAL, Phase, SessionState
+from study_app.session.transitions.state import FINAL, Phase, SessionState, Stall
 from study_app.session.transitions.table import advance, open_session
-from study_app.session.trial import RunningTrial, TankView
+from study_app.session.trial import RunningTrial, TankView, ball_is_back, resting_view
 from study_app.session.trial_recording import Recording
+from study_app.store.limits import broken_limits
+from study_app.store.tables.delivered import delivered, undelivered
 
 BUTTON_CONTINUE = 1 << 0
+BUTTONS_ANSWER = (1 << 1, 1 << 2)
 RETRY_S = 1.0  # a disk that took nothing is tried again so often
-
-
-@dataclass(frozen=True, slots=True)
-class _Stall:
-    """What the disk did not take: why, and the commands that are still to be carried out."""
-
-    reason: str
-    commands: tuple[Command, ...]
-    at_s: float
-    retry_s: float
 
 
 class Runner:
@@ -78,10 +77,20 @@ class Runner:
 
     Parameters
     ----------
-    protocol, schedule, language : what is run, in what order, in which language
-    key : block → code → condition
-    ports : the world
-    start : where a resumed session goes on
+    protocol : Study
+        What is run.
+    schedule : Schedule
+        In what order.
+    key : mapping of str to mapping
+        The condition of each code, by block.
+    ports : Ports
+        Servo, journal, windows and clock.
+    language : str
+        In which language.
+    start : Start
+        Where a resumed session goes on.
+    secret : bytes
+        The sealed key's nonce, from which levels are drawn; a study without designs needs none.
     """
 
     def __init__(
@@ -92,10 +101,11 @@ class Runner:
         ports: Ports,
         language: str,
         start: Start = FIRST,
+        secret: bytes = b"",
     ) -> None:
         self._protocol = protocol
         self._ports = ports
-        self._state = open_session(protocol, schedule, key, language, start)
+        self._state = open_session(protocol, schedule, key, language, start, secret)
         self._reader = ports.servo.telemetry.reader()
         self._recording = Recording(ports.recorder, ports.servo.rate_hz)
         self._running: RunningTrial | None = None
@@ -104,9 +114,8 @@ class Runner:
         self._page_since_ns = 0
         self._waiting: deque[Event] = deque()
         self._busy = False
-        self._stall: _Stall | None = None
+        self._retry_s = 0.0  # when a disk that took nothing is tried again
         self._ending: tuple[Finish, float] | None = None
-        self._stopped_by: Literal["operator", "program"] = "program"  # who stops the force of a session that stalls
         self._listeners: list[Callable[[SessionState], None]] = []
 
     @property
@@ -117,7 +126,7 @@ class Runner:
     @property
     def finished(self) -> bool:
         """Whether the session is over."""
-        return self._state.phase in FINAL and self._ending is None
+        return self._state.over and self._ending is None
 
     @property
     def ending(self) -> bool:
@@ -127,7 +136,7 @@ class Runner:
     @property
     def stalled(self) -> str | None:
         """Why the disk takes nothing, for the operator; None while it does."""
-        return None if self._stall is None else self._stall.reason
+        return None if self._state.stall is None else self._state.stall.reason
 
     @property
     def task(self) -> TaskView | None:
@@ -176,12 +185,12 @@ class Runner:
                 self._carry_out_all((finish,), at_s)
                 self._tell()
             return
-        if self._stall is not None:
-            if self._ports.clock() >= self._stall.retry_s:
-                self._try_again(self._stall)
+        now_s = self._ports.clock()
+        if self._state.stall is not None:
+            if now_s >= self._retry_s:
+                self.post(WriteRetried(now_s))
             return
-        self._carry_out_all((CheckFlushed(),), self._ports.clock())
-        if self._stalls:
+        if not self._carry_out_all((CheckFlushed(),), now_s):
             return
         fault = self._ports.servo.fault
         if fault is not None and self._state.phase not in {Phase.TROUBLE, *FINAL}:
@@ -193,11 +202,22 @@ class Runner:
         if running is not None and running.frozen:
             self.post(PauseAsked(self._ports.clock(), "program"))
         elif running is not None and (outcome := running.outcome()) is not None:
-            self.post(TaskDone(self._ports.clock(), outcome, running.summary()))
+            self.post(self._done(running, outcome))
+        elif self._state.phase in {Phase.RESTING, Phase.FEEDBACK} and now_s >= (self._state.until_s or 0.0):
+            rest = self.view(self._ports.servo.now_ns())
+            if rest is None or ball_is_back(rest, self._state.task):
+                self.post(TimeUp(now_s))
 
     def view(self, now_ns: int) -> TankView | None:
-        """Return what is to be drawn at ``now_ns`` (servo's clock), as late as the trial asks; None without a trial."""
-        return None if self._running is None else self._running.view(now_ns)
+        """Return what is to be drawn at ``now_ns`` (servo's clock), as late as the trial asks; None without a trial.
+
+        In a rest the ball is drawn without delay.
+        """
+        if self._running is not None:
+            return self._running.view(now_ns)
+        if self._state.phase is not Phase.RESTING:
+            return None
+        return resting_view(self._ports.servo, self._state.task, now_ns)
 
     def frame_shown(self, painted_ns: int, sample_ns: int) -> None:
         """Take a frame of the trial's tank: painted at one time, true of another [ns, servo's clock]."""
@@ -209,28 +229,37 @@ class Runner:
             self._fail(error)
 
     def _take(self, event: Event) -> None:
-        if self._stall is not None and not self._take_while_stalled(event, self._stall):
-            return
-        if isinstance(event, Continue) and self._state.phase is Phase.TASK:
-            if self._running is not None:
-                self._running.leave()
-            return
+        if isinstance(event, WriteRetried | EndAsked) and self._state.stall is not None:
+            self._write_again(self._state.stall)
+            if isinstance(event, WriteRetried):
+                return
+        stall = self._state.stall
         self._state, commands = advance(self._state, event)
         if isinstance(event, Reconnected):
             self._recording.forget()
-        self._carry_out_all(commands, event.at_s)
-        if self._stall is None:
+        if self._carry_out_all(commands, event.at_s):
             self._tell()
+        if isinstance(event, EndAsked) and stall is not None:
+            raise StoreError(
+                f"{stall.reason}; the session's end is not written either: resume it later, or end it then"
+            )
 
-    @property
-    def _stalls(self) -> bool:
-        return self._stall is not None
+    def _write_again(self, stall: Stall) -> None:
+        """Carry out what the disk did not take; if it takes it now, go on."""
+        waiting = tuple(self._waiting)
+        self._state, commands = advance(self._state, WriteRetried(stall.at_s))
+        done = self._carry_out_all(commands, stall.at_s)
+        broke = [event for event in self._waiting if isinstance(event, Broke) and event not in waiting]
+        self._waiting = deque((*waiting, *broke))  # what a page said that is covered again at once is said again later
+        if done:
+            self._take(WriteCompleted(self._ports.clock()))
 
     def _tell(self) -> None:
         for listener in self._listeners:
             listener(self._state)
 
-    def _carry_out_all(self, commands: Sequence[Command], at_s: float) -> None:
+    def _carry_out_all(self, commands: Sequence[Command], at_s: float) -> bool:
+        """Carry out commands of a moment in order; return whether the disk took them. Other failures are reported."""
         for index, command in enumerate(commands):
             if isinstance(command, Finish) and not self._ports.settled():
                 self._ending = command, at_s
@@ -238,11 +267,13 @@ class Runner:
             try:
                 self._carry_out(command, at_s)
             except StoreError as error:
-                self._hold(commands[index:], at_s, error)
-                return
+                self._retry_s = self._ports.clock() + RETRY_S
+                self._take(WriteFailed(at_s, str(error), tuple(commands[index:])))
+                return False
             except StudyError as error:
                 self._fail(error)
-                return
+                return True
+        return True
 
     def _fail(self, error: StudyError) -> None:
         """Stop the force, and call the operator."""
@@ -254,6 +285,9 @@ class Runner:
         match command:
             case StopForce():
                 servo.stop_force()
+            case LeaveTask():
+                if self._running is not None:
+                    self._running.leave()
             case StopTrial():
                 self._stop_trial()
             case Rest():
@@ -274,65 +308,30 @@ class Runner:
             case Finish(status, reason):
                 journal.finish(status, reason)
 
-    def _hold(self, commands: Sequence[Command], at_s: float, error: StoreError) -> None:
-        """Stop the force and keep what is still to be done; the participant sees a calm page until it is."""
-        servo = self._ports.servo
-        servo.stop_force()
-        self._stop_trial()
-        servo.rest()
-        self._stall = _Stall(str(error), tuple(commands), at_s, self._ports.clock() + RETRY_S)
-        over = self._state.phase in FINAL
-        self._ports.present(page_builder.page(self._state if over else replace(self._state, phase=Phase.TROUBLE)))
-        self._tell()
-
-    def _try_again(self, stall: _Stall) -> bool:
-        """Do what was left to do; if the disk takes it, pause. Return whether it did."""
-        waiting, busy = tuple(self._waiting), self._busy
-        self._stall, self._busy = None, True
-        self._carry_out_all(stall.commands, stall.at_s)
-        self._busy = busy
-        if self._stalls:  # again, by what was just carried out
-            return False
-        self._waiting = deque(waiting)  # what a page said that is covered again at once is said again later
-        if self._state.phase in {Phase.READING, Phase.TASK, Phase.ANSWERING, Phase.PAUSED}:
-            self._waiting.appendleft(ForceStopped(self._ports.clock(), self._stopped_by))
-        self._stopped_by = "program"
-        if self._waiting and not busy:
-            self.post(self._waiting.popleft())
-        elif not busy:
-            self._tell()
-        return True
-
-    def _take_while_stalled(self, event: Event, stall: _Stall) -> bool:
-        """Return whether the event can be taken after all: an end is, if need be without being written."""
-        if isinstance(event, ForceStopped):
-            if event.by == "operator":
-                self._stopped_by = "operator"
-            return False
-        if not isinstance(event, EndAsked):
-            raise SessionError(f"{stall.reason}; until then the session waits")
-        if not self._try_again(stall):
-            self._state, _ = advance(self._state, event)
-            self._ports.present(page_builder.page(self._state))
-            self._tell()
-            raise StoreError(
-                f"{stall.reason}; the session's end is not written either: resume it later, or end it then"
-            )
-        if self._waiting:
-            self._waiting.append(event)
-            return False
-        return True
-
     def _prepared(self, command: StartTrial) -> RunningTrial:
         return RunningTrial(
             command,
-            self._protocol.scene_for(command.condition),
+            scene_of(self._protocol, command.presented),
             late_s=self._protocol.limits.delay_error_ms / 1000,
             servo=self._ports.servo,
             reader=self._reader,
             recording=self._recording,
             paints=self._ports.paints,
+            hides_ball=self._protocol.conditions[command.presented.condition].ball == "hidden",
         )
+
+    def _done(self, running: RunningTrial, outcome: Outcome) -> TaskDone:
+        """Return that a task is over; of an interval with what it delivered, and which limits it breaks."""
+        summary, limits, command = running.summary(), self._protocol.limits, running.command
+        reasons: tuple[str, ...] = ()
+        if command.interval is not None and limits.attempts is not None:
+            found = delivered(self._protocol, command.presented, command.task, running.samples)
+            summary |= found.columns
+            reasons = (
+                *undelivered(limits, command.presented, command.task, found),
+                *broken_limits(summary, limits.model_dump()),
+            )
+        return TaskDone(self._ports.clock(), outcome, summary, reasons)
 
     def _stop_trial(self) -> None:
         self._recording.stop()
@@ -361,8 +360,21 @@ class Runner:
         if (pressed & BUTTON_STOP).any():
             self.post(ForceStopped(self._ports.clock(), "device"))
         pressed_since = pressed[samples["time_ns"] >= self._page_since_ns]
-        if (pressed_since & BUTTON_CONTINUE).any() and self._button_goes_on and not self._stalls:
+        if (pressed_since & BUTTON_CONTINUE).any() and self._button_goes_on:
             self.post(Continue(self._ports.clock()))
+        self._answer_by_buttons(pressed_since)
+
+    def _answer_by_buttons(self, pressed: Any) -> None:
+        """Answer where there are two answers: the device's second button is the first of them, its third the second."""
+        state = self._state
+        if state.phase is not Phase.ANSWERING or state.due is None or state.design is None:
+            return
+        answers = state.design.answers
+        down = [place for place, bit in enumerate(BUTTONS_ANSWER) if (pressed & bit).any()]
+        if len(answers) == len(BUTTONS_ANSWER) and len(down) == 1:
+            now_s = self._ports.clock()
+            self.post(Chosen(now_s, state.design.name, answers[down[0]]))
+            self.post(Submitted(now_s))
 
     @property
     def _button_goes_on(self) -> bool:

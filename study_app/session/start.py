@@ -7,15 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from study_app.devices.registry import is_falcon, is_simulated, kind_of
+from study_app.devices.registry import check_options, descriptor_of
 from study_app.devices.rig import Rig
-from study_app.errors import DeviceError, SessionError
+from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
+from study_app.session.masking import Masking
 from study_app.session.preflight import Facts, Screen
 from study_app.session.request import NewSession
+from study_app.store.blinded.allocation import check_session
+from study_app.store.blinded.blinding import check_conditions
 from study_app.store.clock import SessionClock
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.participant_ids import check_participant, check_unused
 from study_app.store.sessions.reopen import reopen
@@ -26,10 +29,11 @@ MEASURED_S = 2.0  # so long the servo is looked at before a session
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """Device and servo at rest, and what was measured of them."""
+    """Device and servo at rest, and what was measured of them; ``masking`` of its motors, where that was asked."""
 
     machine: Rig
     facts: Facts
+    masking: Masking | None = None
 
     def facts_with(self, refresh_hz: float, scaling: float) -> Facts:
         """Return the facts with those of the participant's screen: its refresh rate and the scaling of its pixels."""
@@ -38,9 +42,7 @@ class Ready:
 
 def check(chosen: NewSession, study: Protocol) -> None:
     """Refuse what cannot begin before any window opens; nothing is touched."""
-    kind_of(chosen.device)
-    if chosen.firmware is not None and not is_falcon(chosen.device):
-        raise DeviceError(f"only a Falcon takes firmware, not device '{chosen.device}': leave --firmware out")
+    check_options(chosen.device, chosen.device_options)
     if chosen.language not in study.study.languages:
         known = ", ".join(study.study.languages)
         raise SessionError(
@@ -52,6 +54,8 @@ def check(chosen: NewSession, study: Protocol) -> None:
     check_participant(chosen.participant, pilot=chosen.pilot)
     check_study(folder, study.study.name)
     check_unused(folder, chosen.participant, chosen.session)
+    check_session(folder, study, chosen.participant, chosen.session)
+    check_conditions(folder.path, study)
 
 
 def measured(machine: Rig, chosen: NewSession, *, sleep: Callable[[float], object] = time.sleep) -> Facts:
@@ -71,7 +75,12 @@ def measured(machine: Rig, chosen: NewSession, *, sleep: Callable[[float], objec
 
 
 def open_store(
-    chosen: NewSession, protocol: Protocol, source: bytes, machine: Rig, screens: dict[str, Any]
+    chosen: NewSession,
+    protocol: Protocol,
+    source: bytes,
+    machine: Rig,
+    screens: dict[str, Any],
+    masking: Masking | None = None,
 ) -> SessionStore:
     """Claim a new session on the disk, or open the one that goes on."""
     if chosen.resumes is not None:
@@ -82,12 +91,10 @@ def open_store(
             operator=chosen.operator,
             device=machine.described,
             screens=screens,
+            motors_masked=None if masking is None else masking.entry,
             now_ns=machine.servo.now_ns,
         )
-    return begin(
-        chosen.results,
-        protocol,
-        source,
+    start = SessionStart(
         chosen.participant,
         session=chosen.session,
         seed=chosen.seed,
@@ -95,8 +102,9 @@ def open_store(
         language=chosen.language,
         device=machine.described,
         screens=screens,
-        simulated=is_simulated(chosen.device),
+        simulated=descriptor_of(chosen.device).simulated,
         pilot=chosen.pilot,
         recordings=chosen.recordings,
-        clock=SessionClock(machine.servo.now_ns),
+        motors_masked=None if masking is None else masking.entry,
     )
+    return begin(chosen.results, protocol, source, start, clock=SessionClock(machine.servo.now_ns))

@@ -19,7 +19,11 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.protocol.model import Explore, Reach
+from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks.explore import Explore
+from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks.reach import Reach
+from study_app.protocol.trials.tasks.stroke import Point
 
 Outcome: TypeAlias = Literal["complete", "timeout"]
 
@@ -32,7 +36,7 @@ class TaskView:
 
     ``lit`` is the index of the lit target or None, ``reached`` how many were reached and ``of`` how many there are to
     reach (None where time ends the task), ``dwell`` the closed share of the ring in 0 … 1, ``elapsed_s`` the time since
-    the task began.
+    the task began. ``target_m`` is where a moving target is [m, hand frame]; None where targets stand still.
     """
 
     lit: int | None
@@ -40,6 +44,7 @@ class TaskView:
     of: int | None
     dwell: float
     elapsed_s: float
+    target_m: Point | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +137,18 @@ class ExploreTracker(Tracker):
         return True
 
 
+class FollowTracker(Tracker):
+    """Following: the target moves by the clock, and time alone ends the task."""
+
+    def __init__(self, task: Follow) -> None:
+        super().__init__(task.limit_s, "complete")
+        self._task = task
+
+    def _view(self, _time_ns: int, elapsed_ns: int) -> TaskView:
+        elapsed_s = elapsed_ns / _NS
+        return TaskView(0, 0, None, 0.0, elapsed_s, self._task.target_m(elapsed_s))
+
+
 @dataclass(frozen=True, slots=True)
 class _Mark:
     """From one moment on: how many were reached, which target is lit, since when the proxy is inside it [ns]."""
@@ -206,9 +223,15 @@ class ReachTracker(Tracker):
         return TargetReached(lit, (time_ns - (self._start_ns or 0)) / _NS)
 
 
-def track(task: Explore | Reach) -> Tracker:
+def track(task: AnyTask) -> Tracker:
     """Return a tracker at the beginning of ``task``."""
-    return ReachTracker(task) if isinstance(task, Reach) else ExploreTracker(task)
+    match task:
+        case Explore():
+            return ExploreTracker(task)
+        case Reach():
+            return ReachTracker(task)
+        case Follow():
+            return FollowTracker(task)
 
 
 def _nanoseconds(seconds: float) -> int:

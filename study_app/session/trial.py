@@ -6,6 +6,7 @@ to show the tank. Without a window, whoever runs the session reports the first f
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,11 +15,14 @@ from numpy.typing import NDArray
 
 from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.haptics.model.scene import Scene
+from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks.follow import Follow
 from study_app.session.ports import ServoPort
 from study_app.session.tasks import Outcome, TargetReached, TaskView, track
 from study_app.session.transitions.commands import StartTrial
 from study_app.session.trial_recording import Recording
 from study_app.session.trial_statistics import TrialStatistics
+from study_app.store.tables.delivered import JUDGED, judged
 
 # Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every
 # delay, none included, and is met exactly; else the newest sample, up to a tick old, would stand in where there is no
@@ -31,11 +35,15 @@ FROZEN_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class TankView:
-    """What is drawn in the tank: the proxy's place [m, hand frame] (3,), the task, and the time all this is of [ns]."""
+    """What is drawn in the tank: the proxy's place [m, hand frame] (3,), the task, and the time all this is of [ns].
+
+    ``ball_hidden`` is whether the proxy is not drawn.
+    """
 
     position_m: NDArray[np.float64]
     task: TaskView
     sample_time_ns: int
+    ball_hidden: bool = False
 
 
 class RunningTrial:
@@ -43,13 +51,22 @@ class RunningTrial:
 
     Parameters
     ----------
-    command : what is presented, and how late it is drawn
-    scene : what is felt
-    late_s : a frame counts as late if its delay is more than this over the one asked for
-    servo : presents the scene
-    reader : the telemetry's reader that the samples given to `follow` come from; it counts those that were lost
-    recording : takes frames and samples from the first frame on
-    paints : whether a window paints frames as long as the trial runs
+    command : StartTrial
+        What is presented, and how late it is drawn.
+    scene : Scene
+        What is felt.
+    late_s : float
+        A frame counts as late if its delay is more than this over the one asked for [s].
+    servo : ServoPort
+        Presents the scene.
+    reader : telemetry.Reader
+        The telemetry's, from which the samples given to `follow` come; it counts those that were lost.
+    recording : Recording
+        Takes frames and samples from the first frame on.
+    paints : bool
+        Whether a window paints frames as long as the trial runs.
+    hides_ball : bool
+        Whether the ball is not drawn once the lead of the task is over.
     """
 
     def __init__(
@@ -62,9 +79,12 @@ class RunningTrial:
         reader: Any,
         recording: Recording,
         paints: bool,
+        hides_ball: bool = False,
     ) -> None:
         self.trial = command.trial
-        self._command = command
+        self._hides_ball = hides_ball
+        self._taken: list[bytes] = []
+        self.command = command
         self._scene = scene
         self._servo = servo
         self._reader = reader
@@ -83,9 +103,11 @@ class RunningTrial:
 
     def view(self, now_ns: int) -> TankView:
         """Return what is to be drawn at ``now_ns`` (servo's clock), as late as asked and ``SETTLED_S`` more."""
-        drawn_ns = now_ns - round((self._command.delay_s + SETTLED_S) * 1e9)
+        drawn_ns = now_ns - round((self.command.delay_s + SETTLED_S) * 1e9)
         position_m, shown_ns = self._servo.telemetry.position_at(drawn_ns)
-        return TankView(position_m, self._tracker.at(shown_ns), shown_ns)
+        task = self._tracker.at(shown_ns)
+        hidden = self._hides_ball and task.elapsed_s >= self.command.task.lead_s
+        return TankView(position_m, task, shown_ns, hidden)
 
     def frame(self, painted_ns: int, sample_ns: int) -> None:
         """Take a frame that was painted at one moment and showed another [ns, servo's clock]; the first one begins.
@@ -98,7 +120,7 @@ class RunningTrial:
         if self._serial is None:
             self._serial = self._servo.load(self._scene)
             self._dropped_before = self._reader.dropped
-            self._recording.start(self.trial, self._command.attempt)
+            self._recording.start(self.trial, self.command.attempt, self.command.interval)
         self._statistics.frame(painted_ns, sample_ns)
         self._recording.frame(painted_ns, sample_ns)
 
@@ -109,7 +131,10 @@ class RunningTrial:
         mine = samples[samples["scene"] == self._serial]
         reached = self._tracker.feed(mine[mine["limiters"] & LIMITER_GLITCH == 0])
         end_ns = self._tracker.end_ns
-        self._statistics.feed(mine if end_ns is None else mine[mine["time_ns"] <= end_ns])
+        mine = mine if end_ns is None else mine[mine["time_ns"] <= end_ns]
+        self._statistics.feed(mine)
+        if self.command.interval is not None:
+            self._taken.append(judged(mine).tobytes())
         return reached
 
     def leave(self) -> None:
@@ -119,14 +144,21 @@ class RunningTrial:
     def outcome(self) -> Outcome | None:
         """Return how the task ended, once that was drawn, as late as it may be in this block; None before."""
         end_ns = self._tracker.end_ns
-        linger_ns = round((self._command.linger_s + SETTLED_S) * 1e9)
+        linger_ns = round((self.command.linger_s + SETTLED_S) * 1e9)
         if end_ns is None or self._servo.now_ns() - end_ns < linger_ns:
             return None
         return self._tracker.outcome
 
     @property
+    def samples(self) -> Any:
+        """What is judged of the interval so far (array of ``delivered.JUDGED``); none of a trial without a design."""
+        return np.frombuffer(
+            b"".join(self._taken), JUDGED
+        )  # records are concatenated field by field, five times slower
+
+    @property
     def frozen(self) -> bool:
-        """Whether the program or the machine stood still for so long that nobody felt or saw the trial as it is.
+        """Whether the program or the machine stood still for so long that the trial was not presented as it is.
 
         Telemetry cannot tell: it knows no tick that did not come. The servo does, and the frames say it of the window.
         """
@@ -147,3 +179,19 @@ class RunningTrial:
             worst_gap_s=self._servo.worst_gap_s,
             until_ns=self._until_ns,
         )
+
+
+def resting_view(servo: ServoPort, task: AnyTask, now_ns: int) -> TankView:
+    """Return what is drawn in a rest at ``now_ns`` (servo's clock): the ball, and the target where it starts."""
+    position_m, shown_ns = servo.telemetry.position_at(now_ns - round(SETTLED_S * 1e9))
+    lit = None if task.start_m is None else 0
+    return TankView(
+        position_m, TaskView(lit, reached=0, of=None, dwell=0.0, elapsed_s=0.0, target_m=task.start_m), shown_ns
+    )
+
+
+def ball_is_back(view: TankView, task: AnyTask) -> bool:
+    """Return whether the ball is where the next interval of a task begins; tasks without such a place need none."""
+    if not isinstance(task, Follow):
+        return True
+    return math.dist(view.position_m.tolist(), task.start_m) <= task.radius_m

@@ -19,8 +19,10 @@ class Recording:
 
     Parameters
     ----------
-    recorder : where they go
-    rate_hz : the servo's nominal rate
+    recorder : RecorderPort or None
+        Where they go.
+    rate_hz : float
+        The servo's nominal rate.
     """
 
     def __init__(self, recorder: RecorderPort | None, rate_hz: float) -> None:
@@ -32,7 +34,7 @@ class Recording:
         self._running = False
 
     def take(self, samples: Any) -> None:
-        """Take the newest samples, in order (array of ``layout.SAMPLE``), which nobody changes afterwards."""
+        """Take the newest samples, in order (array of ``layout.SAMPLE``), which are not changed afterwards."""
         if self._recorder is None or len(samples) == 0:
             return
         if self._running:
@@ -47,11 +49,11 @@ class Recording:
         self._before.clear()
         self._held = 0
 
-    def start(self, trial: int, attempt: int) -> None:
-        """Begin the recording of a trial, with what came just before it."""
+    def start(self, trial: int, attempt: int, interval: int | None = None) -> None:
+        """Begin the recording of a trial or of one of its intervals, with what came just before it."""
         if self._recorder is None:
             return
-        self._recorder.start(trial, attempt, self._rate_hz)
+        self._recorder.start(trial, attempt, self._rate_hz, interval)
         self._running = True
         spare = max(self._held - self._lead, 0)
         for index, samples in enumerate(self._before):

@@ -21,11 +21,16 @@ class TrialStatistics:
 
     Parameters
     ----------
-    rate_hz : the servo's nominal rate
-    delay_s : the visual delay asked for
-    late_s : a frame counts as late if its delay is more than this over the one asked for
-    due_ns : when the trial's first frame was due: when its page was asked for [ns]
-    paints : whether frames come as long as the trial runs; else its first frame may be the only one
+    rate_hz : float
+        The servo's nominal rate.
+    delay_s : float
+        The visual delay asked for [s].
+    late_s : float
+        A frame counts as late if its delay is more than this over the one asked for [s].
+    due_ns : int
+        When the trial's first frame was due: when its page was asked for [ns].
+    paints : bool
+        Whether frames come as long as the trial runs; else its first frame may be the only one.
     """
 
     def __init__(self, *, rate_hz: float, delay_s: float, late_s: float, due_ns: int, paints: bool = True) -> None:
@@ -88,9 +93,12 @@ class TrialStatistics:
 
         Parameters
         ----------
-        samples_dropped : how many samples of the trial nobody read
-        worst_gap_s : the longest time between two ticks, as the servo kept it
-        until_ns : when the trial ended: until then the last frame stood [ns]
+        samples_dropped : int
+            How many samples of the trial were not read.
+        worst_gap_s : float
+            The longest time between two ticks, as the servo kept it [s].
+        until_ns : int
+            When the trial ended: until then the last frame stood [ns].
         """
         return {
             name: round(value, 6) if isinstance(value, float) else value

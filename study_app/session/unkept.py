@@ -15,9 +15,9 @@ class Unkept:
     recorder = None
     fingerprint = ""
 
-    def __init__(self, now_ns: Callable[[], int], codes: dict[str, dict[str, str]]) -> None:
+    def __init__(self, now_ns: Callable[[], int], codes: dict[str, dict[str, str]], secret: bytes) -> None:
         self.clock = SessionClock(now_ns)
-        self.key = Key(hash="", drawn="seed", codes=codes, tables={}, tables_hash="", nonce=b"")
+        self.key = Key(hash="", drawn="seed", codes=codes, tables={}, tables_hash="", nonce=secret)
 
     def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
         """Keep nothing."""

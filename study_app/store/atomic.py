@@ -22,21 +22,24 @@ OLD_S = 3600.0  # no program takes so long from the last write to a half to its 
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # not those of hidden files: markers come and go
 
 
-def write_file(path: Path, content: bytes, *, waits: bool = True) -> None:
+def write_file(path: Path, content: bytes, *, waits: bool = True, changed_ns: int | None = None) -> None:
     """Put ``content`` at ``path``, replacing what was there in one step.
 
-    Written beside, flushed to the disk, renamed over the old file, and the folder's entry flushed. On any failure the
-    old file is untouched and nothing is left beside it. Without ``waits`` nothing is flushed: for files that can be
-    made again, since a power cut may then take them.
+    Written under a temporary name, flushed to the disk, renamed over the old file, and the folder's entry flushed. On
+    any failure the old file is untouched and no temporary file is left. Without ``waits`` nothing is flushed: for files
+    that can be made again, since a power cut may then take them. ``changed_ns`` is when the file is said to have been
+    changed last [ns since 1970], by default now.
 
     Raises
     ------
     StoreError
         The file cannot be written; names the file and the system's reason.
     """
-    half = beside(path)
+    half = temporary_path(path)
     try:
-        _write_through(half, content, waits=waits)
+        write_through(half, content, waits=waits)
+        if changed_ns is not None:
+            os.utime(half, ns=(changed_ns, changed_ns))
         half.replace(path)
         if waits:
             sync_folder(path.parent)
@@ -50,20 +53,21 @@ def write_file(path: Path, content: bytes, *, waits: bool = True) -> None:
 def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True, mode: int = 0o666) -> bool:
     """Create folder ``path`` holding ``files``, or return False where another program was first.
 
-    The folder is filled beside and renamed into place, which no system does over a folder that holds something: of
-    two programs exactly one succeeds, and the other finds every file whole. Without ``waits`` nothing is flushed: for
-    what can be made again, since a power cut may then take it. ``mode`` is what the files may be at most to whom.
+    The folder is filled under a temporary name and renamed into place, which no system does over a folder that holds
+    something: of two programs exactly one succeeds, and the other finds every file whole. Without ``waits`` nothing is
+    flushed: for what can be made again, since a power cut may then take it. ``mode`` is what the files may be at most
+    to whom.
 
     Raises
     ------
     StoreError
         The folder is neither there nor can be created.
     """
-    half = beside(path)
+    half = temporary_path(path)
     try:
         half.mkdir()
         for name, content in files.items():
-            _write_through(half / name, content, waits=waits, mode=mode)
+            write_through(half / name, content, waits=waits, mode=mode)
         if waits:
             sync_folder(half)
         half.rename(path)
@@ -138,7 +142,7 @@ def write_whole(file: BinaryIO, content: bytes) -> None:
         rest = rest[file.write(rest) :]
 
 
-def beside(path: Path) -> Path:
+def temporary_path(path: Path) -> Path:
     """Return a new name in the folder of ``path`` for what is to become ``path`` in one step."""
     return path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
 
@@ -198,10 +202,29 @@ def probe(folder: Path) -> int:
         Nothing can be written there.
     """
     place = next(path for path in (folder, *folder.absolute().parents) if is_there(path))
-    path = beside(place / "probe")
+    path = temporary_path(place / "probe")
     try:
-        _write_through(path, b"probe\n")
+        write_through(path, b"probe\n")
         return shutil.disk_usage(place).free
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def disk_time_ns(folder: Path) -> int:
+    """Return the present time by the clock of the disk that ``folder`` is on, which stamps its files [ns since 1970].
+
+    Raises
+    ------
+    StoreError
+        Nothing can be written there.
+    """
+    path = temporary_path(folder / "time")
+    try:
+        path.touch(exist_ok=False)
+        return path.stat().st_mtime_ns
     except OSError as error:
         raise cannot_write(folder, error) from error
     finally:
@@ -222,9 +245,11 @@ def sync_folder(path: Path) -> None:
 
 def cannot_write(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
+    blocked = isinstance(error, FileExistsError | NotADirectoryError)
+    why = "a file is where a folder is needed" if blocked else cause(error)
     return StoreError(
-        f"{path} cannot be written ({cause(error)}): free space, mend permissions, close what holds it, or choose "
-        "another results folder"
+        f"{path} cannot be written ({why}): free disk space, correct its permissions, close the program "
+        "that uses it, or choose another results folder"
     )
 
 
@@ -247,13 +272,13 @@ def is_there(path: Path) -> bool:
 
 def cannot_read(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
-    return StoreError(f"{path} cannot be read ({cause(error)}): mend permissions, or restore it from a copy")
+    return StoreError(f"{path} cannot be read ({cause(error)}): correct its permissions, or restore it from a copy")
 
 
 def open_regular(path: Path) -> BufferedReader:
     """Open a file to read it; a folder, and a device or pipe, which may have no end, is an OSError."""
     if not stat.S_ISREG(path.stat().st_mode):
-        raise OSError(errno.EINVAL, "it is no file")
+        raise OSError(errno.EINVAL, "it is not a file")
     return path.open("rb")
 
 
@@ -300,7 +325,8 @@ def _ends_whole(file: BinaryIO, size: int) -> bool:
     return file.read(1) == b"\n"
 
 
-def _write_through(path: Path, content: bytes, *, waits: bool = True, mode: int = 0o666) -> None:
+def write_through(path: Path, content: bytes, *, waits: bool = True, mode: int = 0o666) -> None:
+    """Write a new file ``path`` and, with ``waits``, flush it to the disk."""
     with open(path, "xb", buffering=0, opener=lambda name, flags: os.open(name, flags, mode)) as file:
         write_whole(file, content)
         if waits:

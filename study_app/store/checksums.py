@@ -52,8 +52,8 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: 
     ours = [path.relative_to(session.path).as_posix() for path in rewritten if path.is_relative_to(session.path)]
     if not (changed := [name for name in ours if hashed(session, name) != listed.get(name)]):
         return False
-    if told := [name for name in changed if name != REBUILT]:
-        note_rebuilt(session, f"other checksums were listed for {', '.join(told)}")
+    if others := [name for name in changed if name != REBUILT]:
+        note_rebuilt(session, f"other checksums were listed for {', '.join(others)}")
     write_file(session.checksums, checksum_bytes(listed | {name: hashed(session, name) for name in (*ours, REBUILT)}))
     return True
 
@@ -112,12 +112,12 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
     try:
         text = read_own(session.checksums, study_root(session.checksums)).decode("utf-8")
     except UnicodeDecodeError as error:
-        raise StoreError(f"{session.checksums} is no list of checksums: restore it from a copy") from error
+        raise StoreError(f"{session.checksums} is not a list of checksums: restore it from a copy") from error
     found: dict[str, str] = {}
     for line in text.splitlines():
         match = _LINE.fullmatch(line)
         if match is None:
-            raise StoreError(f"{session.checksums} has a line that is no checksum: restore it from a copy")
+            raise StoreError(f"{session.checksums} has a line that is not a checksum: restore it from a copy")
         found[match[2]] = match[1]
     if not found:
         raise StoreError(f"{session.checksums} is empty: restore it from a copy")

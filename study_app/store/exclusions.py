@@ -14,9 +14,10 @@ from study_app.errors import StoreError
 from study_app.store.atomic import append_line, cannot_read, read_regular, write_file
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.progress import attempts
+from study_app.store.progress import progress_of
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.store.tables.columns import EXCLUSIONS, MISSING, header
+from study_app.store.tables.column import MISSING, header
+from study_app.store.tables.columns import EXCLUSIONS
 from study_app.store.tables.csv_files import csv_bytes
 from study_app.store.tables.formulas import unguarded
 
@@ -54,8 +55,18 @@ def exclude(
 
     Parameters
     ----------
+    folder : Path
+        The study folder.
+    participant : str
+        The participant's id.
+    session : int
+        The session's number.
+    trial : int, optional
+        The trial's number; by default the whole session is left out.
     by : str
         The rule, or the initials of the person.
+    reason : str
+        Why, in words.
     now : datetime, optional
         Wall time with its zone; by default the system's.
 
@@ -65,7 +76,7 @@ def exclude(
         There is no such session or trial, it is excluded already, ``by`` or ``reason`` is empty, or the list cannot be
         read or written.
     """
-    _refuse_empty(by, reason, "leaving data out is recorded with a rule or name, and a reason")
+    _refuse_empty(by, reason, "an exclusion needs a rule or name, and a reason")
     study = StudyFolder(folder)
     _check_there(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
@@ -75,7 +86,7 @@ def exclude(
         rows = exclusions(folder)
         for row in rows:
             if row.what in (new.what, (participant, session, None)):
-                raise StoreError(f"{named(new)} is left out already, since {row.excluded_at} ({row.reason})")
+                raise StoreError(f"{named(new)} is already excluded, since {row.excluded_at} ({row.reason})")
         write_file(study.exclusions, exclusion_bytes((*rows, new)))
     finally:
         opening.release()
@@ -101,7 +112,7 @@ def include(
     StoreError
         It is not left out, ``by`` or ``reason`` is empty, or a file cannot be read or written.
     """
-    _refuse_empty(by, reason, "taking an exclusion back is recorded with a name and a reason")
+    _refuse_empty(by, reason, "reversing an exclusion needs a name and a reason")
     study = StudyFolder(folder)
     opening = open_alone(folder)
     try:
@@ -110,7 +121,7 @@ def include(
         if taken is None:
             asked = named(Exclusion(participant, session, trial, "", "", ""))
             listed = "; ".join(named(row) for row in rows) or "nothing"
-            raise StoreError(f"{asked} is not left out; left out: {listed}")
+            raise StoreError(f"{asked} is not excluded; excluded: {listed}")
         at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
         record = {"at": at, "by": by.strip(), "reason": reason.strip(), "exclusion": asdict(taken)}
         append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
@@ -143,11 +154,11 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
     except OSError as error:
         raise cannot_read(path, error) from error
     except UnicodeDecodeError as error:
-        raise StoreError(f"{path} is no UTF-8: save it as CSV in UTF-8") from error
+        raise StoreError(f"{path} is not UTF-8: save it as CSV in UTF-8") from error
     except csv.Error as error:
-        raise StoreError(f"{path} is no CSV ({error}): save it as CSV in UTF-8, with commas") from error
+        raise StoreError(f"{path} is not CSV ({error}): save it as CSV in UTF-8, with commas") from error
     if tuple(names) != header(EXCLUSIONS):
-        raise StoreError(f"{path}: its columns must be {', '.join(header(EXCLUSIONS))}, found {', '.join(names)}")
+        raise StoreError(f"{path}: its columns must be {', '.join(header(EXCLUSIONS))}, but are {', '.join(names)}")
     return tuple(_exclusion(path, number, row) for number, row in enumerate(rows, start=2))
 
 
@@ -167,7 +178,9 @@ def _exclusion(path: Path, number: int, row: list[str]) -> Exclusion:
         by, reason = unguarded(by), unguarded(reason)
         return Exclusion(participant, int(session), None if trial == MISSING else int(trial), by, reason, at)
     except ValueError as error:
-        raise StoreError(f"{path}, row {number}: {','.join(row)!r} is no exclusion: mend or remove the row") from error
+        raise StoreError(
+            f"{path}, row {number}: {','.join(row)!r} is not an exclusion: correct or remove the row"
+        ) from error
 
 
 def _check_there(study: StudyFolder, participant: str, session: int, trial: int | None) -> None:
@@ -178,7 +191,7 @@ def _check_there(study: StudyFolder, participant: str, session: int, trial: int 
         raise StoreError(f"{study.path} has no session {session} of participant {participant}; {its}")
     if trial is None:
         return
-    presented = {number for number, _ in attempts(journal.read(place.journal))}
+    presented = progress_of(journal.read(place.journal)).presented
     if trial not in presented:
         listed = ", ".join(map(str, sorted(presented))) or "none"
         raise StoreError(f"participant {participant}, session {session} has no trial {trial}: it has {listed}")

@@ -4,7 +4,7 @@
 
     results/<study>/
       dataset_description.json  exclusions.csv  exclusions_reversed.jsonl  fingerprints.txt  .psychds-ignore
-      blinding/key.sealed  blinding/reveals.jsonl
+      blinding/key.sealed  blinding/reveals.jsonl  blinding/allocated/001.json ...
       data/
         study-<study>_description-participants_data.csv
         sub-P007/ses-01/
@@ -118,6 +118,15 @@ class StudyFolder:
         return self.blinding / "key.sealed"
 
     @property
+    def allocated(self) -> Path:
+        """The folder of the participants' entries in the allocation to groups."""
+        return self.blinding / "allocated"
+
+    def allocation(self, entry: int) -> Path:
+        """Return the file of an entry in the allocation."""
+        return self.allocated / f"{entry:03d}.json"
+
+    @property
     def reveals(self) -> Path:
         """Who opened the key, when and why."""
         return self.blinding / "reveals.jsonl"
@@ -155,14 +164,17 @@ def locate(path: Path) -> tuple[StudyFolder, SessionFolder]:
     Raises
     ------
     StoreError
-        It is no session's folder.
+        It is not a session folder.
     """
     folder = path.resolve()
     number = _SESSION_FOLDER.fullmatch(folder.name)
     participant = folder.parent.name.removeprefix("sub-")
     named = number is not None and folder.parent.name.startswith("sub-") and ID_PATTERN.fullmatch(participant)
     if not named or folder.parent.parent.name != "data" or not folder.is_dir():
-        raise StoreError(f"{path} is no session's folder: name one such as results/rek2024/data/sub-P007/ses-01")
+        raise StoreError(
+            f"{path} is not a session folder: name one such as results/rek2024/data/sub-P007/ses-01, or one that "
+            "liquid-study sessions lists"
+        )
     return StudyFolder(folder.parents[2]), SessionFolder(folder, participant, int(number[1]) if number else 0)
 
 

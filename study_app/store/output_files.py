@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import secrets
 from collections.abc import Mapping
 from pathlib import Path
 
 from study_app.errors import AnalysisError, StoreError
-from study_app.store.atomic import sweep_old
+from study_app.store.atomic import sweep_old, temporary_path, write_through
 
 
 def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     """Put ``files`` (name to content) into the folder ``to``, which is created; older files of these names give way.
 
-    All are written beside and flushed to the disk before the first takes its name, so that a full disk changes nothing.
-    What a killed program left half-written there is taken away at the end, when it is old.
+    All are written under temporary names and flushed to the disk before the first takes its name, so that a full disk
+    changes nothing. What a killed program left half-written there is taken away at the end, when it is old.
 
     Raises
     ------
@@ -26,8 +24,7 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     for name in files:
         if not (to / name).resolve().is_relative_to(to.resolve()):
             raise AnalysisError(f"{name!r} would be written outside of {to}: nothing was written")
-    token = secrets.token_hex(4)
-    staged = {name: (to / name).with_name(f".{Path(name).name}.{token}.tmp") for name in files}
+    staged = {name: temporary_path(to / name) for name in files}
     within = sorted({folder for path in staged.values() for folder in (path.parent, *path.parent.parents)})
     created = [folder for folder in within if folder.is_relative_to(to) and not folder.exists()]
     try:
@@ -35,10 +32,7 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
         for folder in created:
             folder.mkdir(exist_ok=True)
         for name, content in files.items():
-            with staged[name].open("xb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
+            write_through(staged[name], content)
         for name, path in staged.items():
             path.replace(to / name)
     except OSError as error:
@@ -48,9 +42,10 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
         for folder in reversed(created):
             with contextlib.suppress(OSError):
                 folder.rmdir()
-        why = error.strerror or type(error).__name__
+        why = "it is a file, not a folder" if to.is_file() else error.strerror or type(error).__name__
         raise AnalysisError(
-            f"{to} cannot be written ({why}): choose another folder with --to, free space, or mend the permissions"
+            f"{to} cannot be written ({why}): choose another folder with --to, free disk space, or correct the "
+            "permissions"
         ) from error
     for folder in {path.parent for path in staged.values()}:
         sweep_old(folder)
@@ -68,6 +63,5 @@ def make_folder(to: Path) -> None:
     try:
         to.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StoreError(
-            f"cannot make the folder {to} ({error.strerror or error}): choose another with --to"
-        ) from error
+        why = "it is a file, not a folder" if to.is_file() else error.strerror or error
+        raise StoreError(f"cannot make the folder {to} ({why}): choose another with --to") from error

@@ -19,7 +19,7 @@ from study_app.errors import DeviceError, ServoFault
 from study_app.user_folder import user_folder
 
 MOST_BYTES: Final = 250_000
-KEPT: Final = 2  # files beside the newest
+KEPT: Final = 2  # files besides the newest
 OMITTED: Final = "…"
 DEVICE_FAILED: Final = "the device failed: %s"  # an error to whoever helps; the session says it itself, and goes on
 _ERROR: Final = re.compile(rf"\S+ \S+ (ERROR|CRITICAL|\S+ \S+ {DEVICE_FAILED.partition('%')[0]})")

@@ -1,8 +1,11 @@
-"""How far a session went: read from its journal alone, so that it can be continued where it was left."""
+"""How far a session went and what happened in it: the one fold over a journal, which is all that it reads.
+
+Whoever resumes, shows or checks a session reads it here, so that they agree.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -11,8 +14,7 @@ from study_app.errors import StoreError
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
-
-_ROUNDED_S = 1.1e-6
+from study_app.store.limits import Broken, beyond_limits
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,32 +25,222 @@ class Given:
     first_s: float | None = None
     last_s: float | None = None
     changes: int = 0
-    value: int | None = None
+    value: Any = None
 
 
 @dataclass(frozen=True, slots=True)
+class TrialAnswer:
+    """The answer to a trial of intervals, and how long it took [s]; None where that is not known."""
+
+    value: Any
+    seconds: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class NoteLine:
+    """A note or mark as the operator wrote it, ``at_s`` in the time that was worked."""
+
+    at_s: float
+    kind: str
+    text: str
+
+
+@dataclass(slots=True)
 class Progress:
-    """Where a session stands.
+    """Where a session stands and what happened in it, by the lines of its journal that were taken (`take`).
 
     ``start`` is its first line: participant, session, seed, language and the rest. ``step`` is the index in the
-    schedule of the step to continue at: the first that was not left behind. ``page`` or ``trial`` names it where it was
-    begun: of a trial, ``attempt`` counts how often it was presented, ``task_done`` says that the last time its task ran
-    to the end (so only answers are missing, or, without a questionnaire, nothing), and ``answers`` holds what was
-    chosen since. ``ended`` is the status of a finished session. ``t_s`` is the latest moment on its clock, ``language``
-    the participant's.
+    schedule of the step to continue at: the first that was not left behind. ``page`` (or form) or ``trial`` names
+    it where it was begun: of a trial, ``attempt`` counts how often it was presented, ``task_done`` says that the last
+    time its task ran to the end (so only answers are missing, or, without a questionnaire, nothing), and ``answers``
+    holds what was chosen since; ``invalid`` counts its attempts that were not delivered as requested. ``presented``
+    says of each trial by number how often it was, ``steps`` which step it is. ``ended`` is the status of a finished
+    session. ``t_s`` is the latest moment on its clock, ``language`` the participant's.
+
+    ``here`` is the index of the step that was shown last (−1 before the first), ``durations_s`` how long the steps left
+    behind were shown, ``away_s`` how long no program held the session, which no duration counts. ``targets`` counts
+    those reached in the latest trial; it began at ``trial_since_s``, None while a page is shown or after a gap, and its
+    task took ``trial_lasted_s``, None until it ended. ``answered`` counts the responses to each trial and form, of a
+    trial's last attempt; ``broken`` has for each trial done the limits that it broke: column, value and limit. ``lost``
+    says why a trial's recording could not be kept, ``lacking`` how many samples it lacks.
+
+    ``of_intervals`` is the latest trial if it is one of intervals; ``trial_answers`` are the answers to all of them,
+    ``repeated`` says of each why it was presented again.
     """
 
-    start: Line
+    start: Line = field(default_factory=dict)
     step: int = 0
     page: str | None = None
     trial: int | None = None
     attempt: int = 0
     task_done: bool = False
     answers: dict[str, Given] = field(default_factory=dict)
+    invalid: int = 0
+    presented: dict[int, int] = field(default_factory=dict)
+    steps: dict[int, int] = field(default_factory=dict)
     ended: str | None = None
+    fingerprint: str = ""
     resumed: int = 0
     t_s: float = 0.0
     language: str = ""
+    here: int = -1
+    here_since_s: float = 0.0
+    durations_s: dict[int, float] = field(default_factory=dict)
+    away_s: float = 0.0
+    trial_since_s: float | None = None
+    trial_lasted_s: float | None = None
+    targets: int = 0
+    answered: dict[int | str, int] = field(default_factory=dict)
+    broken: dict[int, tuple[Broken, ...]] = field(default_factory=dict)
+    lost: dict[int, str] = field(default_factory=dict)
+    lacking: dict[int, int] = field(default_factory=dict)
+    notes: list[NoteLine] = field(default_factory=list)
+    repeats: int = 0
+    paused: bool = False
+    broke: str = ""
+    of_intervals: int | None = None
+    trial_answers: dict[int, TrialAnswer] = field(default_factory=dict)
+    repeated: dict[int, tuple[str, ...]] = field(default_factory=dict)
+    _reason: str = ""
+    _left_open: dict[tuple[int, int], dict[str, Given]] = field(default_factory=dict)
+
+    @property
+    def unconfirmed(self) -> dict[tuple[int, int], dict[str, Given]]:
+        """Of each attempt, by trial and attempt: the choices that no confirmation followed."""
+        found = dict(self._left_open)
+        if self.trial is not None and (chosen := _chosen(self.answers)):
+            found[self.trial, self.attempt] = chosen
+        return found
+
+    def take(self, line: Line) -> None:
+        """Follow one more line."""
+        at_s = line["t_s"]
+        match line["event"]:
+            case "session_started":
+                self.start, self.language = line, line.get("language", "")
+            case "page_shown":
+                self._show_page(line["page"], at_s)
+            case "form_shown":
+                self._show_page(line["form"], at_s)
+                self.answers = {}
+            case "page_left":
+                self._leave()
+            case "trial_started":
+                self._start_trial(line["trial"], line["attempt"], at_s)
+                self._note_repetition(line)
+            case "trial_ended":
+                self._end_trial(line)
+            case "target_reached":
+                self.targets += 1
+            case "item_shown" | "choice":
+                self.answers[line["item"]] = _answered(self.answers.get(line["item"], Given()), line)
+            case "answer_removed":
+                self.answers[line["item"]] = Given(onset_s=self.answers.get(line["item"], Given()).onset_s)
+            case "responses" | "form_answered":
+                self.answered[line["form"] if "form" in line else line["trial"]] = len(line["items"])
+                if self.of_intervals is not None and line.get("trial") == self.of_intervals:
+                    self.trial_answers[self.of_intervals] = _timed(line["items"][0])
+                self.answers = {}
+                self._leave()
+            case "passed_over":
+                self._go_to(line.get("page"), line.get("trial"))
+                self._leave()
+            case "recorded" if line["samples_unrecorded"]:
+                self.lacking[line["trial"]] = line["samples_unrecorded"]
+            case "recording_lost":
+                self.lost[line["trial"]] = line["reason"]
+            case "note":
+                self.notes.append(NoteLine(at_s - self.away_s, line["kind"], line["text"]))
+            case "repeat":
+                self._forget(line["trial"])
+                self.repeats += 1
+                self._reason = str(line["reason"])
+            case "paused" | "resumed":
+                self.paused = line["event"] == "paused"
+            case "broke":
+                self.broke = str(line["what"])
+            case "device_reconnected":
+                self.broke = ""
+            case "language_chosen":
+                self.language = line["language"]
+            case "session_resumed":
+                self._resume(max(0.0, at_s - self.t_s))
+            case "session_ended":
+                self._close(at_s)
+                self.ended, self.fingerprint, self.paused = line["status"], line.get("fingerprint", ""), False
+        self.t_s = max(self.t_s, at_s)
+
+    def _go_to(self, page: str | None, trial: int | None) -> None:
+        """Go to a step, unless it is the one under way: then it is shown again."""
+        if (self.page, self.trial) != (page, trial):
+            if (self.page, self.trial) != (None, None):
+                self._leave()
+            self.page, self.trial = page, trial
+
+    def _leave(self) -> None:
+        self._drop_answers()
+        self.step, self.page, self.trial, self.attempt, self.task_done = self.step + 1, None, None, 0, False
+        self.invalid = 0
+
+    def _drop_answers(self) -> None:
+        self._left_open = self.unconfirmed
+        self.answers = {}
+
+    def _show_page(self, page: str, at_s: float) -> None:
+        self._go_to(page, None)
+        self._enter(at_s)
+        self.trial_since_s = self.trial_lasted_s = None
+
+    def _start_trial(self, trial: int, attempt: int, at_s: float) -> None:
+        """Present a trial; one of before comes again where a whole block does."""
+        self._go_to(None, trial)
+        self._drop_answers()
+        self._forget(trial)
+        self.step = self.steps.setdefault(trial, self.step)
+        self.attempt, self.task_done = attempt, False
+        self.presented[trial] = max(attempt, self.presented.get(trial, 0))
+        self._enter(at_s)
+        self.trial_since_s, self.trial_lasted_s, self.targets, self.paused = at_s, None, 0, False
+
+    def _end_trial(self, line: Line) -> None:
+        self.trial_lasted_s = None if self.trial_since_s is None else line["t_s"] - self.trial_since_s
+        self.task_done = line["outcome"] in ("complete", "timeout")
+        self.invalid += line["outcome"] == "invalid"
+        if self.task_done:
+            self.broken[line["trial"]] = beyond_limits(line, self.start.get("limits", {}))
+        else:
+            self._reason = str(line["outcome"])
+
+    def _note_repetition(self, line: Line) -> None:
+        """Keep why a trial of intervals is presented again."""
+        trial = line["trial"]
+        self.of_intervals = trial if is_of_intervals(line) else None
+        if self.of_intervals is not None and line["attempt"] > 1:
+            self.repeated[trial] = (*self.repeated.get(trial, ()), self._reason or "interrupted")
+        self._reason = ""
+
+    def _forget(self, trial: int) -> None:
+        """Forget what an earlier attempt of a trial left."""
+        self.answered.pop(trial, None)
+        self.trial_answers.pop(trial, None)
+        self.broken.pop(trial, None)
+
+    def _resume(self, gap_s: float) -> None:
+        """Go on after a gap, which the session's clock counts as a pause."""
+        self.resumed += 1
+        self._reason = "program ended"
+        self.paused, self.broke, self.trial_since_s, self.trial_lasted_s = False, "", None, None
+        self.here_since_s += gap_s
+        self.away_s += gap_s
+
+    def _enter(self, at_s: float) -> None:
+        if self.step != self.here:
+            self._close(at_s)
+            self.here, self.here_since_s = self.step, at_s
+
+    def _close(self, at_s: float) -> None:
+        if self.here >= 0:
+            self.durations_s[self.here] = at_s - self.here_since_s
 
 
 def progress(session_folder: Path) -> Progress:
@@ -57,7 +249,7 @@ def progress(session_folder: Path) -> Progress:
     Raises
     ------
     StoreError
-        It is no session's folder, or its journal is missing, empty or damaged.
+        It is not a session folder, or its journal is missing, empty or damaged.
     """
     _, session = locate(session_folder)
     return progress_of(journal.read(session.journal))
@@ -72,75 +264,15 @@ def progress_of(lines: Sequence[Line]) -> Progress:
         They do not begin as a session's do.
     """
     if not lines or lines[0]["event"] != "session_started":
-        raise StoreError("the journal does not begin with session_started: nothing was begun that could go on")
-    now = Progress(lines[0], language=lines[0].get("language", ""))
-    for line in lines[1:]:
-        now = _after(now, line)
-    return replace(now, t_s=max(0.0, *(line["t_s"] for line in lines)))
-
-
-def wrong_responses(lines: Sequence[Line]) -> Iterator[str]:
-    """Yield a sentence on each answer in ``responses`` that is not the one given by the choices before it."""
-    now = Progress(lines[0])
-    for line in lines[1:]:
-        if line["event"] == "responses":
-            chosen = dict(now.answers)
-            for row in line["items"]:
-                given = chosen.pop(row["item"], Given())
-                if not _is_of(row, given):
-                    yield (
-                        f"line {line['n']} (responses) has for {row['item']!r} in trial {line['trial']} another answer "
-                        f"than was chosen before: it was changed"
-                    )
-            yield from (
-                f"line {line['n']} (responses) lacks {item!r}, answered in trial {line['trial']}: it was changed"
-                for item in chosen
-            )
-        now = _after(now, line)
-
-
-def _is_of(row: Mapping[str, Any], given: Given) -> bool:
-    """Return whether an answer in ``responses`` is what was ``given``; moments of a line are rounded to 1 µs."""
-    moments = ((row[name], getattr(given, name)) for name in ("onset_s", "first_s", "last_s"))
-    return (row["value"], row["changes"]) == (given.value, given.changes) and all(
-        told == ours or (None not in (told, ours) and abs(told - ours) <= _ROUNDED_S) for told, ours in moments
-    )
-
-
-def _after(now: Progress, line: Line) -> Progress:
-    match line["event"]:
-        case "page_shown":
-            return _at(now, page=line["page"])
-        case "page_left":
-            return _left(now)
-        case "trial_started":
-            return replace(_at(now, trial=line["trial"]), attempt=line["attempt"], task_done=False, answers={})
-        case "trial_ended":
-            return replace(now, task_done=line["outcome"] in ("complete", "timeout"))
-        case "item_shown" | "choice":
-            given = now.answers.get(line["item"], Given())
-            return replace(now, answers={**now.answers, line["item"]: _answered(given, line)})
-        case "responses":
-            return _left(now)
-        case "session_ended":
-            return replace(now, ended=line["status"])
-        case "language_chosen":
-            return replace(now, language=line["language"])
-        case "session_resumed":
-            return replace(now, resumed=now.resumed + 1)
+        raise StoreError("the journal does not begin with session_started: there is no session to resume")
+    now = Progress()
+    for line in lines:
+        now.take(line)
     return now
 
 
-def _at(now: Progress, *, page: str | None = None, trial: int | None = None) -> Progress:
-    """Enter a step, unless it is the one under way: then it is shown again."""
-    if (now.page, now.trial) == (page, trial):
-        return now
-    now = now if (now.page, now.trial) == (None, None) else _left(now)
-    return replace(now, page=page, trial=trial)
-
-
-def _left(now: Progress) -> Progress:
-    return replace(now, step=now.step + 1, page=None, trial=None, attempt=0, task_done=False, answers={})
+def _chosen(answers: Mapping[str, Given]) -> dict[str, Given]:
+    return {item: given for item, given in answers.items() if given.first_s is not None}
 
 
 def _answered(given: Given, line: Line) -> Given:
@@ -154,6 +286,26 @@ def _answered(given: Given, line: Line) -> Given:
     return replace(given, last_s=at_s, value=line["value"], changes=given.changes + 1)
 
 
-def attempts(lines: Iterable[Line]) -> list[tuple[int, int]]:
-    """Return trial and attempt of every presentation, in order."""
-    return [(line["trial"], line["attempt"]) for line in lines if line["event"] == "trial_started"]
+def _timed(item: Mapping[str, Any]) -> TrialAnswer:
+    onset_s, first_s = item.get("onset_s"), item.get("first_s")
+    return TrialAnswer(item.get("value"), None if onset_s is None or first_s is None else first_s - onset_s)
+
+
+def is_of_intervals(started: Mapping[str, Any]) -> bool:
+    """Return whether the line on a trial's beginning is of a trial of intervals: it says what they present."""
+    return "sealed" in started or "arrangement" in started
+
+
+def recordable(lines: Iterable[Line]) -> list[tuple[int, int, int | None]]:
+    """Return trial, attempt and interval of all that was recorded, or was to be; the interval is None in a trial."""
+    return [
+        (line["trial"], line["attempt"], line.get("interval"))
+        for line in lines
+        if line["event"] == "interval_started" or (line["event"] == "trial_started" and not is_of_intervals(line))
+    ]
+
+
+def named(line: Mapping[str, Any]) -> str:
+    """Return the name of what a line is about: "trial 3, attempt 1", in a trial of intervals with the interval."""
+    interval = line.get("interval")
+    return f"trial {line['trial']}, attempt {line['attempt']}" + ("" if interval is None else f", interval {interval}")

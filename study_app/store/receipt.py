@@ -18,7 +18,7 @@ from typing import Any
 import study_app
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import block_codes
+from study_app.protocol.orders.block_orders import block_codes, order_of
 from study_app.store.atomic import read_own, study_root, write_file
 from study_app.store.journals.journal import plain
 from study_app.store.journals.journal_events import holds, shortened
@@ -66,11 +66,24 @@ FIELDS = (
 
 def without_conditions(protocol: Protocol) -> dict[str, Any]:
     """Return the protocol as a JSON value without what blinding hides; blocks say their codes and what they compare."""
-    shown = protocol.model_dump(mode="json", exclude={"liquids": True, "conditions": True})
+    shown = protocol.model_dump(
+        mode="json",
+        exclude={
+            **dict.fromkeys(("liquids", "conditions", "stimuli", "methods"), True),
+            "designs": {"__all__": {"modulus"}},
+        },
+    )
     for name, block in protocol.blocks.items():
-        del shown["blocks"][name]["conditions"]
-        shown["blocks"][name]["codes"] = list(block_codes(block))
-        shown["blocks"][name]["compares"] = protocol.compared_in(name)
+        table = shown["blocks"][name]
+        for hidden in ("conditions", "standard", "stimulus", "standards", "method"):
+            table.pop(hidden, None)
+        table["codes"] = list(block_codes(protocol, block))
+        table["compares"] = protocol.compared_in(name)
+        if block.design is not None:
+            ordered = order_of(protocol, block)
+            asks = f"{name}/answer"  # no questionnaire of a file has such a name
+            table |= {"order": ordered.order, "slots": list(ordered.slots), "questionnaire": asks}
+            shown["questionnaires"][asks] = protocol.design_questions[name].model_dump(mode="json")
     return shown
 
 
@@ -112,12 +125,12 @@ def read(path: Path) -> dict[str, Any]:
     try:
         receipt = parse_json(read_own(path, study_root(path)))
     except ValueError as error:
-        raise StoreError(f"{path} is no receipt ({error}): restore it from a copy") from error
+        raise StoreError(f"{path} is not a receipt ({error}): restore it from a copy") from error
     if not isinstance(receipt, dict) or "key_hash" not in receipt:
-        raise StoreError(f"{path} is no receipt (no key_hash): restore it from a copy")
+        raise StoreError(f"{path} is not a receipt (no key_hash): restore it from a copy")
     for name, value in receipt.items():
         if not _holds(name, value):
-            raise StoreError(f"{path} is no receipt ({name} is {shortened(value)}): restore it from a copy")
+            raise StoreError(f"{path} is not a receipt ({name} is {shortened(value)}): restore it from a copy")
     return receipt
 
 
@@ -128,7 +141,7 @@ def other_format(receipt: Mapping[str, Any], start: Mapping[str, Any]) -> bool:
 
 def _holds(name: str, value: object) -> bool:
     """Return whether ``value`` is what a receipt's field called ``name`` holds."""
-    if name in ("versions", "device", "screens", "clock", "protocol"):
+    if name in ("versions", "device", "screens", "clock", "protocol", "motors_masked"):
         return isinstance(value, dict)
     if name == "resumed":
         return isinstance(value, list)

@@ -1,4 +1,4 @@
-"""Recordings are written beside the session: what happens at 1 kHz goes into a queue, a thread of its own to the disk.
+"""Recordings are written in the background: what happens at 1 kHz goes into a queue, a thread of its own to the disk.
 
 Handing samples over never waits for the disk. Where the disk cannot keep up for two minutes, or takes nothing at all,
 samples are dropped and counted and the session goes on: answers are worth more than recordings. Whatever else fails
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 ROOM = 120_000  # samples that may wait: two minutes at 1 kHz, 23 MB
 ENOUGH = 5_000  # samples that are worth waking the thread for
 PATIENCE_S = 30.0  # how long the end of a session waits for the disk
+LEAVING_S = 2.0  # how long a session that is left without an end does: nothing must hold up who ends the program
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,7 @@ class Recorded:
     samples: Written
     frames: Written
     dropped: int
+    interval: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +51,11 @@ class Lost:
     trial: int
     attempt: int
     reason: str
+    interval: int | None = None
 
 
 Kept: TypeAlias = Recorded | Lost
+_Which: TypeAlias = tuple[int, int, int | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,12 @@ class _Begin:
     trial: int
     attempt: int
     rate_hz: float
+    interval: int | None
+
+    @property
+    def which(self) -> _Which:
+        """Trial, attempt and interval."""
+        return self.trial, self.attempt, self.interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +92,13 @@ class Recorder:
         Whether `append` waits for room instead of dropping: for rehearsals.
     room : int
         How many samples may wait.
+
+    Attributes
+    ----------
+    thread : threading.Thread or None
+        What writes; None before the first trial, and after it ended by a failure.
+    changed : threading.Condition
+        Notified when a recording was kept or lost.
     """
 
     def __init__(self, folder: Path, facts: Mapping[str, Any], *, waits: bool = False, room: int = ROOM) -> None:
@@ -93,53 +110,53 @@ class Recorder:
         self._facts = dict(facts)
         self._waits = waits
         self._room = room
-        self._thread: threading.Thread | None = None
-        self._changed = threading.Condition()
+        self.thread: threading.Thread | None = None
+        self.changed = threading.Condition()
         self._queue: deque[Any] = deque()
         self._waiting = 0
         self._closing = False
         self._patient_until_s = 0.0
         self._kept: list[Kept] = []
         self._lost: list[Lost] = []
-        self._underway: tuple[int, int] | None = None
-        self._expected: dict[tuple[int, int], None] = {}
+        self._underway: _Which | None = None
+        self._expected: dict[_Which, None] = {}
         self._frames = array("q")
         self._dropped = 0
 
-    def start(self, trial: int, attempt: int, rate_hz: float) -> None:
-        """Begin the recording of a trial; one that is under way is stopped first.
+    def start(self, trial: int, attempt: int, rate_hz: float, interval: int | None = None) -> None:
+        """Begin the recording of a trial, or of one of its intervals; one that is under way is stopped first.
 
         Its first sample is best the one before the trial's first, of another scene: the force that the hand felt last
         is what the trial's force moves from when it is computed again.
         """
         self.stop()
-        self._underway = trial, attempt
+        self._underway = trial, attempt, interval
         self._frames, self._dropped = array("q"), 0
-        with self._changed:
+        with self.changed:
             if self._closing:
                 self._underway = None
                 return
-            self._expected[trial, attempt] = None
-            self._queue.append(_Begin(trial, attempt, rate_hz))
+            self._expected[trial, attempt, interval] = None
+            self._queue.append(_Begin(trial, attempt, rate_hz, interval))
             if not self._works():
                 self._begin_work()
-            self._changed.notify_all()
+            self.changed.notify_all()
 
     def append(self, samples: Any) -> None:
-        """Hand over the next samples, in order (array of ``layout.SAMPLE``), which nobody changes afterwards."""
+        """Hand over the next samples, in order (array of ``layout.SAMPLE``), which are not changed afterwards."""
         count = len(samples)
         if self._underway is None or count == 0:
             return
-        with self._changed:
+        with self.changed:
             while self._waits and self._waiting and self._waiting + count > self._room and self._works():
-                self._changed.wait()
+                self.changed.wait()
             if self._waiting and self._waiting + count > self._room:
                 self._dropped += count
                 return
             self._queue.append(samples)
             self._waiting += count
             if self._waiting >= min(ENOUGH, self._room):
-                self._changed.notify_all()
+                self.changed.notify_all()
 
     def frame(self, painted_ns: int, sample_ns: int) -> None:
         """Keep that a frame was painted at one moment and showed another [ns, the servo's clock]."""
@@ -152,9 +169,9 @@ class Recorder:
         if self._underway is None:
             return
         self._underway = None
-        with self._changed:
+        with self.changed:
             self._queue.append(_End(self._frames, self._dropped))
-            self._changed.notify_all()
+            self.changed.notify_all()
 
     @property
     def dropped(self) -> int:
@@ -164,12 +181,12 @@ class Recorder:
     @property
     def lost(self) -> tuple[Lost, ...]:
         """Every recording that could not be kept so far, known as soon as it is lost."""
-        with self._changed:
+        with self.changed:
             return tuple(self._lost)
 
     def kept(self) -> tuple[Kept, ...]:
         """Return what has become whole, or was lost, since the last call."""
-        with self._changed:
+        with self.changed:
             found, self._kept = tuple(self._kept), []
         return found
 
@@ -183,51 +200,51 @@ class Recorder:
 
     def _end(self, patience_s: float = PATIENCE_S) -> None:
         self.stop()
-        with self._changed:
+        with self.changed:
             if not self._closing:
                 self._patient_until_s = time.monotonic() + patience_s
             self._closing = True
-            self._changed.notify_all()
+            self.changed.notify_all()
 
     def close(self, patience_s: float = PATIENCE_S) -> None:
         """End what is under way and wait until all is on the disk, but not for ever; `kept` tells what became of it."""
         self._end(patience_s)
-        if self._thread is not None:
-            self._thread.join(max(0.0, min(patience_s, self._patient_until_s - time.monotonic())))
-        with self._changed:
-            reason = "the disk did not take it in time" if self._works() else "its thread had ended"
-            self._kept += [Lost(trial, attempt, reason) for trial, attempt in self._expected]
+        if self.thread is not None:
+            self.thread.join(max(0.0, min(patience_s, self._patient_until_s - time.monotonic())))
+        with self.changed:
+            reason = "the disk was too slow" if self._works() else "its thread had ended"
+            self._kept += [Lost(trial, attempt, reason, interval) for trial, attempt, interval in self._expected]
             self._expected.clear()
 
     def _works(self) -> bool:
-        return self._thread is not None and self._thread.is_alive()
+        return self.thread is not None and self.thread.is_alive()
 
     def _begin_work(self) -> None:
         """Start the thread, for the first trial or after it had ended; with the lock held."""
-        self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+        self.thread = threading.Thread(target=self._work, name="recorder", daemon=True)
         try:
-            self._thread.start()
+            self.thread.start()
         except RuntimeError as error:
             self._lose_all(f"its thread cannot be started: {error}")
 
     def _work(self) -> None:
-        """Write until all is written: the recorder's thread. Whatever ends it is told, and the next trial starts it."""
+        """Write all that is handed over, in the recorder's thread; the next trial restarts it after a failure."""
         try:
             self._write()
         except BaseException as error:
-            with self._changed:
+            with self.changed:
                 self._lose_all(f"its thread ended: {type(error).__name__}: {error}")
             raise
 
     def _lose_all(self, reason: str) -> None:
         """Give up what is under way and what waits; with the lock held."""
-        lost = [Lost(trial, attempt, reason) for trial, attempt in self._expected]
+        lost = [Lost(trial, attempt, reason, interval) for trial, attempt, interval in self._expected]
         self._kept += lost
         self._lost += lost
         self._expected.clear()
         self._queue.clear()
-        self._waiting, self._underway, self._thread = 0, None, None
-        self._changed.notify_all()
+        self._waiting, self._underway, self.thread = 0, None, None
+        self.changed.notify_all()
 
     def _write(self) -> None:
         """Work through the queue until it is empty and closed."""
@@ -235,18 +252,21 @@ class Recorder:
             if not isinstance(begin, _Begin):
                 continue  # of a trial that was lost with an earlier thread
             kept = self._record(begin)
-            with self._changed:
-                if (begin.trial, begin.attempt) in self._expected:
-                    del self._expected[begin.trial, begin.attempt]
+            with self.changed:
+                if begin.which in self._expected:
+                    del self._expected[begin.which]
                     self._kept.append(kept)
                     if isinstance(kept, Lost):
                         self._lost.append(kept)
-                    self._changed.notify_all()
+                    self.changed.notify_all()
+                else:  # `close` gave it up: no file without a line of the journal
+                    for path in recording_files(self._folder, *begin.which):
+                        path.unlink(missing_ok=True)
 
     def _record(self, begin: _Begin) -> Kept:
         """Write one trial's files; the queue is then past the trial's end, whatever became of them."""
-        samples_path, frames_path = recording_files(self._folder, begin.trial, begin.attempt)
-        facts = {**self._facts, "trial": begin.trial, "attempt": begin.attempt}
+        samples_path, frames_path = recording_files(self._folder, *begin.which)
+        facts = {**self._facts, **_keys(*begin.which)}
         coming = _Coming(self._next)
         file: SamplesFile | None = None
         shown: Written | None = None
@@ -258,7 +278,7 @@ class Recorder:
             end = coming.end
             frames = np.frombuffer(end.frames, np.int64).reshape(-1, 2)
             shown = self._files.write_frames(frames_path, frames, facts)
-            return Recorded(begin.trial, begin.attempt, file.finish(end.dropped), shown, end.dropped)
+            return Recorded(begin.trial, begin.attempt, file.finish(end.dropped), shown, end.dropped, begin.interval)
         except Exception as error:  # noqa: BLE001 - whatever it is, the next trial's recording is still to be written
             with contextlib.suppress(Exception):  # what cannot be taken away either is named by a check of the folder
                 if file is not None:
@@ -268,7 +288,7 @@ class Recorder:
                     shown.path.unlink(missing_ok=True)
             coming.skip()
             reason = cause(error) if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
-            return Lost(begin.trial, begin.attempt, reason)
+            return Lost(begin.trial, begin.attempt, reason, begin.interval)
 
     def _make_folder(self) -> None:
         """Create the folder, where it is missing, so that no power cut takes it with all that was journalled."""
@@ -278,15 +298,15 @@ class Recorder:
 
     def _next(self) -> Any:
         """Wait for the next thing in the queue; None when it is closed and empty."""
-        with self._changed:
+        with self.changed:
             while not self._queue and not self._closing:
-                self._changed.wait()
+                self.changed.wait()
             if not self._queue:
                 return None
             thing = self._queue.popleft()
             if not isinstance(thing, _Begin | _End):
                 self._waiting -= len(thing)
-                self._changed.notify_all()
+                self.changed.notify_all()
             return thing
 
 
@@ -330,7 +350,7 @@ class _Coming:
 
 def event_of(kept: Kept) -> tuple[str, dict[str, Any]]:
     """Return the journal's event and fields about a recording; files by their path in the session's folder."""
-    which = {"trial": kept.trial, "attempt": kept.attempt}
+    which = _keys(kept.trial, kept.attempt, kept.interval)
     if not isinstance(kept, Recorded):
         return "recording_lost", {**which, "reason": kept.reason}
     samples, frames = kept.samples, kept.frames
@@ -346,15 +366,23 @@ def event_of(kept: Kept) -> tuple[str, dict[str, Any]]:
     }
 
 
+def _keys(trial: int, attempt: int, interval: int | None) -> dict[str, int]:
+    """Return the fields that say what a recording is of."""
+    which = {"trial": trial, "attempt": attempt}
+    return which if interval is None else {**which, "interval": interval}
+
+
 def hashes_of(lines: Sequence[Line]) -> dict[str, str]:
     """Return path in the session's folder → SHA-256 of every recording that the journal tells of."""
-    told = [line for line in lines if line["event"] == "recorded"]
-    return {line["recording"]: line["sha256"] for line in told} | {
-        line["recording_frames"]: line["frames_sha256"] for line in told
+    recorded = [line for line in lines if line["event"] == "recorded"]
+    return {line["recording"]: line["sha256"] for line in recorded} | {
+        line["recording_frames"]: line["frames_sha256"] for line in recorded
     }
 
 
-def recording_files(folder: Path, trial: int, attempt: int) -> tuple[Path, Path]:
-    """Return the files of samples and of frames: trial-003.parquet, trial-003_attempt-2_frames.parquet ..."""
-    name = f"trial-{trial:03d}" + (f"_attempt-{attempt}" if attempt > 1 else "")
+def recording_files(folder: Path, trial: int, attempt: int, interval: int | None = None) -> tuple[Path, Path]:
+    """Return the files of samples and of frames, such as trial-003.parquet and trial-003_interval-2_frames.parquet."""
+    again = f"_attempt-{attempt}" if attempt > 1 else ""
+    part = "" if interval is None else f"_interval-{interval}"
+    name = f"trial-{trial:03d}{again}{part}"
     return folder / f"{name}.parquet", folder / f"{name}_frames.parquet"

@@ -26,16 +26,15 @@ from pyarrow import parquet
 
 from study_app.errors import StoreError
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
-from study_app.haptics.model.layout import SAMPLE, records
-from study_app.store.atomic import beside, cannot_read, sync_folder
+from study_app.haptics.model.layout import FORCE_STEP_N, SAMPLE, records
+from study_app.store.atomic import cannot_read, sync_folder, temporary_path
 from study_app.store.journals.journal import plain
 from study_app.store.journals.parsing import parse_json
-from study_app.store.tables.columns import Column
+from study_app.store.tables.column import Column
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
 
 FORMAT = 2
 SPEED_STEP_MPS = 2.0**-12
-FORCE_STEP_N = 2.0**-14
 ROUNDED_TO = {
     "velocity_mps": SPEED_STEP_MPS,
     "wake_mps": SPEED_STEP_MPS,
@@ -256,7 +255,7 @@ class _Half:
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         self._path = path
-        self._temporary = beside(path)
+        self._temporary = temporary_path(path)
         self._schema = _schema(columns)
         self._file: BinaryIO = self._temporary.open("xb")
         self._writer = parquet.ParquetWriter(
@@ -297,8 +296,8 @@ class _Half:
 def _schema(columns: Sequence[Column]) -> pa.Schema:
     fields = []
     for column in columns:
-        told = {"description": column.description, **({"unit": column.unit} if column.unit else {})}
-        fields.append(pa.field(column.name, _type(column), nullable=False, metadata=told))
+        metadata = {"description": column.description, **({"unit": column.unit} if column.unit else {})}
+        fields.append(pa.field(column.name, _type(column), nullable=False, metadata=metadata))
     return pa.schema(fields)
 
 
@@ -337,7 +336,7 @@ def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any
     except (pa.ArrowException, UnicodeDecodeError) as error:
         raise _damaged(path, error) from error
     if not _are_of(table, SAMPLES if kind == "samples" else FRAMES, facts["rows"]):
-        raise StoreError(f"{path} is damaged (its columns are others than those of {kind}): restore it from a copy")
+        raise StoreError(f"{path} is damaged (its columns differ from those of {kind}): restore it from a copy")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
 
 
@@ -374,7 +373,7 @@ def _facts(path: Path, metadata: Any) -> dict[str, Any]:
             _check_facts_of_samples(facts, metadata.num_rows)
         return {**facts, "kind": facts["kind"], "rows": metadata.num_rows}
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise StoreError(f"{path} is no recording of ours: restore it from a copy") from error
+        raise StoreError(f"{path} is not a recording of this program: restore it from a copy") from error
 
 
 def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:
@@ -384,11 +383,11 @@ def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:
     checks = facts["crc32"]
     whole = (checks["rows"], *checks["device_force"], *checks["effect_force"])
     if not all(isinstance(number, int) for number in whole):
-        raise ValueError("its checks are none")
+        raise ValueError("its checks are invalid")
     for name in {"first_device_force_n", "first_command_n"} & facts.keys():
         first = facts[name]
         if len(first) not in (0, 3) or not all(number is None or isinstance(number, int | float) for number in first):
-            raise ValueError(f"{name} is no force")
+            raise ValueError(f"{name} is not a force")
 
 
 def _damaged(path: Path, error: Exception) -> StoreError:

@@ -28,16 +28,16 @@ _PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>
 _HEADING: Final = re.compile(
     r"^(Fatal Python error: [\w \-]+|(Current thread|Thread) 0x[0-9a-f]+ \(most recent call first\):)$"
 )
-ABOUT: Final = """What liquid-study knows of itself on this machine, for whoever helps with it.
+ABOUT: Final = """What liquid-study knows about itself on this machine, for support.
 
 versions.json    the program, Python, the system and libraries
 settings.json    the settings of this machine, without initials and folders
-log.txt          the program's log: words of the source, places in it, failures of devices
+log.txt          the program's log: text and lines of the source, failures of devices
 last-error.txt   the last error in the log
-diagnosis.txt    what was found of the device, where it was examined
-crash-N.txt      places in the source at a crash, the newest first
+diagnosis.txt    findings about the device, if it was examined
+crash-N.txt      lines of the source at a crash, the newest first
 
-No participant's id, no answer, no value of a liquid and no key is in here.
+It contains no participant id, no answers, no parameters of liquids and no key.
 """
 
 

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from study_app.devices.names import DEFAULT_DEVICE, NAME_PATTERN
 from study_app.errors import StoreError
 from study_app.protocol.source.problems import faults_of
 from study_app.store.atomic import cannot_read, cannot_write, write_file
@@ -29,6 +30,8 @@ STATEMENT_X_HEIGHT_PX: Final = 16 * 1118 / 2048
 DISTANCE_MM: Final = (200.0, 3000.0)
 WIDTH_MM: Final = (80.0, 5000.0)
 MOST_RECENT: Final = 8
+REMEMBERED_OPTIONS: Final = ("firmware",)
+"""Options of devices that are settings of this computer, by name; others are asked for before each session."""
 OFFSET_MS: Final = (0.0, 500.0)
 SPREAD_MS: Final = (0.0, 200.0)
 Place = Annotated[str, Field(pattern=r"^[^\x00]+$")]
@@ -56,8 +59,8 @@ class MachineSettings(_Strict):
     """What this machine is like.
 
     ``screen`` is the participant's by its name, ``screen_number`` tells screens of one name apart and counts from 1;
-    ``viewing_distance_mm`` and ``screen_width_mm`` are None until somebody measured them. ``firmware`` is the file of a
-    Falcon's program, ``workspace`` the folder of protocols and results (None: not chosen, see `study_app.workspace`);
+    ``viewing_distance_mm`` and ``screen_width_mm`` are None until somebody measured them. ``firmware`` is the file
+    of a device's program, ``workspace`` the folder of protocols and results (None: not chosen: `study_app.workspace`);
     ``recent`` are the protocol files outside it that were opened last, newest first; ``operator`` are the initials that
     were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at. Whether ``device`` is
     known is for those to say who open it.
@@ -68,7 +71,7 @@ class MachineSettings(_Strict):
     viewing_distance_mm: Annotated[float, Field(ge=DISTANCE_MM[0], le=DISTANCE_MM[1])] | None = None
     screen_width_mm: Annotated[float, Field(ge=WIDTH_MM[0], le=WIDTH_MM[1])] | None = None
     display_offset: DisplayOffset | None = None
-    device: Annotated[str, Field(pattern=r"^[a-z][a-z-]*(:.+)?$")] = "mouse"
+    device: Annotated[str, Field(pattern=rf"^{NAME_PATTERN}(:.+)?$")] = DEFAULT_DEVICE
     firmware: Place | None = None
     workspace: Place | None = None
     recent: Annotated[tuple[Place, ...], Field(max_length=MOST_RECENT, strict=False)] = ()
@@ -78,9 +81,10 @@ class MachineSettings(_Strict):
     operator: Annotated[str, Field(max_length=40)] = ""
 
     @property
-    def firmware_file(self) -> Path | None:
-        """The file of a Falcon's program, if one was chosen."""
-        return None if self.firmware is None else Path(self.firmware)
+    def device_options(self) -> dict[str, Path]:
+        """The values of devices' options that are remembered on this computer, by name."""
+        values = {name: getattr(self, name) for name in REMEMBERED_OPTIONS}
+        return {name: Path(value) for name, value in values.items() if value is not None}
 
     def with_recent(self, protocol: Path) -> MachineSettings:
         """Return the settings with this file, if it is outside the workspace, as the one that was opened last."""
@@ -120,7 +124,7 @@ class MachineSettings(_Strict):
         return math.degrees(2 * math.atan(height_mm / (2 * self.viewing_distance_mm)))
 
     def describe(self, screen: str, width_px: float, system_mm: float) -> dict[str, Any]:
-        """Return what the receipt says of the participant's screen beside what the system tells of it."""
+        """Return what the receipt says of the participant's screen besides what the system reports of it."""
         offset = self.offset_on(screen)
         return {
             "viewing_distance_mm": self.viewing_distance_mm,
@@ -151,9 +155,9 @@ def load() -> MachineSettings:
     except OSError as error:
         raise cannot_read(path, error) from error
     except ValueError as error:
-        raise _unusable(path, f"it is no JSON ({error})") from error
+        raise _unusable(path, f"it is not JSON ({error})") from error
     if not isinstance(document, dict):
-        raise _unusable(path, "it is no table of settings")
+        raise _unusable(path, "it is not a table of settings")
     document["workspace"] = setting_of(document)
     document.pop("results", None)
     try:
@@ -242,6 +246,7 @@ def _first(error: ValidationError, document: dict[str, Any]) -> str:
 
 def _unusable(path: Path, why: str) -> StoreError:
     return StoreError(
-        f"this machine's settings in {path} cannot be used, {why}: mend or delete the file, or set {FOLDER_VARIABLE} "
+        f"this machine's settings in {path} cannot be used, {why}: correct or delete the file, or set "
+        f"{FOLDER_VARIABLE} "
         "to another folder"
     )

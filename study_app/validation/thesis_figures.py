@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from study_app.evaluation import style
+from study_app import figure_style as style
 from study_app.store.atomic import write_file
 from study_app.store.output_files import make_folder
 from study_app.validation.thesis_motions import FIGURES, Run, ThesisFigure
@@ -46,7 +46,7 @@ def figures(to: Path) -> tuple[Path, ...]:
         shown = make()
         drawn = draw(shown)
         title = f"Fig. {shown.number}: {shown.title}"
-        files = {kind: style.file_bytes(drawn, kind, title) for kind in style.FORMATS}
+        files = {kind: style.file_bytes(drawn, kind, title, style.PLOT_SETTINGS) for kind in style.FORMATS}
         files["txt"] = f"{title}. {shown.caption}\n".encode()
         for kind, content in files.items():
             write_file(to / f"{shown.name}.{kind}", content)
@@ -54,19 +54,21 @@ def figures(to: Path) -> tuple[Path, ...]:
     return tuple(written)
 
 
-@style.own_settings()
+@style.own_settings(style.PLOT_SETTINGS)
 def draw(shown: ThesisFigure) -> Figure:
     """Draw one figure: title, force over time, what explains it (the path, or the liquid's speed), caption."""
     caption = textwrap.wrap(shown.caption, CAPTION_LETTERS)
     height_pt = TOP_PT + PLOT_PT + FOOT_PT + LINE_PT * len(caption)
-    figure = Figure(figsize=(style.WIDTH_PT / 72, height_pt / 72), facecolor="white")
+    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, height_pt / 72), facecolor="white")
 
     def write(left_pt: float, down_pt: float, text: str, **look: Any) -> None:
-        figure.text(left_pt / style.WIDTH_PT, 1 - down_pt / height_pt, text, va="top", **look)
+        figure.text(left_pt / style.PAGE_WIDTH_PT, 1 - down_pt / height_pt, text, va="top", **look)
 
     def place(left_pt: float, width_pt: float) -> Axes:
         bottom = 1 - (TOP_PT + PLOT_PT) / height_pt
-        return figure.add_axes((left_pt / style.WIDTH_PT, bottom, width_pt / style.WIDTH_PT, PLOT_PT / height_pt))
+        return figure.add_axes(
+            (left_pt / style.PAGE_WIDTH_PT, bottom, width_pt / style.PAGE_WIDTH_PT, PLOT_PT / height_pt)
+        )
 
     write(SIDE_PT, 6, f"Fig. {shown.number}", fontsize=9, fontweight="bold")
     write(SIDE_PT + 38, 6, shown.title, fontsize=9)
@@ -81,7 +83,7 @@ def draw(shown: ThesisFigure) -> Figure:
 def _take_apart(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
     """Draw the axes of each run's force in a plot of its own, and their path."""
     path_pt = PLOT_PT
-    width_pt = (style.WIDTH_PT - SIDE_PT - path_pt - RIGHT_PT) / len(shown.runs) - GAP_PT
+    width_pt = (style.PAGE_WIDTH_PT - SIDE_PT - path_pt - RIGHT_PT) / len(shown.runs) - GAP_PT
     plots = []
     for number, run in enumerate(shown.runs):
         plots.append(place(SIDE_PT + number * (width_pt + GAP_PT), width_pt))
@@ -89,12 +91,12 @@ def _take_apart(place: Callable[[float, float], Axes], shown: ThesisFigure) -> N
     limits = np.array([plot.get_ylim() for plot in plots])
     for plot in plots:
         plot.set_ylim(limits[:, 0].min() * 1.08, limits[:, 1].max() * 1.08)
-    _path(place(style.WIDTH_PT - RIGHT_PT - path_pt, path_pt), shown.runs[0])
+    _path(place(style.PAGE_WIDTH_PT - RIGHT_PT - path_pt, path_pt), shown.runs[0])
 
 
 def _compare(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
     """Draw the force of all runs along the straight motion, and how much of its speed the liquid takes up."""
-    width_pt = (style.WIDTH_PT - SIDE_PT - GAP_PT - RIGHT_PT) / 2
+    width_pt = (style.PAGE_WIDTH_PT - SIDE_PT - GAP_PT - RIGHT_PT) / 2
     force, liquid = place(SIDE_PT, width_pt), place(SIDE_PT + width_pt + GAP_PT, width_pt)
     colours = style.STEPS if len(shown.runs) == len(style.STEPS) else style.STEPS[::2]
     for run, colour in zip(shown.runs, colours, strict=True):

@@ -14,8 +14,9 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.model import paths
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Given, Liquid, Scene, Wake
+from study_app.haptics.model.scene import Given, Liquid, Scene
 from study_app.haptics.runtime.offline import Table, simulate
 
 RATE_HZ: Final = 1000.0
@@ -27,7 +28,7 @@ EXPONENTS: Final = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One motion through one liquid; ``label`` tells it from the other runs of its figure."""
+    """One motion through one liquid; ``label`` names it in its figure."""
 
     label: str
     scene: Scene

@@ -1,4 +1,4 @@
-"""What the devices' place and the home's card say of each device, as values. No Qt here."""
+"""What windows say of each device, the device that a dialog selects first, and the options it asks for. No Qt here."""
 
 from __future__ import annotations
 
@@ -6,24 +6,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from study_app.devices.backends import NONE, READY, Backend
-from study_app.devices.registry import kind_of, list_devices
+from study_app.devices.descriptor import DRIVER_READY, NONE, READY, Backend, DeviceDescriptor, DeviceOption
+from study_app.devices.names import DEFAULT_DEVICE
+from study_app.devices.registry import descriptor_of, discover, title_of
 from study_app.errors import DeviceError
+from study_app.store.workstation import REMEMBERED_OPTIONS
 
 if TYPE_CHECKING:
     from study_app.viewmodels.tones import Tone
-
-TITLES = {
-    "mouse": "Mouse",
-    "spacemouse": "SpaceMouse",
-    "falcon": "Novint Falcon",
-    "scripted": "Scripted hand",
-    "falcon-emulated": "Emulated Falcon",
-    "falcon-socket": "Falcon behind a socket",
-}
-ICONS = {"mouse": "mouse", "spacemouse": "mouse", "falcon": "device"}
-SIMULATED_ICON = "fast_forward"
-FELT_BY_PEOPLE = ("mouse", "spacemouse", "falcon")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +30,7 @@ class DeviceShown:
     """A device: ``name`` is for ``--device``, ``can`` says what it can and cannot do.
 
     ``tone``, ``sign`` and ``word`` are its state; ``why`` says why it cannot be used now, "" where it can.
+    ``choosable`` is whether its name can be taken as it is, ``diagnosable`` whether it can be examined as it is.
     """
 
     name: str
@@ -51,34 +42,27 @@ class DeviceShown:
     can: str
     why: str
     ways: tuple[Way, ...] = ()
+    simulated: bool = False
+    choosable: bool = False
+    diagnosable: bool = False
 
     @property
     def ready(self) -> bool:
         """Whether it can be felt with now."""
         return self.tone == "ok"
 
-    @property
-    def choosable(self) -> bool:
-        """Whether its name can be taken as it is."""
-        return self.name in list_devices()
-
-    @property
-    def diagnosable(self) -> bool:
-        """Whether an examination can look at it as it is."""
-        return self.choosable and self.name.startswith("falcon")
-
 
 def devices_shown(backends: Sequence[Backend]) -> tuple[DeviceShown, ...]:
-    """Return what to show of each device, those that people feel with first; backends of one device are one."""
+    """Return what to show of each device, those that people use first; backends of one device are one."""
     names = list(dict.fromkeys(backend.name for backend in backends))
     shown = [_shown(name, [one for one in backends if one.name == name]) for name in names]
-    return tuple(sorted(shown, key=lambda device: device.name not in FELT_BY_PEOPLE))
+    return tuple(sorted(shown, key=lambda device: device.simulated))
 
 
 def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
     """Return what to show of the preferred device; of one that was not looked at, its name alone."""
     try:
-        kind = kind_of(name)
+        kind = descriptor_of(name).name
     except DeviceError as error:
         return DeviceShown(name, name, "device", "bad", "warning", "Not known", "", _sentence(str(error)))
     for device in shown:
@@ -89,24 +73,54 @@ def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
 
 def looking(name: str) -> DeviceShown:
     """Return what to show of a device before anybody looked."""
-    kind = name.partition(":")[0]
-    return DeviceShown(name, TITLES.get(kind, name), _icon(kind), "neutral", "clock", "Looking …", "", "")
+    device = _descriptor(name)
+    icon = "device" if device is None else device.icon
+    return DeviceShown(name, title_of(name), icon, "neutral", "clock", "Looking …", "", "")
+
+
+def device_label(device: str) -> str:
+    """Return what to choose a device by."""
+    return descriptor_of(device).label
+
+
+def device_or_default(device: str) -> str:
+    """Return the device, or the default device if the registry does not know it."""
+    try:
+        descriptor_of(device)
+    except DeviceError:
+        return DEFAULT_DEVICE
+    return device
+
+
+def window_options() -> tuple[DeviceOption, ...]:
+    """Return the options of all devices that windows ask for, each name once."""
+    return tuple({option.name: option for device in discover().devices for option in device.window_options}.values())
+
+
+def remembered_options() -> tuple[DeviceOption, ...]:
+    """Return the options that are remembered on this computer."""
+    return tuple(option for option in window_options() if option.name in REMEMBERED_OPTIONS)
 
 
 def _shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
-    kind = name.partition(":")[0]
+    device = _descriptor(name)
     best = min(ways, key=_rank)
-    tone, sign, word = _state(best)
+    by_command = device is not None and device.argument_required
+    tone, sign, word = _state(best, by_command=by_command)
+    choosable = device is not None and not by_command
     return DeviceShown(
         name=name,
-        title=TITLES.get(kind, name),
-        icon=_icon(kind),
+        title=title_of(name),
+        icon="device" if device is None else device.icon,
         tone=tone,
         sign=sign,
         word=word,
         can=_sentence(ways[0].can),
         why="" if tone == "ok" and not best.why else _sentence(best.why),
         ways=tuple(Way(way.by, way.state, way.why) for way in ways),
+        simulated=device is not None and device.simulated,
+        choosable=choosable,
+        diagnosable=choosable and device is not None and device.doctor is not None,
     )
 
 
@@ -114,27 +128,29 @@ def _rank(backend: Backend) -> int:
     """Return how far a backend is from being felt with; a driver that is ready has not found a device yet."""
     if _connected(backend):
         return 0
-    return {READY: 1, NONE: 2}.get(backend.state, 3)
+    return {READY: 1, DRIVER_READY: 1, NONE: 2}.get(backend.state, 3)
 
 
 def _connected(backend: Backend) -> bool:
     return backend.state.startswith("connected")
 
 
-def _state(backend: Backend) -> tuple[Tone, str, str]:
+def _state(backend: Backend, *, by_command: bool) -> tuple[Tone, str, str]:
     if _connected(backend):
-        return ("warn", "warning", "Look at it") if backend.why else ("ok", "check", "Connected")
-    if backend.state == READY and backend.name == "falcon":
+        return ("warn", "warning", "Check it") if backend.why else ("ok", "check", "Connected")
+    if backend.state == DRIVER_READY:
         return "neutral", "ring", "Driver ready"
-    if backend.state == READY and backend.name not in list_devices():
-        return "neutral", "info", "By command"
+    if backend.state == READY and by_command:
+        return "neutral", "info", "Command line only"
     if backend.state == READY:
         return "ok", "check", "Ready"
     return ("neutral", "ring", "Not connected") if backend.state == NONE else ("warn", "warning", "Not available")
 
 
-def _icon(kind: str) -> str:
-    return ICONS.get(kind, SIMULATED_ICON)
+def _descriptor(name: str) -> DeviceDescriptor | None:
+    """Return the descriptor of a device; None of one that could not be loaded."""
+    kind = name.partition(":")[0]
+    return next((device for device in discover().devices if device.name == kind), None)
 
 
 def _sentence(words: str) -> str:

@@ -9,17 +9,19 @@ from functools import partial
 from pathlib import Path
 
 from study_app.errors import ProtocolError, StudyError
-from study_app.protocol.describe import expected_duration_s
-from study_app.protocol.load import at_hand, is_scene_file, load
+from study_app.protocol.load import at_hand, is_scene_file, load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import PageStep, Schedule, build_schedule
+from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
 from study_app.session.resume import find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
+from study_app.store.blinded.allocation import session_protocol
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.workstation import recent_protocols
+from study_app.viewmodels.extent import counted_each, extent_of
+from study_app.viewmodels.session.stages import operator_language, step_title
 from study_app.viewmodels.sessions import SessionFacts, counted, started_words
 
 LANGUAGES = {"en": "English", "nl": "Dutch", "de": "German", "fr": "French", "es": "Spanish", "it": "Italian"}
@@ -37,6 +39,11 @@ class StudyFacts:
     extent: str
     duration: str
     needs: str
+
+    @property
+    def name(self) -> str:
+        """The study's name, which its sessions carry."""
+        return self.protocol.study.name
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +77,8 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
         count = len(error.problems)
         others = f" (and {count - 1} more: liquid-study check {source})" if count > 1 else ""
         return BrokenFacts(source, f"{error.problems[0]}{others}")
-    language = "en" if "en" in protocol.study.languages else protocol.study.languages[0]
-    settings = sum(len(block.conditions) * block.repetitions for block in protocol.main_blocks)
+    language = operator_language(protocol)
+    extent = extent_of(protocol)
     return StudyFacts(
         source=source,
         protocol=protocol,
@@ -80,12 +87,12 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
         languages=", ".join(sorted(LANGUAGES.get(code, code) for code in protocol.study.languages)),
         extent=", ".join(
             (
-                counted(protocol.parts, "part"),
-                counted(settings, "setting"),
-                counted(protocol.responses_per_participant(), "answer"),
+                counted_each(extent.parts, "part"),
+                counted_each(extent.settings, "setting"),
+                counted_each(extent.answers, "answer"),
             )
         ),
-        duration=f"about {max(1, round(expected_duration_s(protocol) / 60))} min",
+        duration=f"about {extent.minutes}",
         needs=f"Falcon or mouse; at most {protocol.device.force_limit_n:g} N",
     )
 
@@ -101,13 +108,17 @@ class Interrupted:
     line: str
 
 
-def interrupted(found: Iterable[SessionFacts], studies: Iterable[StudyFacts], now: datetime) -> Interrupted | None:
-    """Return the newest session that can go on here, if any: unfinished, open in no program, of a protocol at hand."""
+def interrupted(
+    found: Iterable[SessionFacts], studies: Iterable[StudyFacts | BrokenFacts], now: datetime
+) -> Interrupted | None:
+    """Return the newest session that can go on here, if any: unfinished, open in no program, of a protocol at hand.
+
+    A protocol that cannot be used because its liquid file is lost still resumes: its liquids are sealed in the key.
+    """
     studies = tuple(studies)
-    by_name = {facts.protocol.study.name: facts for facts in studies}
     for session in found:
-        study = by_name.get(session.study)
-        if session.status != "unfinished" or study is None or is_open(session.folder):
+        candidates = [it.source for it in studies if isinstance(it, BrokenFacts) or it.name == session.study]
+        if session.status != "unfinished" or not candidates or is_open(session.folder):
             continue
         try:
             folder = locate(session.folder)[1]
@@ -115,14 +126,16 @@ def interrupted(found: Iterable[SessionFacts], studies: Iterable[StudyFacts], no
                 continue
             lines = journal.read(folder.journal)
             begun = progress_of(lines)
-            schedule = build_schedule(study.protocol, session.participant, begun.start["seed"])
-            source = find_protocol(
-                begun.start, [facts.source for facts in studies], partial(source_to_resume, session.folder)
-            )
-            step = resume_at(study.protocol, schedule, lines).step
+            read = partial(source_to_resume, session.folder)
+            source = find_protocol(begun.start, candidates, read)
+            protocol = parse(read(source), source)
+            study = locate(session.folder)[0]
+            protocol = session_protocol(study, protocol, session.participant, begun.start["session"])
+            schedule = build_schedule(protocol, session.participant, begun.start["seed"])
+            step = resume_at(protocol, schedule, lines).step
         except StudyError:
             continue  # what is wrong with it is said when it is asked for by its folder
-        where = place_words(study.protocol, schedule, step)
+        where = place_words(protocol, schedule, step)
         stopped = started_words(datetime.fromisoformat(lines[-1]["at"]).astimezone(now.tzinfo), now)
         whole = f" of {session.answers_of}" if session.answers_of is not None else ""
         kind = "Pilot " if session.pilot else ""
@@ -131,19 +144,19 @@ def interrupted(found: Iterable[SessionFacts], studies: Iterable[StudyFacts], no
             source=source,
             participant=session.participant,
             heading=f"{kind}{session.participant}, session {session.session} stopped {where}",
-            line=f"{stopped}. {session.answers}{whole} answers are on disk; nothing is missing before that point.",
+            line=f"{stopped}. {session.answers}{whole} answers are on disk; nothing before that point is missing.",
         )
     return None
 
 
 def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
     """Return where a session goes on, in the operator's words and without a condition: "in part 2, delay setting 3"."""
-    language = "en" if "en" in protocol.study.languages else protocol.study.languages[0]
+    language = operator_language(protocol)
     if step >= len(schedule.steps):
-        return "after its last page"
+        return "after the last page"
     here = schedule.steps[step]
-    if isinstance(here, PageStep):
-        return f"before “{protocol.text(protocol.pages[here.page_id].title, language)}”"
+    if not isinstance(here, Trial):
+        return f"before “{step_title(protocol, here, language)}”"
     name = here.label(protocol, language)
     label = f"{name[:1].lower()}{name[1:]}" + (f" of {here.of}" if here.of > 1 else "")
     return f"in part {here.part}, {label}" if here.part else f"in {label}"

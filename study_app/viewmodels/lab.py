@@ -7,13 +7,20 @@ how it is written.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.haptics.model.effect import Parameter, Value
 from study_app.lab.ab_comparison import Setting, Side, Workbench
-from study_app.lab.parameters import Parameter, Value, sections
+from study_app.lab.limiters import Limiter
+from study_app.lab.parameters import sections
+from study_app.lab.presets import Choice
+from study_app.lab.wake_tail import Tail
+
+if TYPE_CHECKING:
+    from study_app.lab.shadow import Trace
 
 Floats: TypeAlias = NDArray[np.float64]
 Point: TypeAlias = tuple[float, float, float]
@@ -22,66 +29,6 @@ Choices: TypeAlias = tuple[tuple[str, str], ...]
 
 SPAN_S = 2.5
 SIDES: tuple[Side, Side] = ("A", "B")
-
-
-class TailShown(Protocol):
-    """The wake's elements as places the body was at (see ``lab.shadow.Tail``), from the oldest to the newest.
-
-    ``positions_m`` (n, 3) [m, hand frame]; ``breaks`` (n,) bool, true where a segment begins; ``ages`` (n,) from 0, the
-    newest, to 1, the oldest; ``alive`` of ``elements`` are held now, in ``segments`` segments.
-    """
-
-    @property
-    def positions_m(self) -> Floats: ...  # noqa: D102
-    @property
-    def breaks(self) -> NDArray[np.bool_]: ...  # noqa: D102
-    @property
-    def ages(self) -> Floats: ...  # noqa: D102
-    @property
-    def elements(self) -> int: ...  # noqa: D102
-    @property
-    def alive(self) -> int: ...  # noqa: D102
-    @property
-    def segments(self) -> int: ...  # noqa: D102
-
-
-class TraceShown(Protocol):
-    """The last 2.5 s of one motion as A and as B have it (see ``lab.shadow.Trace``); ``t_s`` (n,) ends at 0, now.
-
-    ``force_a_n``, ``force_b_n`` (n, 3) are forces as sent, or as they would be, on the hand; ``body_mps``,
-    ``wake_a_mps`` and ``wake_b_mps`` (n,) speeds.
-    """
-
-    @property
-    def t_s(self) -> Floats: ...  # noqa: D102
-    @property
-    def force_a_n(self) -> Floats: ...  # noqa: D102
-    @property
-    def force_b_n(self) -> Floats: ...  # noqa: D102
-    @property
-    def body_mps(self) -> Floats: ...  # noqa: D102
-    @property
-    def wake_a_mps(self) -> Floats: ...  # noqa: D102
-    @property
-    def wake_b_mps(self) -> Floats: ...  # noqa: D102
-
-
-class LiquidShown(Protocol):
-    """A liquid that a side can be set to (see ``lab.presets.Choice``); ``title`` names it among the others."""
-
-    @property
-    def title(self) -> str: ...  # noqa: D102
-
-
-class LimiterShown(Protocol):
-    """A limiter, how many ticks of the last 10 s it acted in, and whether it does now (see ``lab.live.Limiter``)."""
-
-    @property
-    def name(self) -> str: ...  # noqa: D102
-    @property
-    def ticks(self) -> int: ...  # noqa: D102
-    @property
-    def acting(self) -> bool: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +42,7 @@ class Now:
 
 @dataclass(frozen=True, slots=True)
 class CostRow:
-    """An effect and the ns it takes of a tick; ``ns`` None where it is not there, and ``why`` not ("not asked for")."""
+    """An effect and the ns it takes of a tick; ``ns`` None where it is not there, and ``why`` not ("not used")."""
 
     effect: str
     ns: float | None
@@ -113,12 +60,16 @@ class ErrorRow:
 
 @dataclass(frozen=True, slots=True)
 class DeviceShown:
-    """Which devices can be chosen, which is, and how it is: ``state`` is one or two words."""
+    """Which devices can be chosen, which is, and how it is: ``state`` is one or two words.
+
+    ``pointer`` is whether the window's pointer moves it.
+    """
 
     choices: Choices
     chosen: str
     state: str = ""
     ready: bool = True
+    pointer: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,15 +85,15 @@ class LabView:
     """
 
     workbench: Workbench
-    liquids: tuple[LiquidShown, ...]
+    liquids: tuple[Choice, ...]
     device: DeviceShown
     paths: Choices = ()
     path: str | None = None
-    trace: TraceShown | None = None
-    tail_a: TailShown | None = None
-    tail_b: TailShown | None = None
+    trace: Trace | None = None
+    tail_a: Tail | None = None
+    tail_b: Tail | None = None
     now: Now | None = None
-    limiters: tuple[LimiterShown, ...] = ()
+    limiters: tuple[Limiter, ...] = ()
     cost: tuple[CostRow, ...] = ()
     tick_ns: float | None = None
     errors: tuple[ErrorRow, ...] = ()
@@ -162,7 +113,7 @@ class LabView:
         return self.workbench.felt
 
     @property
-    def tail(self) -> TailShown | None:
+    def tail(self) -> Tail | None:
         """The tail of the side that is felt."""
         return self.tail_a if self.felt == "A" else self.tail_b
 

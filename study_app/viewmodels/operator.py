@@ -9,15 +9,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from study_app.devices.descriptor import Icon
 from study_app.protocol.model import Explore, Protocol, Reach
-from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.orders.schedule import FormStep, Schedule, Trial
+from study_app.protocol.trials.tracks import design_of
+from study_app.protocol.wording.languages import words
+from study_app.store.limits import Broken
+from study_app.store.progress import NoteLine, Progress
+from study_app.store.tables.columns import SEALED
 from study_app.viewmodels.force_traces import ForceFigures, force_rows
-from study_app.viewmodels.number_words import duration_words, grouped, minutes
-from study_app.viewmodels.servo_health import Vitals
-from study_app.viewmodels.session_stages import NoteLine, SessionProgress, Stage, operator_language
+from study_app.viewmodels.number_words import grouped, minutes
+from study_app.viewmodels.servo_health import Tile, Vitals, health_tiles
+from study_app.viewmodels.session.stages import Stage, operator_language
+from study_app.viewmodels.session.track_health import track_words
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
-Verdict = Literal["ok", "late", "open"]
 StepState = Literal["done", "now", "open"]
 
 MEASURES = {
@@ -44,17 +50,6 @@ class StepRow:
 
 
 @dataclass(frozen=True, slots=True)
-class Tile:
-    """A number with its unit, a verdict and a line that says what the verdict compares with."""
-
-    title: str
-    value: str
-    unit: str
-    verdict: Verdict
-    line: str
-
-
-@dataclass(frozen=True, slots=True)
 class TrialTime:
     """Time in the task: ``most_s`` None where the task has no end of its own."""
 
@@ -74,7 +69,7 @@ class DeviceView:
     """The device's card: its name, whether it answers, and rows of (label, value), the most important ones first."""
 
     name: str
-    kind: Literal["falcon", "mouse", "simulated"]
+    icon: Icon
     ready: bool
     rows: tuple[tuple[str, str], ...]
 
@@ -88,7 +83,8 @@ class OperatorView:
     ``waits`` says that the trouble is a disk that takes
     nothing: the session goes on when it does again. ``beyond`` says which recordings were lost, then of each trial out
     of limits which it broke, the newest first. ``may_reconnect`` says that the trouble is a device that can be
-    connected again, ``reconnects`` that it is being so, ``reconnection`` how far that is, or why it failed.
+    connected again, ``reconnects`` that it is being so, ``reconnection`` how far that is, or why it failed. ``track``
+    says how the track of the latest trial with a design is doing, without a level.
     """
 
     study: str
@@ -121,6 +117,7 @@ class OperatorView:
     may_reconnect: bool = False
     reconnects: bool = False
     reconnection: str = ""
+    track: tuple[str, ...] = ()
 
     @property
     def trials_line(self) -> str:
@@ -134,13 +131,14 @@ class Session:
     """What stays the same through a session and is shown: who, with what, by which limits."""
 
     protocol: Protocol
+    schedule: Schedule
     stages: tuple[Stage, ...]
     who: str
     expected_s: float
     answers_of: int
     lateness_limit_s: float
     device_name: str
-    device_kind: Literal["falcon", "mouse", "simulated"]
+    device_icon: Icon
     device_rows: tuple[tuple[str, str], ...]
 
     @property
@@ -148,10 +146,29 @@ class Session:
         """The language of the operator's window, English, where the study has it; else the study's first."""
         return operator_language(self.protocol)
 
+    def trial(self, progress: Progress) -> Trial | None:
+        """Return the trial under way or being answered; None on a page of text and before the first step."""
+        step = self.schedule.steps[progress.here] if progress.here >= 0 else None
+        return step if isinstance(step, Trial) else None
+
+    def main_trials(self, progress: Progress) -> tuple[tuple[int, int], ...]:
+        """Return of each part how many of its main trials were left behind, and how many it has."""
+        counts: dict[int | None, tuple[int, int]] = {}
+        for index, step in enumerate(self.schedule.steps):
+            if isinstance(step, Trial) and step.phase == "main":
+                done, of = counts.get(step.part, (0, 0))
+                counts[step.part] = (done + (index < progress.here or progress.ended == "completed"), of + 1)
+        return tuple(counts.values())
+
+    def broken(self, progress: Progress) -> dict[int, tuple[Broken, ...]]:
+        """Return what the trials done broke, as far as the operator may know: if double-blind, lateness and gaps."""
+        hidden = SEALED if self.protocol.study.blinding == "double" else frozenset()
+        return {trial: tuple(one for one in them if one[0] not in hidden) for trial, them in progress.broken.items()}
+
 
 def operator_view(
     session: Session,
-    progress: SessionProgress,
+    progress: Progress,
     vitals: Vitals,
     *,
     now_s: float,
@@ -175,7 +192,7 @@ def operator_view(
     trouble = progress.broke or trouble
     state = _state(progress, force_on=force_on, trouble=trouble)
     waits = waits and not progress.broke
-    trial = progress.trial
+    trial = session.trial(progress)
     answering = trial is not None and progress.trial_lasted_s is not None
     return OperatorView(
         study=session.protocol.study.name,
@@ -183,26 +200,26 @@ def operator_view(
         state=state,
         state_word="Waiting for the disk" if waits and state == "trouble" else _state_word(state, progress),
         trouble=trouble,
-        saved_ago_s=None if progress.saved_s is None else max(0.0, now_s - progress.saved_s),
-        elapsed_s=(progress.ended_s if progress.ended else now_s) - progress.away_s,
+        saved_ago_s=max(0.0, now_s - progress.t_s) if progress.start else None,
+        elapsed_s=(progress.t_s if progress.ended else now_s) - progress.away_s,
         expected_s=session.expected_s,
-        main_trials=progress.main_trials,
+        main_trials=session.main_trials(progress),
         part_line=_part_line(session, trial),
         heading=_heading(session, progress),
         setting_line=_setting_line(session, progress, answering=answering),
         trial_time=_trial_time(session, progress, now_s),
         steps=tuple(_step_row(stage, progress) for stage in session.stages),
         counts=_counts(session, progress),
-        tiles=_tiles(vitals, rate_hz, session.lateness_limit_s),
+        tiles=health_tiles(vitals, rate_hz, session.lateness_limit_s),
         device=DeviceView(
             session.device_name,
-            session.device_kind,
+            session.device_icon,
             device_ready,
             (*force_rows(session.protocol, forces), ("Safety faults", str(faults)), *session.device_rows),
         ),
-        notes=progress.notes[-NOTES_SHOWN:][::-1],
+        notes=tuple(progress.notes[-NOTES_SHOWN:][::-1]),
         force_on=force_on,
-        may_pause=state == "running" and progress.step >= 0,
+        may_pause=state == "running" and progress.here >= 0,
         may_resume=state in {"paused", "force off"},
         may_repeat=trial is not None and state == "running",
         over=state == "ended",
@@ -214,23 +231,33 @@ def operator_view(
             *_beyond(session, progress),
         ),
         blinding=session.protocol.study.blinding,
+        track=_track(session, progress),
     )
 
 
-def _state(progress: SessionProgress, *, force_on: bool, trouble: str) -> State:
+def _track(session: Session, progress: Progress) -> tuple[str, ...]:
+    trial = next((one for one in session.schedule.trials if one.number == progress.of_intervals), None)
+    if trial is None or progress.ended:
+        return ()
+    design = design_of(session.protocol, session.protocol.blocks[trial.block])
+    names = words(session.language).design_answers
+    return track_words(progress, session.schedule, trial, {one: names[one] for one in design.answers})
+
+
+def _state(progress: Progress, *, force_on: bool, trouble: str) -> State:
     if progress.ended:
         return "ended"
     if trouble:
         return "trouble"
-    if progress.step < 0:
+    if progress.here < 0:
         return "preparing"
     if not force_on:
         return "force off"
     return "paused" if progress.paused else "running"
 
 
-def _state_word(state: State, progress: SessionProgress) -> str:
-    if state == "ended":
+def _state_word(state: State, progress: Progress) -> str:
+    if progress.ended:
         return {
             "completed": "Complete",
             "withdrawn": "Withdrawn",
@@ -255,30 +282,33 @@ def _part_line(session: Session, trial: Trial | None) -> str:
     return f"Part {trial.part} of {parts}  ·  {title}" if trial.part and parts > 1 else title
 
 
-def _heading(session: Session, progress: SessionProgress) -> str:
+def _heading(session: Session, progress: Progress) -> str:
     if progress.ended:
         return {"completed": "Session complete"}.get(progress.ended, "Session ended")
-    if progress.step < 0:
+    if progress.here < 0:
         return "Getting ready"
-    trial = progress.trial
+    trial = session.trial(progress)
     if trial is None:
-        return next(s.label for s in session.stages if s.first <= progress.step <= s.last)
+        return next(s.label for s in session.stages if s.first <= progress.here <= s.last)
     if trial.phase != "main":
         return trial.label(session.protocol, session.language)
-    main = [other.number for other in progress.schedule.trials if other.phase == "main"]
+    main = [other.number for other in session.schedule.trials if other.phase == "main"]
     return f"Trial {main.index(trial.number) + 1} of {len(main)}"
 
 
-def _setting_line(session: Session, progress: SessionProgress, *, answering: bool) -> str:
+def _setting_line(session: Session, progress: Progress, *, answering: bool) -> str:
     if progress.ended:
         shown = f"  ·  Fingerprint {progress.fingerprint}" if progress.fingerprint else ""
-        return f"Everything answered is on disk{shown}"
-    trial = progress.trial
+        return f"All answers are on disk{shown}"
+    trial = session.trial(progress)
     if trial is None:
-        return "The participant reads" if progress.step >= 0 else "The first page opens in a moment"
+        if progress.here < 0:
+            return "The first page will appear shortly"
+        filled_in = isinstance(session.schedule.steps[progress.here], FormStep)
+        return "The participant is filling in a form" if filled_in else "The participant is reading"
     block = session.protocol.blocks[trial.block]
     task = session.protocol.tasks[block.task]
-    doing = "free exploration" if isinstance(task, Explore) else "reaching targets"
+    doing = task.activity
     if progress.broke:
         doing = "stopped by a fault"
     elif progress.paused:
@@ -292,8 +322,8 @@ def _setting_line(session: Session, progress: SessionProgress, *, answering: boo
     return f"{trial.label(session.protocol, session.language)}  ·  {doing}"
 
 
-def _trial_time(session: Session, progress: SessionProgress, now_s: float) -> TrialTime | None:
-    trial = progress.trial
+def _trial_time(session: Session, progress: Progress, now_s: float) -> TrialTime | None:
+    trial = session.trial(progress)
     if trial is None or progress.ended:
         return None
     block = session.protocol.blocks[trial.block]
@@ -304,97 +334,57 @@ def _trial_time(session: Session, progress: SessionProgress, now_s: float) -> Tr
     return TrialTime(elapsed, task.min_s if isinstance(task, Explore) else None, task.limit_s)
 
 
-def _step_row(stage: Stage, progress: SessionProgress) -> StepRow:
+def _step_row(stage: Stage, progress: Progress) -> StepRow:
     many = stage.last - stage.first + 1
     spent = sum(progress.durations_s.get(step, 0.0) for step in range(stage.first, stage.last + 1))
-    if progress.step > stage.last or progress.ended == "completed":
+    if progress.here > stage.last or progress.ended == "completed":
         return StepRow(stage.label, "done", minutes(spent))
-    if stage.first <= progress.step <= stage.last:
-        place = f"{progress.step - stage.first + 1} of {many}" if many > 1 else "now"
+    if stage.first <= progress.here <= stage.last:
+        place = f"{progress.here - stage.first + 1} of {many}" if many > 1 else "now"
         return StepRow(stage.label, "now", "" if progress.ended else place)
     return StepRow(stage.label, "open", "")
 
 
-def _counts(session: Session, progress: SessionProgress) -> tuple[tuple[str, str], ...]:
+def _counts(session: Session, progress: Progress) -> tuple[tuple[str, str], ...]:
+    broken = session.broken(progress).values()
     return (
-        ("Answers on disk", f"{sum(progress.answers.values())} of {session.answers_of}"),
-        ("Trials within limits", f"{progress.trials_within_limits} of {len(progress.trials_done)}"),
-        ("Marks, repeats", f"{progress.marks}, {progress.repeats}"),
+        ("Answers on disk", f"{sum(progress.answered.values())} of {session.answers_of}"),
+        ("Trials within limits", f"{sum(not one for one in broken)} of {len(broken)}"),
+        ("Marks, repeats", f"{sum(note.kind == 'mark' for note in progress.notes)}, {progress.repeats}"),
     )
 
 
-def _lost(session: Session, progress: SessionProgress, lost: Mapping[int, str]) -> tuple[str, ...]:
+def _lost(session: Session, progress: Progress, lost: Mapping[int, str]) -> tuple[str, ...]:
     """Return a sentence for every trial whose recording could not be kept, the newest first."""
-    trials = {trial.number: trial for trial in progress.schedule.trials}
+    trials = {trial.number: trial for trial in session.schedule.trials}
     return tuple(
         f"Recording of {trials[number].label(session.protocol, session.language)} lost: {reason}"
         for number, reason in sorted(lost.items(), reverse=True)
     )
 
 
-def _lacking(session: Session, progress: SessionProgress, now: Mapping[int, int]) -> tuple[str, ...]:
+def _lacking(session: Session, progress: Progress, now: Mapping[int, int]) -> tuple[str, ...]:
     """Return a sentence for every trial whose recording lacks samples, the newest first."""
-    labels = {trial.number: trial.label(session.protocol, session.language) for trial in progress.schedule.trials}
+    labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
         f"Recording of {labels[number]} lacks {grouped(count)} samples: the disk does not keep up"
         for number, count in sorted({**progress.lacking, **now}.items(), reverse=True)
     )
 
 
-def _beyond(session: Session, progress: SessionProgress) -> tuple[str, ...]:
+def _beyond(session: Session, progress: Progress) -> tuple[str, ...]:
     """Return a sentence for every finished trial that broke a limit, the newest first."""
-    labels = {trial.number: trial.label(session.protocol, session.language) for trial in progress.schedule.trials}
+    labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
         f"{labels[number]} out of limits: "
         + "; ".join(
             f"{MEASURES[measure]} {value:.3g} {_unit(measure)}, limit {limit:g} {_unit(measure)}"
             for measure, value, limit in beyond
         )
-        for number, beyond in reversed(tuple(progress.trials_done.items()))
+        for number, beyond in reversed(session.broken(progress).items())
         if beyond
     )
 
 
 def _unit(measure: str) -> str:
     return "%" if measure in {"withheld_share", "targets_reached"} else "ms"
-
-
-def _tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, ...]:
-    rate = vitals.rate_hz
-    p99 = vitals.lateness_p99_s
-    p99_value, _, p99_unit = duration_words(p99).partition(" ") if p99 is not None else ("–", "", "")
-    screen = f", {vitals.frame_rate_hz:.1f} Hz" if vitals.frame_rate_hz else ""
-    return (
-        Tile(
-            "Servo rate",
-            "–" if rate is None else f"{rate:.1f}",
-            "Hz",
-            "open" if rate is None else _verdict(abs(rate - rate_hz) <= 0.01 * rate_hz),
-            f"asked for {rate_hz:.0f} Hz",
-        ),
-        Tile(
-            "Lateness, p99",
-            p99_value,
-            p99_unit,
-            "open" if p99 is None else _verdict(p99 <= limit_s),
-            f"limit {duration_words(limit_s)}",
-        ),
-        Tile(
-            "Overruns",
-            grouped(vitals.overruns),
-            "",
-            "open" if vitals.ticks == 0 else _verdict(vitals.overruns <= vitals.ticks * 1e-4),
-            f"of {grouped(vitals.ticks)} ticks",
-        ),
-        Tile(
-            "Refreshes missed",
-            grouped(vitals.refreshes_missed),
-            "",
-            "open" if vitals.refreshes == 0 else _verdict(vitals.refreshes_missed <= 0.01 * vitals.refreshes),
-            f"of {grouped(vitals.refreshes)}{screen}",
-        ),
-    )
-
-
-def _verdict(within: bool) -> Verdict:
-    return "ok" if within else "late"

@@ -1,6 +1,7 @@
 """What the window before a session shows, as one frozen value. No Qt here.
 
-Nothing here says a liquid, a parameter or a delay: costs and errors are those of the dearest and the least true scene.
+Nothing here says a liquid, a parameter or a delay: costs and errors are those of the most expensive and the least
+accurate scene.
 """
 
 from __future__ import annotations
@@ -12,13 +13,16 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.protocol.describe import expected_duration_s
+from study_app.protocol.describe import spread
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.session.preflight import Check, Facts
 from study_app.session.resume import resume_at
 from study_app.store.journals.journal import Line
-from study_app.viewmodels.session_stages import SessionProgress, operator_language, progress_after
+from study_app.store.progress import progress_of
+from study_app.viewmodels.extent import extent_of
+from study_app.viewmodels.session.stages import operator_language, step_title
 
 WAITING = "measuring …"
 BINS_PER_DECADE = 10
@@ -28,7 +32,7 @@ BINS_PER_DECADE = 10
 class PreflightView:
     """Everything on the window.
 
-    ``rows`` are (label, value) of what will run; ``lateness_us`` is what was measured of the servo's turns (n,), and
+    ``rows`` are (label, value) of what will run; ``lateness_us`` is what was measured of the servo's ticks (n,), and
     ``limit_us`` what the protocol allows. While it is ``busy`` nothing can be begun.
     """
 
@@ -81,7 +85,7 @@ def preflight_view(
     """Return what to show of ``facts``; ``goes_on`` are the rows of a session that goes on (`resumed_rows`).
 
     ``error_n`` is the largest difference of a scene's force from the definition by the letter [N], None while it is not
-    known; where nobody was asked (``asked_error``) its line is left out.
+    known; where no one was asked (``asked_error``) its line is left out.
     """
     return PreflightView(
         study=protocol.study.name,
@@ -102,18 +106,17 @@ def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Line]) 
     SessionError
         The journal is not of this schedule.
     """
-    told = list(lines)
-    start = resume_at(protocol, schedule, told)
+    journal = list(lines)
+    start = resume_at(protocol, schedule, journal)
     language = operator_language(protocol)
     step = schedule.steps[start.step] if start.step < len(schedule.steps) else None
     if isinstance(step, Trial):
         attempt = start.presented.get(step.number, 0) + 1
         here = step.label(protocol, language) + (f", attempt\u00a0{attempt}" if attempt > 1 else "")
     else:
-        here = "the end" if step is None else protocol.text(protocol.pages[step.page_id].title, language)
-    answers = progress_after(SessionProgress(protocol, schedule), told).answers
-    kept = f"{sum(answers.values())} of {protocol.responses_per_participant()} answers"
-    return ("Goes on at", here), ("Kept", kept)
+        here = "the end" if step is None else step_title(protocol, step, language)
+    kept = f"{sum(progress_of(journal).answered.values())} of {orders_of(protocol).answers} answers"
+    return ("Continues at", here), ("Kept", kept)
 
 
 def histogram(lateness_us: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64], float | None]:
@@ -127,16 +130,15 @@ def histogram(lateness_us: NDArray[np.float64]) -> tuple[NDArray[np.float64], ND
 def _rows(
     protocol: Protocol, now: datetime, error_n: float | None, *, asked_error: bool
 ) -> tuple[tuple[str, str], ...]:
-    settings = sum(len(block.conditions) * block.repetitions for block in protocol.main_blocks)
-    expected_s = expected_duration_s(protocol)
-    ends = now + timedelta(seconds=expected_s)
+    extent = extent_of(protocol)
+    ends = now + timedelta(seconds=max(extent.expected_s))
     error = WAITING if error_n is None else "< 0.01 N" if error_n < 0.01 else f"{error_n:.2f} N"
     return (
-        ("Parts", str(protocol.parts)),
-        ("Settings", str(settings)),
-        ("Answers", str(protocol.responses_per_participant())),
-        ("Expected time", f"{max(1, round(expected_s / 60))} min"),
+        ("Parts", spread(extent.parts)),
+        ("Settings", spread(extent.settings)),
+        ("Answers", spread(extent.answers)),
+        ("Expected time", extent.minutes),
         ("Force limit", f"{protocol.device.force_limit_n:g} N"),
-        *((("Force off the definition", error),) if asked_error else ()),
+        *((("Expected force error", error),) if asked_error else ()),
         ("Ends about", f"{ends:%H:%M}"),
     )

@@ -15,7 +15,7 @@ NAMED: int = 5
 """Of so many sessions that are not in the figures each is named."""
 
 Remedy: TypeAlias = Literal["again", "home", "read", "stop"]
-"""What a button beside a sentence does: look again, go home, go on reading, stop."""
+"""What the button of a sentence does: look again, go home, go on reading, stop."""
 
 NOTHING: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = MappingProxyType({})
 
@@ -60,7 +60,7 @@ class FigureShown:
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """What is left out of the analysis, by which rule or person, why and when.
+    """What is excluded from the analysis, by which rule or person, why and when.
 
     ``which`` is participant, session and trial (None: the whole session).
     """
@@ -96,7 +96,7 @@ class ResultsView:
 
     ``trials`` are the main trials of each session (participant, number), with the words for them. ``colours`` are the
     figures' colours in print, by the role in the theme that takes their place. ``sealed`` is None while it is not
-    known. ``drawing`` goes on where there are no figures yet, ``testing`` beside those there are; ``untested`` says
+    known. ``drawing`` goes on where there are no figures yet, ``testing`` besides those there are; ``untested`` says
     that this was stopped.
     """
 
@@ -132,11 +132,11 @@ def in_figures(sessions: Sequence[SessionFacts]) -> tuple[str, str]:
     inside = [one for one in sessions if one.counts]
     head = f"{len(inside)} of {counted(len(sessions), 'session')} in the figures"
     if not sessions:
-        return "No session yet", ""
+        return "No sessions yet", ""
     excluded = [one.name for one in sessions if one.excluded is not None]
     open_ones = [one.name for one in sessions if one.excluded is None and not one.counts]
-    told = [_are(open_ones, "not complete"), _are(excluded, "excluded")]
-    line = "; ".join(filter(None, told))
+    parts = [_are(open_ones, "not complete"), _are(excluded, "excluded")]
+    line = "; ".join(filter(None, parts))
     return head, f"{line}." if line else ""
 
 

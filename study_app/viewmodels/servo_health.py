@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.viewmodels.number_words import duration_words, grouped
+
 Floats = NDArray[np.float64]
+Verdict = Literal["ok", "late", "open"]
 
 LATENESS_WINDOW_S = 60
 RATE_WINDOW_TICKS = 2000
@@ -34,6 +37,17 @@ class Vitals:
     frame_rate_hz: float | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """A number with its unit, a verdict and a line that says what the verdict compares with."""
+
+    title: str
+    value: str
+    unit: str
+    verdict: Verdict
+    line: str
+
+
 class ServoHealth:
     """Takes telemetry and painted frames as they come; gives figures, a histogram and traces when asked.
 
@@ -50,7 +64,7 @@ class ServoHealth:
     def __init__(self, rate_hz: float, refresh_hz: float = 60.0) -> None:
         self.rate_hz = rate_hz
         self.refresh_hz = refresh_hz
-        self._lateness_ns = np.zeros(int(LATENESS_WINDOW_S * rate_hz), np.int64)
+        self.lateness_ns = np.zeros(int(LATENESS_WINDOW_S * rate_hz), np.int64)
         self._latenesses = 0
         self._recent = np.zeros((RATE_WINDOW_TICKS, 2), np.int64)  # tick, time [ns]
         self._ticks = 0
@@ -69,7 +83,7 @@ class ServoHealth:
         count = len(samples)
         if count == 0:
             return
-        _into_ring(self._lateness_ns, self._latenesses, np.asarray(samples.lateness_ns))
+        _into_ring(self.lateness_ns, self._latenesses, np.asarray(samples.lateness_ns))
         _into_ring(self._recent, self._ticks, np.column_stack((samples.tick, samples.time_ns)))
         self._latenesses += count
         self._ticks += count
@@ -129,7 +143,7 @@ class ServoHealth:
         return path[:, 0] - now_s, path[:, 1:]
 
     def _kept(self) -> NDArray[np.int64]:
-        return self._lateness_ns[: min(self._latenesses, len(self._lateness_ns))]
+        return self.lateness_ns[: min(self._latenesses, len(self.lateness_ns))]
 
     def _rate(self) -> float | None:
         kept = min(self._ticks, len(self._recent))
@@ -149,3 +163,45 @@ def _into_ring(ring: NDArray[Any], written: int, rows: NDArray[Any]) -> None:
     first = min(len(rows), len(ring) - start)
     ring[start : start + first] = rows[:first]
     ring[: len(rows) - first] = rows[first:]
+
+
+def health_tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, ...]:
+    """Return the tiles of the operator's window; ``rate_hz`` was asked for, ``limit_s`` is the limit of lateness."""
+    rate = vitals.rate_hz
+    p99 = vitals.lateness_p99_s
+    p99_value, _, p99_unit = duration_words(p99).partition(" ") if p99 is not None else ("–", "", "")
+    screen = f", {vitals.frame_rate_hz:.1f} Hz" if vitals.frame_rate_hz else ""
+    return (
+        Tile(
+            "Servo rate",
+            "–" if rate is None else f"{rate:.1f}",
+            "Hz",
+            "open" if rate is None else _verdict(abs(rate - rate_hz) <= 0.01 * rate_hz),
+            f"requested: {rate_hz:.0f} Hz",
+        ),
+        Tile(
+            "Lateness, p99",
+            p99_value,
+            p99_unit,
+            "open" if p99 is None else _verdict(p99 <= limit_s),
+            f"limit {duration_words(limit_s)}",
+        ),
+        Tile(
+            "Overruns",
+            grouped(vitals.overruns),
+            "",
+            "open" if vitals.ticks == 0 else _verdict(vitals.overruns <= vitals.ticks * 1e-4),
+            f"of {grouped(vitals.ticks)} ticks",
+        ),
+        Tile(
+            "Refreshes missed",
+            grouped(vitals.refreshes_missed),
+            "",
+            "open" if vitals.refreshes == 0 else _verdict(vitals.refreshes_missed <= 0.01 * vitals.refreshes),
+            f"of {grouped(vitals.refreshes)}{screen}",
+        ),
+    )
+
+
+def _verdict(within: bool) -> Verdict:
+    return "ok" if within else "late"

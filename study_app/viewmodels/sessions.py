@@ -12,6 +12,8 @@ from typing import Any, Literal, TypeAlias
 from study_app.errors import StoreError
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.sessions.folder_lock import is_open
 from study_app.store.tables.participants import participants_at_once
 
 Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]
@@ -22,7 +24,12 @@ SAMPLE = "sample-"
 
 @dataclass(frozen=True, slots=True)
 class SessionFacts:
-    """A session as a row shows it; ``excluded`` is why all of it is left out of the analysis, None where it is not."""
+    """A session as a row shows it.
+
+    ``status`` is the table's, or "running" where a program has the session open. ``excluded`` is why the analysis
+    excludes all of it, None where it does not; ``lost`` counts recordings that could not be stored, ``reconnected`` how
+    often the device failed and was connected again.
+    """
 
     participant: str
     session: int
@@ -36,6 +43,8 @@ class SessionFacts:
     pilot: bool
     folder: Path
     excluded: str | None = None
+    lost: int = 0
+    reconnected: int = 0
 
     @property
     def kind(self) -> Kind:
@@ -79,32 +88,35 @@ def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts
 def session_facts(
     study: Path, rows: Iterable[Mapping[str, Any]], listed: Iterable[Exclusion], answers_of: Mapping[str, int]
 ) -> list[SessionFacts]:
-    """Return the rows of a study's participants as facts; ``listed`` is what is left out of the analysis."""
+    """Return the rows of a study's participants as facts; ``listed`` is what is excluded from the analysis."""
     reasons = {(one.participant, one.session): one.reason for one in listed if one.trial is None}
-    placed = [(row, StudyFolder(study).session(row["participant"], int(row["session"])).path) for row in rows]
+    placed = [(row, StudyFolder(study).session(row["participant"], int(row["session"]))) for row in rows]
+    counts = [journal.count_events(session.journal, "recording_lost", "device_reconnected") for _, session in placed]
     return [
         SessionFacts(
             participant=row["participant"],
             session=int(row["session"]),
             study=str(row["study"]),
-            started=_started(row["session_started_at"], folder),
-            status=row["status"],
+            started=_started(row["session_started_at"], session.path),
+            status="running" if row["status"] == "unfinished" and is_open(session.path) else row["status"],
             validity=row["validity"],
             answers=int(row["responses"] or 0),
             answers_of=answers_of.get(row["study"]),
             simulated=bool(row["simulated"]),
             pilot=bool(row["pilot"]),
-            folder=folder,
+            folder=session.path,
             excluded=reasons.get((row["participant"], int(row["session"]))),
+            lost=lost,
+            reconnected=reconnected,
         )
-        for row, folder in placed
+        for (row, session), (lost, reconnected) in zip(placed, counts, strict=True)
     ]
 
 
-def _started(told: object, folder: Path) -> datetime:
+def _started(time: object, folder: Path) -> datetime:
     """Return when a session began; where its journal is too damaged to tell, when its folder last changed."""
     with contextlib.suppress(ValueError):
-        return datetime.fromisoformat(str(told))
+        return datetime.fromisoformat(str(time))
     with contextlib.suppress(OSError):
         return datetime.fromtimestamp(folder.stat().st_mtime).astimezone()
     return datetime.fromtimestamp(0).astimezone()

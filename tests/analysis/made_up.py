@@ -12,7 +12,8 @@ import pandas as pd
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting
 from study_app.analysis.tables.planned_analysis import NOTHING, Decided
 from study_app.analysis.tables.study import Study
-from study_app.store.tables.columns import RESPONSES, TRIALS, Column
+from study_app.store.tables.column import Column
+from study_app.store.tables.columns import RESPONSES, TRIALS
 
 TYPES = {"text": "string", "time": "string", "integer": "Int64", "number": "Float64", "flag": "boolean"}
 ITEMS = ("different", "harder")

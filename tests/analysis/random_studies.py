@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.block_results import plain
-from study_app.analysis.findings.section_failures import Failures
 from study_app.analysis.report import number_files, summary
 from study_app.analysis.report.block_section import block
 from study_app.analysis.report.first_page.page import first_page
+from study_app.analysis.report.json_values import plain
 from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.r_script import r_script
+from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.tables.study import Study
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study
 

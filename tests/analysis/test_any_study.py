@@ -6,8 +6,10 @@ import pytest
 
 from tests.analysis.random_studies import check
 
+pytestmark = pytest.mark.slow
+
 STUDIES = 12
-"""tests/benchmarks/random_studies.py checks 2,000."""
+"""tests/benchmarks/analysis/random_studies.py checks 2,000."""
 
 
 @pytest.mark.parametrize("number", range(STUDIES))

@@ -13,12 +13,23 @@ import pytest
 from scipy.stats import binom
 
 from study_app.analysis.designs.block_tests import of_tables
-from study_app.analysis.designs.liquids import pairs_of
 from study_app.analysis.designs.verdicts import judged
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings import item_test
-from study_app.analysis.findings.block_results import BlockFound, Results, plain
-from study_app.analysis.findings.conduct import delivered, orders
+from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
+from study_app.analysis.findings.contrast_with_control import equivalent_up_to
+from study_app.analysis.findings.delay_trend import FINDING as TREND
+from study_app.analysis.findings.detection_threshold import FINDING as THRESHOLD
+from study_app.analysis.findings.liquid_recognition import FINDING as RECOGNITION
+from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
+from study_app.analysis.findings.other_assumptions import FINDING as AGAIN
+from study_app.analysis.findings.over_all_statements import FINDING as OVERALL
+from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
+from study_app.analysis.findings.pair_comparison import pairs_of
+from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
+from study_app.analysis.report.json_values import plain
+from study_app.analysis.results import item_test
+from study_app.analysis.results.block_results import BlockFound, Results
+from study_app.analysis.results.conduct import delivered, orders
 from study_app.analysis.statistics.friedman import friedman
 from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
 from study_app.analysis.statistics.paired import paired
@@ -29,6 +40,8 @@ from study_app.errors import AnalysisError
 from study_app.protocol.load import load, parse, source_bytes
 from tests.analysis.conftest import Answer, make_results, twelve
 from tests.analysis.conftest import Results as Folder
+
+pytestmark = pytest.mark.slow
 
 DECIDED = Decided(True, False, 0.05, 1.0, ("a", "b"), (), (), (), None)
 
@@ -109,31 +122,31 @@ def of_twelve(tmp_path_factory: pytest.TempPathFactory) -> tuple[BlockFound, Blo
 def test_the_thesis_study_of_twelve(of_twelve: tuple[BlockFound, BlockFound]) -> None:
     liquids, delays = of_twelve
     assert liquids.names == ("Water", "Honey", "Light oil")
-    assert liquids.overall is not None
-    assert liquids.overall.n == 12
-    assert [one.item for one in liquids.omnibus] == [item.id for item in liquids.items]
-    assert {(one.members, one.correction, one.primary) for one in liquids.omnibus} == {(9, "Holm", True)}
+    assert OVERALL.of(liquids) is not None
+    assert OVERALL.of(liquids).n == 12
+    assert [one.item for one in OMNIBUS.of(liquids)] == [item.id for item in liquids.items]
+    assert {(one.members, one.correction, one.primary) for one in OMNIBUS.of(liquids)} == {(9, "Holm", True)}
     assert (
-        {one.tested.item for one in liquids.pairs}
-        == {one.item for one in liquids.omnibus if one.verdict == "shown"}
+        {one.tested.item for one in PAIRS.of(liquids)}
+        == {one.item for one in OMNIBUS.of(liquids) if one.verdict == "shown"}
         != set()
     )
-    assert {one.tested.members for one in liquids.pairs} == {len(liquids.pairs)}
-    assert len(liquids.pairs) % 3 == 0
-    assert liquids.named is not None
-    assert liquids.named.right == ("like_water", "like_honey", "like_oil")
-    assert sum(map(sum, liquids.named.found.table)) == 36
-    assert len(liquids.mixed) == 9
+    assert {one.tested.members for one in PAIRS.of(liquids)} == {len(PAIRS.of(liquids))}
+    assert len(PAIRS.of(liquids)) % 3 == 0
+    assert RECOGNITION.of(liquids) is not None
+    assert RECOGNITION.of(liquids).right == ("like_water", "like_honey", "like_oil")
+    assert sum(map(sum, RECOGNITION.of(liquids).found.table)) == 36
+    assert len(AGAIN.of(liquids).mixed) == 9
     assert list(delays.delays_ms) == [0, 50, 75, 100, 125, 150, 200]
-    assert [one.outcome.method.split("(")[1][:-1] for one in delays.trends] == ["increasing"] * 4 + ["decreasing"]
-    assert {one.verdict for one in delays.trends} == {"shown"}
-    assert all(one.steps.lowest_ms is not None for one in delays.lowest)
-    assert len(delays.against) == 5 * 6
-    assert {(one.control_ms, one.found.bound) for one in delays.against} == {(0.0, 1.0)}
-    assert delays.threshold is not None
-    assert delays.threshold.effect is not None
-    assert 50 < delays.threshold.effect < 200
-    assert not delays.omnibus
+    assert [one.outcome.method.split("(")[1][:-1] for one in TREND.of(delays)] == ["increasing"] * 4 + ["decreasing"]
+    assert {one.verdict for one in TREND.of(delays)} == {"shown"}
+    assert all(one.steps.lowest_ms is not None for one in LOWEST.of(delays))
+    assert len(CONTRASTS.of(delays)) == 5 * 6
+    assert {(one.control_ms, one.found.bound) for one in CONTRASTS.of(delays)} == {(0.0, 1.0)}
+    assert THRESHOLD.of(delays) is not None
+    assert THRESHOLD.of(delays).effect is not None
+    assert 50 < THRESHOLD.of(delays).effect < 200
+    assert not OMNIBUS.of(delays)
     assert not (*liquids.absent, *delays.absent)
 
 
@@ -141,15 +154,15 @@ def test_equivalence_goes_up_from_the_shortest_delay_and_stops_at_the_first_that
     of_twelve: tuple[BlockFound, BlockFound],
 ) -> None:
     _, delays = of_twelve
-    for item, up_to in (delays.equivalent_up_to or {}).items():
-        verdicts = [one.verdict == "equivalent" for one in delays.against if one.item == item]
+    for item, up_to in equivalent_up_to(CONTRASTS.of(delays)).items():
+        verdicts = [one.verdict == "equivalent" for one in CONTRASTS.of(delays) if one.item == item]
         run = verdicts.index(False) if False in verdicts else len(verdicts)
         assert up_to == ([None, *delays.delays_ms[1:]][run])
 
 
 def test_of_five_no_pair_and_no_model_is_there_and_it_says_why(rek: Folder) -> None:
     liquids, delays = blocks(opened(rek, 5))
-    assert (liquids.pairs, liquids.mixed, delays.mixed) == ((), (), ())
+    assert (PAIRS.of(liquids), AGAIN.of(liquids).mixed, AGAIN.of(delays).mixed) == ((), (), ())
     assert [one.what for one in liquids.absent] == ["comparison of two settings", "mixed model of the settings"]
     assert "5 participants cannot show it: the smallest p that 5 pairs can give is 0.0625" in liquids.absent[0].why
     assert "0.1875, which is above 0.05" in liquids.absent[0].why
@@ -172,10 +185,17 @@ def test_while_sealed_only_codes_are_compared(rek: Folder) -> None:
     results = found(rek)
     for block in results.blocks:
         assert block.names == tuple(block.settings[place].code for place in range(len(block.settings)))
-        assert len(block.omnibus) == len(block.items)
-        assert {one.outcome.test for one in block.omnibus} == {"Friedman"}
-        assert {block.pairs, block.named, block.trends, block.lowest, block.against, block.mixed} == {(), None}
-        assert (block.overall, block.threshold, block.delays_ms) == (None, None, ())
+        assert len(OMNIBUS.of(block)) == len(block.items)
+        assert {one.outcome.test for one in OMNIBUS.of(block)} == {"Friedman"}
+        assert {
+            PAIRS.of(block),
+            RECOGNITION.of(block),
+            TREND.of(block),
+            LOWEST.of(block),
+            CONTRASTS.of(block),
+            AGAIN.of(block).mixed,
+        } == {(), None}
+        assert (OVERALL.of(block), THRESHOLD.of(block), block.delays_ms) == (None, None, ())
         assert all("after unblinding" in one.why for one in block.absent)
     assert results.performance is None
     assert [one.what for one in results.blocks[1].absent] == [
@@ -189,16 +209,16 @@ def test_codes_and_names_give_the_same_friedman(rek: Folder) -> None:
     sealed, _ = blocks(rek)
     rek.open()
     known, _ = blocks(rek)
-    assert [one.outcome.p for one in sealed.omnibus] == pytest.approx([one.outcome.p for one in known.omnibus])
+    assert [one.outcome.p for one in OMNIBUS.of(sealed)] == pytest.approx([one.outcome.p for one in OMNIBUS.of(known)])
 
 
 def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
     results = found(opened(without("all", tmp_path / "rek2024"), 8))
     liquids, delays = results.blocks
     assert not results.decided.made
-    assert {one.primary for one in liquids.omnibus} == {False}
-    assert {one.correction for one in liquids.omnibus} == {"Benjamini-Hochberg"}
-    assert "shown" not in {one.verdict for one in liquids.omnibus}
+    assert {one.primary for one in OMNIBUS.of(liquids)} == {False}
+    assert {one.correction for one in OMNIBUS.of(liquids)} == {"Benjamini-Hochberg"}
+    assert "shown" not in {one.verdict for one in OMNIBUS.of(liquids)}
     why = {one.what: one.why for one in (*liquids.absent, *delays.absent)}
     assert "chosen by the answers" in why["test of equivalence"]
     assert "does not say which statements name" in why["test of recognition"]
@@ -208,8 +228,8 @@ def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
 
 def test_a_bound_that_was_not_decided_is_not_made_up(tmp_path: Path) -> None:
     _, delays = blocks(opened(without("equivalence_bound", tmp_path / "rek2024"), 8))
-    assert (delays.against, delays.equivalent_up_to) == ((), {})
-    assert len(delays.trends) == 5
+    assert CONTRASTS.entries(delays) == {"against": (), "equivalent_up_to": {}}
+    assert len(TREND.of(delays)) == 5
 
 
 @pytest.mark.parametrize("level", [1, 4, 7])
@@ -220,10 +240,10 @@ def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int)
     results = found(rek)
     json.dumps(plain(results), allow_nan=False)
     liquids, delays = results.blocks
-    assert {one.verdict for one in (*liquids.omnibus, *delays.trends)} == {"not tested"}
-    assert {one.found.verdict for one in delays.against} == {"equivalent"}  # eleven of eleven did not move
-    assert liquids.named is not None
-    assert liquids.named.found.undecided == 33
+    assert {one.verdict for one in (*OMNIBUS.of(liquids), *TREND.of(delays))} == {"not tested"}
+    assert {one.found.verdict for one in CONTRASTS.of(delays)} == {"equivalent"}  # eleven of eleven did not move
+    assert RECOGNITION.of(liquids) is not None
+    assert RECOGNITION.of(liquids).found.undecided == 33
 
 
 def test_levels_that_nobody_chose_change_nothing(rek: Folder, tmp_path: Path) -> None:
@@ -235,7 +255,7 @@ def test_levels_that_nobody_chose_change_nothing(rek: Folder, tmp_path: Path) ->
     rek.open()
     other.open()
     for one, two in zip(blocks(rek), blocks(other), strict=True):
-        for mine, theirs in zip((*one.omnibus, *one.trends), (*two.omnibus, *two.trends), strict=True):
+        for mine, theirs in zip((*OMNIBUS.of(one), *TREND.of(one)), (*OMNIBUS.of(two), *TREND.of(two)), strict=True):
             assert mine.outcome.p == pytest.approx(theirs.outcome.p)
 
 
@@ -259,16 +279,16 @@ def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder)
     rek.add("P100", missing)
     rek.open()
     liquids, _ = blocks(rek)
-    one = next(one for one in liquids.omnibus if one.item == "immersive")
+    one = next(one for one in OMNIBUS.of(liquids) if one.item == "immersive")
     assert (one.outcome.n, one.outcome.dropped) == (8, 1)
     assert one.outcome.p == pytest.approx(whole["immersive"].p)
-    assert [other.item for other in liquids.incomplete] == ["immersive"]
-    assert liquids.incomplete[0].outcome.n == 9
+    assert [other.item for other in AGAIN.of(liquids).incomplete] == ["immersive"]
+    assert AGAIN.of(liquids).incomplete[0].outcome.n == 9
     assert next(row for row in liquids.measures if row["item"] == "immersive" and row["missing"])["n"] == 8
 
 
 def _omnibus(folder: Folder) -> tuple:  # type: ignore[type-arg]
-    return found(folder).blocks[0].omnibus
+    return OMNIBUS.of(found(folder).blocks[0])
 
 
 def test_two_settings_are_compared_as_a_pair(small: Folder) -> None:
@@ -281,8 +301,8 @@ def test_two_settings_are_compared_as_a_pair(small: Folder) -> None:
         small.add(f"P{number:03d}", answer)
     small.open()
     (block,) = found(small).blocks
-    assert {one.outcome.test for one in block.omnibus} == {"Wilcoxon signed ranks"}
-    assert block.omnibus[0].outcome.p == pytest.approx(2 / 2**8)
+    assert {one.outcome.test for one in OMNIBUS.of(block)} == {"Wilcoxon signed ranks"}
+    assert OMNIBUS.of(block)[0].outcome.p == pytest.approx(2 / 2**8)
 
 
 @pytest.mark.parametrize("n", [12, 24])

@@ -7,13 +7,16 @@ from dataclasses import replace
 import pytest
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.words import all_of, percent
+from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
 from study_app.analysis.report.block_section import block
 from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.r_script import r_script
 from study_app.analysis.report.summary import findings
+from study_app.analysis.results.words import all_of, percent
 from study_app.analysis.tables.study import Study
 from tests.analysis.made_up import DECIDED, delays, everybody, liquids, study
+
+pytestmark = pytest.mark.slow
 
 LEVELS = (0.0, 50.0, 100.0)
 
@@ -61,15 +64,15 @@ def test_a_difference_that_could_not_be_shown_has_no_p() -> None:
     few = study_of(4)
     results = evaluate(few, planning=False)
     (found,) = results.blocks
-    assert {one.verdict for one in found.against} == {"out of reach"}
+    assert {one.verdict for one in CONTRASTS.of(found)} == {"out of reach"}
     assert "<td>out of reach</td>" in " ".join(block(found, results, ())).replace(' class="n"', "")
 
 
 def test_the_verdict_of_unanimity_holds_after_the_correction() -> None:
     made = study_of(12)
     (found,) = evaluate(made, planning=False).blocks
-    assert {one.verdict for one in found.against if one.delay_ms > 0} == {"different"}
-    assert all(one.found.interval is None for one in found.against)
+    assert {one.verdict for one in CONTRASTS.of(found) if one.delay_ms > 0} == {"different"}
+    assert all(one.found.interval is None for one in CONTRASTS.of(found))
 
 
 @pytest.mark.parametrize(("longest_ms", "verdict"), [(50.0, "different"), (200.0, "inconclusive")])
@@ -81,9 +84,9 @@ def test_the_verdict_of_one_of_many_comparisons_is_the_corrected_one(longest_ms:
 
     settings = delays([ms for ms in (0.0, 50.0, 100.0, 150.0, 200.0) if ms <= longest_ms])
     (found,) = evaluate(study(settings, list(everybody(settings, 10, answer))), planning=False).blocks
-    assert found.against[0].found.p_difference is not None
-    assert found.against[0].found.p_difference <= 0.05 / 2
-    assert found.against[0].verdict == verdict
+    assert CONTRASTS.of(found)[0].found.p_difference is not None
+    assert CONTRASTS.of(found)[0].found.p_difference <= 0.05 / 2
+    assert CONTRASTS.of(found)[0].verdict == verdict
 
 
 def test_all_statements_are_told_as_a_reader_would() -> None:

@@ -22,12 +22,13 @@ from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import Trial, build_schedule, draw_key, stream
 from study_app.protocol.wording.languages import words
 from study_app.session.trial import SETTLED_S
+from study_app.store.progress import Progress
 from study_app.viewmodels.operator import Session
-from study_app.viewmodels.session_stages import SessionProgress, stages
+from study_app.viewmodels.session.stages import stages
 from tests.compiled import needs_servo
 from tests.session.fakes import FakeJournal
 
-pytestmark = needs_servo
+pytestmark = [pytest.mark.slow, needs_servo]
 
 TRIAL_S = 1.0
 ODD_S = (0.0, 0.0503, 0.1, 0.2)
@@ -44,22 +45,22 @@ class Room:
         self.journal = FakeJournal([])
         session = Session(
             protocol=self.protocol,
+            schedule=self.schedule,
             stages=stages(self.protocol, self.schedule),
             who="Participant P001",
             expected_s=10.0,
             answers_of=0,
             lateness_limit_s=0.002,
             device_name="Scripted hand",
-            device_kind="simulated",
+            device_icon="fast_forward",
             device_rows=(),
         )
         parts = Parts(
             session=session,
-            schedule=self.schedule,
             key=self.key,
             language="en",
             servo=servo,
-            journal=WatchedJournal(self.journal, SessionProgress(self.protocol, self.schedule), self.seconds),
+            journal=WatchedJournal(self.journal, Progress(), self.seconds),
             clock=self.seconds,
             aim_m=lambda: (0.0, 0.0, 0.0),
             recorder=self,
@@ -78,7 +79,7 @@ class Room:
         self.frames = []
         self.bridge = SessionBridge(parts, participant, operator)
         self.bridge.start()
-        self.bridge._frames.stop()
+        self.bridge.frames.stop()
 
     def seconds(self):
         return self.servo.now_ns() / 1e9
@@ -87,7 +88,7 @@ class Room:
 
     lost, dropped = (), 0
 
-    def start(self, trial, _attempt, _rate_hz):
+    def start(self, trial, _attempt, _rate_hz, _interval=None):
         self.frames.append((trial, []))
 
     def append(self, samples):
@@ -118,7 +119,7 @@ def room(qapp, monkeypatch):
         made = Room(servo)
         yield made
         if isValid(made.bridge):
-            made.bridge._leave()
+            made.bridge.leave_now()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
@@ -133,7 +134,7 @@ def test_what_is_drawn_is_of_the_moment_that_was_asked_for_at_every_delay(room):
         seen += 1
         samples.append(reader.read())
         count = len(room.frames[-1][1]) if room.frames else 0
-        room.bridge._frame()
+        room.bridge.draw_frame()
         trial, frames = room.frames[-1]
         if len(frames) != count + 1:
             continue  # the first frame of the next trial comes with the next
@@ -146,9 +147,9 @@ def test_what_is_drawn_is_of_the_moment_that_was_asked_for_at_every_delay(room):
             continue
         expected_m = [np.interp(sample_ns, at, places[:, axis]) for axis in range(3)]
         tank = room.bridge.participant.tank
-        if tank is not None and tank._view.sample_time_ns == sample_ns:
-            assert tank._view.position_m == pytest.approx(expected_m, abs=1e-12)
-            assert tank._ball == tank._placer.place(tuple(tank._view.position_m))
+        if tank is not None and tank.view.sample_time_ns == sample_ns:
+            assert tank.view.position_m == pytest.approx(expected_m, abs=1e-12)
+            assert tank.ball == tank.placer.place(tuple(tank.view.position_m))
             compared += 1
     assert compared > 40 * len(ODD_S)
     assert {room.delay_s(trial) for trial, _ in room.frames} == set(ODD_S)
@@ -166,9 +167,9 @@ def test_plots_and_bookkeeping_take_nothing_from_a_frame(room, monkeypatch):
         )
     room.bridge.participant.painted.connect(lambda _sample_ns: order.append("painted"))
     room.servo.advance(17)
-    room.bridge._slack._works[1].done_ns = room.bridge._slack._works[2].done_ns = None
-    monkeypatch.setattr(type(room.bridge._frames), "next_ns", 1 << 62)
-    room.bridge._frame()
+    room.bridge.budget.tasks[1].done_ns = room.bridge.budget.tasks[2].done_ns = None
+    monkeypatch.setattr(type(room.bridge.frames), "next_ns", 1 << 62)
+    room.bridge.draw_frame()
     assert order == ["show_view", "painted", "look", "show_traces", "show_forces"]
 
 
@@ -178,7 +179,7 @@ def test_a_session_of_delays_is_held_and_its_recordings_are_read(qapp, monkeypat
     monkeypatch.setattr(held, "VIRTUAL_HZ", (60.0,))
     lines = []
     found = held.delays(0.5, "gui", tell=lines.append)
-    assert lines == ["virtual, 60 Hz, the tank alone", "virtual, 60 Hz, beside the cockpit"]
+    assert lines == ["virtual, 60 Hz, tank alone", "virtual, 60 Hz, with the cockpit"]
     assert found.loads == ("none", "gui")
     for load in found.loads:
         trials = found.on("virtual, 60 Hz", load)

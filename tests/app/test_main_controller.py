@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.main_controller import MainController
 from study_app.app.session import live_session
+from study_app.app.session.termination import BY_SIGNAL_S
 from study_app.errors import DeviceLost, DeviceNotFound
 from study_app.gui.home.main_window import FULL, LEAST
 from study_app.gui.theme.theme import DARK
@@ -44,6 +46,7 @@ def visit(qapp: Any, tmp_path: Path) -> Any:
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["back", "signal"])
 def test_a_device_that_opens_after_all_is_let_go_of_before_the_end(
     visit: MainController, monkeypatch: Any, how: str
@@ -57,7 +60,7 @@ def test_a_device_that_opens_after_all_is_let_go_of_before_the_end(
 
     monkeypatch.setattr(live_session, "open_rig", open_slowly)
     monkeypatch.setattr(live_session, "measured", lambda *_words, **_named: None)
-    visit._start(CHOSEN)
+    visit.window.place("home").session_asked.emit(CHOSEN)
     assert opening.wait(10)
     assert visit.live is not None
     if how == "back":
@@ -72,11 +75,34 @@ def test_a_device_that_opens_after_all_is_let_go_of_before_the_end(
     assert machine.stopped
 
 
+@pytest.mark.slow
+def test_a_signal_waits_two_seconds_at_most_for_a_device_that_is_being_opened(
+    visit: MainController, monkeypatch: Any
+) -> None:
+    opening, may_open = threading.Event(), threading.Event()
+
+    def hang(*_words: Any, **_named: Any) -> Machine:
+        opening.set()
+        may_open.wait(30)
+        return Machine()
+
+    monkeypatch.setattr(live_session, "open_rig", hang)
+    visit.window.place("home").session_asked.emit(CHOSEN)
+    assert opening.wait(10)
+    begun = time.monotonic()
+    visit.end_by_signal(15)
+    visit.end()
+    took_s = time.monotonic() - begun
+    may_open.set()
+    assert took_s < BY_SIGNAL_S + 1.0
+    assert visit.code == 128 + 15
+
+
 def test_one_session_at_a_time(visit: MainController, monkeypatch: Any) -> None:
     monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
-    visit._start(CHOSEN)
+    visit.window.place("home").session_asked.emit(CHOSEN)
     first = visit.live
-    visit._start(CHOSEN)
+    visit.window.place("home").session_asked.emit(CHOSEN)
     assert visit.live is first
     visit.live = None
 
@@ -86,10 +112,10 @@ def test_a_session_that_was_not_begun_is_told_so(visit: MainController, monkeypa
         raise DeviceNotFound("no Falcon is connected: plug it in")
 
     monkeypatch.setattr(live_session, "open_rig", refuse)
-    visit._start(CHOSEN)
+    visit.window.place("home").session_asked.emit(CHOSEN)
     qtbot.waitUntil(lambda: visit.window.notice is not None)
     assert visit.window.notice is not None
-    assert visit.window.notice.windowTitle() == "The session was not begun"
+    assert visit.window.notice.windowTitle() == "The session did not start"
 
 
 def test_a_mistake_before_the_first_window_leads_home_again(
@@ -99,11 +125,11 @@ def test_a_mistake_before_the_first_window_leads_home_again(
         raise TypeError("nobody is there")
 
     monkeypatch.setattr(live_session, "OpeningWindow", broken)
-    visit._start(CHOSEN)
+    visit.window.place("home").session_asked.emit(CHOSEN)
     assert visit.window.isVisible()
     assert visit.live is None
     assert visit.window.notice is not None
-    assert visit.window.notice.windowTitle() == "The session was stopped by a mistake in the program"
+    assert visit.window.notice.windowTitle() == "A bug in the program stopped the session"
     assert "nobody is there" in capsys.readouterr().err
 
 
@@ -112,11 +138,11 @@ def test_a_device_that_is_gone_at_the_end_does_not_keep_the_window_away(
 ) -> None:
     machine = Machine(lost=True)
     monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
-    visit._start(CHOSEN)
+    visit.window.place("home").session_asked.emit(CHOSEN)
     live = visit.live
     assert live is not None
-    live._machine = machine  # type: ignore[assignment]
-    live._cancel()
+    live.machine = machine  # type: ignore[assignment]
+    live.cancel()
     assert machine.stopped
     assert visit.window.isVisible()
     assert visit.window.notice is not None
@@ -124,10 +150,10 @@ def test_a_device_that_is_gone_at_the_end_does_not_keep_the_window_away(
 
 def test_a_theme_that_was_changed_in_the_cockpit_stays(visit: MainController, monkeypatch: Any) -> None:
     monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
-    visit._start(CHOSEN)
+    visit.window.place("home").session_asked.emit(CHOSEN)
     assert visit.live is not None
     visit.live.theme = DARK
-    visit.live._cancel()
+    visit.live.cancel()
     assert visit.window.theme is DARK
     assert visit.machine.settings.theme == "dark"
 

@@ -12,9 +12,9 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from study_app.analysis.analyst import AnalysisClient
 from study_app.analysis.worker import carry_out
-from study_app.analysis.worker_messages import Answer, Order, Refused
+from study_app.analysis.worker_client import start_analysis_worker
+from study_app.analysis.worker_messages import Answer, Order
 from study_app.app.results import ResultsController
 from study_app.errors import StudyError
 from study_app.gui.home.main_window import MainWindow
@@ -23,7 +23,10 @@ from study_app.gui.widgets.main_view import Place
 from study_app.store.blinded.blinding import reveals
 from study_app.store.exclusions import exclude, exclusions
 from study_app.store.folders import StudyFolder
+from study_app.workers.messages import Crashed, Refused
 from tests.studies import rehearsed
+
+pytestmark = pytest.mark.slow
 
 SOON_MS = 120_000
 """A process loads its libraries anew, on machines that do other things too."""
@@ -33,7 +36,7 @@ class Here:
     """Carries out orders here and at once, in place of a process; tells the answers when it is asked."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[int, Answer]] = []
+        self.told: list[tuple[int, Answer | Refused | Crashed]] = []
         self.number = 0
         self.works = True
         self.stops = False
@@ -43,7 +46,9 @@ class Here:
         self.number += 1
         number = self.number
         try:
-            last: Answer = carry_out(order, lambda answer: self.told.append((number, answer)), lambda: self.stops)
+            last: Answer | Refused = carry_out(
+                order, lambda answer: self.told.append((number, answer)), lambda: self.stops
+            )
         except StudyError as error:
             last = Refused(str(error), stopped=self.stops)
         self.told.append((number, last))
@@ -52,7 +57,7 @@ class Here:
     def stop(self) -> None:
         self.stops = True
 
-    def answers(self) -> list[tuple[int, Answer]]:
+    def answers(self) -> list[tuple[int, Answer | Refused | Crashed]]:
         told, self.told = self.told, []
         return told
 
@@ -63,10 +68,10 @@ class Here:
 class Opened:
     """A main window with results, and what was opened from there."""
 
-    def __init__(self, qtbot: QtBot, results: Path, analyst: Callable[[], Any] = Here) -> None:
+    def __init__(self, qtbot: QtBot, results: Path, start_worker: Callable[[], Any] = Here) -> None:
         self.qtbot = qtbot
         self.files: list[Path] = []
-        self.desk = ResultsController(results, opener=self.files.append, analyst=analyst)
+        self.desk = ResultsController(results, opener=self.files.append, start_worker=start_worker)
         self.place = self.desk.place
         self.window = MainWindow({"home": Place, "results": lambda: self.place})
         qtbot.addWidget(self.window)
@@ -167,7 +172,7 @@ def test_what_the_store_refuses_is_said(shown: Opened, results: Path) -> None:
     shown.place.sessions.rows.table.selectRow(0)
     shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
     assert shown.window.notice is not None
-    assert shown.window.notice.windowTitle() == "It was not left out"
+    assert shown.window.notice.windowTitle() == "It was not excluded"
     assert len(exclusions(results / "demo")) == 1
     assert shown.place.sessions.why.text() == "P001 is excluded."
     shown.click(shown.window.notice.close_button)
@@ -203,7 +208,7 @@ def test_what_cannot_be_written_is_said_in_the_dialog(shown: Opened, tmp_path: P
 def test_with_no_study_there_is_one_sentence_and_the_way_home(qtbot: QtBot, tmp_path: Path) -> None:
     opened = Opened(qtbot, tmp_path / "none")
     assert opened.desk.view.trouble is not None
-    assert opened.place.figures.trouble.title.text() == "No study yet"
+    assert opened.place.figures.trouble.title.text() == "No studies yet"
     opened.click(opened.place.figures.trouble.button)
     assert opened.window.here == "home"
     assert not (tmp_path / "none").exists()
@@ -225,7 +230,7 @@ def test_a_results_folder_that_is_none_is_told_and_looked_at_again(qtbot: QtBot,
 def test_a_study_without_a_session_says_so(qtbot: QtBot, tmp_path: Path) -> None:
     (tmp_path / "results" / "new" / "data").mkdir(parents=True)
     opened = Opened(qtbot, tmp_path / "results")
-    assert opened.place.figures.trouble.title.text() == "No session yet"
+    assert opened.place.figures.trouble.title.text() == "No sessions yet"
     assert not opened.place.report.isEnabled()
 
 
@@ -290,11 +295,33 @@ def test_what_is_stopped_can_be_gone_on_with(qtbot: QtBot, results: Path) -> Non
     assert len(opened.titles) == 2
 
 
+def test_a_process_that_crashes_is_said_and_looked_at_again(qtbot: QtBot, results: Path) -> None:
+    made: list[Here] = []
+
+    class Crashes(Here):
+        def order(self, order: Order) -> int:
+            if len(made) > 1:
+                return super().order(order)
+            self.number += 1
+            self.told, self.works = [(self.number, Crashed(1))], False
+            return self.number
+
+    def crashing() -> Here:
+        made.append(Crashes())
+        return made[-1]
+
+    opened = Opened(qtbot, results, crashing)
+    assert opened.place.figures.trouble.title.text() == "A bug in the program stopped the evaluation"
+    opened.click(opened.place.figures.trouble.button)
+    opened.wait()
+    assert len(opened.titles) == 2
+
+
 def test_leaving_ends_what_reads(shown: Opened) -> None:
-    reader: Any = shown.desk._reader
+    reader: Any = shown.desk.reader
     shown.window.go("home")
     assert reader.closed
-    assert shown.desk._reader is None
+    assert shown.desk.reader is None
     shown.window.go("results")
     shown.wait()
     assert len(shown.titles) == 2
@@ -309,13 +336,13 @@ def test_other_results_can_be_looked_at(shown: Opened, tmp_path: Path) -> None:
 
 
 def nobody_left() -> bool:
-    return not any(child.name == "analyst" for child in multiprocessing.active_children())
+    return not any(child.name == "analysis" for child in multiprocessing.active_children())
 
 
 def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_left(
     qtbot: QtBot, results: Path, tmp_path: Path
 ) -> None:
-    opened = Opened(qtbot, results, AnalysisClient)
+    opened = Opened(qtbot, results, start_analysis_worker)
     assert opened.titles == ["Agreement for each setting", "Answers by delay setting"]
     assert not nobody_left()
     opened.click(opened.place.report)
@@ -339,12 +366,11 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
 
 
 def test_a_process_that_ends_by_itself_is_told_and_begun_again(qtbot: QtBot, results: Path) -> None:
-    opened = Opened(qtbot, results, AnalysisClient)
-    reader: Any = opened.desk._reader
+    opened = Opened(qtbot, results, start_analysis_worker)
+    reader: Any = opened.desk.reader
     opened.desk.look()
-    reader._process.kill()
-    opened.wait()
-    assert "mistake in the program" in opened.place.figures.trouble.title.text()
+    reader.process.kill()
+    qtbot.waitUntil(lambda: "bug in the program" in opened.place.figures.trouble.title.text(), timeout=SOON_MS)
     opened.click(opened.place.figures.trouble.button)
     opened.wait()
     assert len(opened.titles) == 2

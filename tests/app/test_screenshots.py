@@ -14,6 +14,8 @@ from study_app.app.screenshots.capture import Camera
 from study_app.errors import StudyError
 from tests.compiled import needs_servo
 
+pytestmark = pytest.mark.slow
+
 
 @needs_servo
 def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, monkeypatch):
@@ -45,7 +47,7 @@ def test_a_session_that_cannot_be_taken_is_let_go_of(qapp, tmp_path, monkeypatch
         raise StudyError("no picture")
 
     monkeypatch.setattr(session_pictures, "TRACED_MS", 0)
-    monkeypatch.setattr(session_pictures._Session, "take_cockpit", fails)
+    monkeypatch.setattr(session_pictures.PicturedSession, "take_cockpit", fails)
     monkeypatch.setattr("study_app.session.start.MEASURED_S", 0.1)
     with pytest.raises(StudyError, match="no picture"):
         screenshots(tmp_path, only="single-blind", tell=lambda _line: None)
@@ -55,7 +57,7 @@ def test_a_session_that_cannot_be_taken_is_let_go_of(qapp, tmp_path, monkeypatch
 
 def test_what_does_not_come_is_named(qapp, tmp_path, monkeypatch):
     monkeypatch.setattr(capture, "PATIENCE_S", 0.1)
-    with pytest.raises(StudyError, match="in vain for the figures"):
+    with pytest.raises(StudyError, match="the figures did not appear"):
         Camera(tmp_path, print).until(lambda: None, "the figures")
 
 

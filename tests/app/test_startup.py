@@ -7,6 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.slow
+
 HEAVY = ("matplotlib", "numba", "pandas", "pyarrow", "pyqtgraph", "scipy")
 
 HOME = """
@@ -49,7 +53,7 @@ print(sorted({name.partition(".")[0] for name in sys.modules}))
 
 
 BESIDE = """
-import gc, threading
+import gc, sys, threading
 from PySide6.QtCore import QObject
 from study_app.app.session.live_session import load_windows
 from study_app.gui.application import application_here
@@ -58,6 +62,7 @@ application = application_here()
 beside = threading.Thread(target=load_windows)
 beside.start()
 beside.join()
+assert {"study_app.app.session.preflight_controller", "study_app.app.session.windows"} <= set(sys.modules)
 objects = [one for one in gc.get_objects() if isinstance(one, QObject)]
 assert application in objects
 print([one for one in objects if one.thread() != application.thread()])

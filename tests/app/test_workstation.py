@@ -17,7 +17,7 @@ from study_app.app.devices import DevicesController
 from study_app.app.main_controller import MainController
 from study_app.app.session.live_session import LiveSession
 from study_app.app.workstation import WorkstationController, described, settings_here, text_scale_on
-from study_app.devices.backends import NONE, READY, Backend
+from study_app.devices.descriptor import NONE, READY, Backend
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.dialogs import Notice
 from study_app.session.request import NewSession
@@ -67,7 +67,7 @@ def test_settings_that_cannot_be_kept_are_told_and_count_all_the_same(desk, qtbo
     settings_file().parent.write_text("")  # a file where the folder should be
     with qtbot.waitSignal(desk.troubled) as told:
         desk.change({"theme": "dark"})
-    assert "could not be kept" in told.args[0]
+    assert "could not be saved" in told.args[0]
     assert desk.settings.theme == "dark"
     settings_file().parent.unlink()
 
@@ -91,7 +91,7 @@ def test_the_place_shows_what_is_set_and_sets_what_is_typed(desk, qtbot):
     qtbot.mouseClick(place.undo, Qt.MouseButton.LeftButton)
     assert not load().sound
     assert not place.windows.sound.isChecked()
-    assert place.kept_in.accessibleName() == f"Kept in {settings_file()}"
+    assert place.kept_in.accessibleName() == f"Saved in {settings_file()}"
 
 
 def test_the_receipt_says_distance_width_and_offset_of_the_participants_screen(qapp):
@@ -106,6 +106,7 @@ def test_the_receipt_says_distance_width_and_offset_of_the_participants_screen(q
     assert "viewing_distance_mm" not in screens["operator"]
 
 
+@pytest.mark.slow
 def test_devices_are_looked_for_beside_the_windows_one_look_at_a_time(desk, qtbot):
     looks, may_end, where = [], threading.Event(), []
 
@@ -129,7 +130,7 @@ def test_devices_are_looked_for_beside_the_windows_one_look_at_a_time(desk, qtbo
     assert devices.preferred.word == "Ready"
     place.chosen.emit("falcon")
     assert (load().device, devices.preferred.word) == ("falcon", "Not connected")
-    place.firmware_chosen.emit("/there/firmware.bin")
+    place.option_chosen.emit("firmware", "/there/firmware.bin")
     assert load().firmware == "/there/firmware.bin"
 
 
@@ -192,11 +193,12 @@ def test_the_display_test_is_one_click_from_home(visit, qtbot):
         qtbot.keyClick(test, Qt.Key.Key_Escape)
 
 
+@pytest.mark.slow
 def test_a_damaged_file_is_told_when_the_window_opens(qtbot, tmp_path, monkeypatch):
     monkeypatch.setattr(workstation, "load_or_default", lambda: (DEFAULTS, "the file is no JSON"))
     made = MainController(tmp_path)
     qtbot.addWidget(made.window)
-    made.devices._look = lambda: [MOUSE]
+    made.devices.backends = lambda: [MOUSE]
     with qtbot.waitSignal(made.devices.looked):
         made.open()
     assert made.window.notice.isVisible()
@@ -208,12 +210,12 @@ def test_a_diagnosis_ends_when_the_place_is_left(visit, qtbot, monkeypatch):
     begun = []
 
     class Examined:
-        def __init__(self, name, firmware):
-            self.asked = name, firmware
+        def __init__(self, name, options):
+            self.asked = name, options
             self.closed = False
             begun.append(self)
 
-        def said(self):
+        def answers(self):
             return []
 
         def close(self):
@@ -221,14 +223,14 @@ def test_a_diagnosis_ends_when_the_place_is_left(visit, qtbot, monkeypatch):
 
     monkeypatch.setattr("study_app.app.devices.DiagnosisDialog", _with(Examined))
     visit.machine.change({"device": "falcon:FT1", "firmware": "/there/firmware.bin"})
-    visit.devices._look = lambda: [MOUSE, FALCON]
+    visit.devices.backends = lambda: [MOUSE, FALCON]
     visit.window.show()
     visit.window.go("devices")
     with qtbot.waitSignal(visit.devices.looked):
         visit.devices.look()
     row = visit.devices.place.people.rows["falcon"]
     qtbot.mouseClick(row.diagnose, Qt.MouseButton.LeftButton)
-    assert [(name, str(firmware)) for name, firmware in (one.asked for one in begun)] == [
+    assert [(name, str(options["firmware"])) for name, options in (one.asked for one in begun)] == [
         ("falcon:FT1", "/there/firmware.bin")
     ]
     visit.window.go("home")
@@ -260,10 +262,10 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qt
     qtbot.addWidget(operator)
     operator.show()
     live.bridge = SimpleNamespace(operator=operator)
-    live._diagnose()
+    live.diagnose()
     assert asked == ([] if held is None else [(device, held)])
     assert [notice.windowTitle() for notice in operator.findChildren(Notice)] == (
-        ["There is nothing to examine"] if held is None else []
+        ["There is nothing to diagnose"] if held is None else []
     )
 
 
@@ -271,8 +273,8 @@ def test_a_session_opens_on_the_screen_that_is_set_unless_another_was_chosen(qap
     monkeypatch.setattr("study_app.app.session.live_session.choose_screens", lambda number: number)
     monkeypatch.setattr("study_app.app.session.live_session.screen_number", lambda _settings: 2)
     chosen = NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, Path("nowhere"))
-    assert LiveSession(chosen, LIGHT)._screens() == 2
-    assert LiveSession(replace(chosen, screen=1), LIGHT)._screens() == 1
+    assert LiveSession(chosen, LIGHT).screens() == 2
+    assert LiveSession(replace(chosen, screen=1), LIGHT).screens() == 1
 
 
 def test_what_is_found_after_the_end_is_not_shown(qtbot, desk):
@@ -292,7 +294,7 @@ def test_what_is_found_after_the_end_is_not_shown(qtbot, desk):
     devices.end()
     devices.look()  # as a timer may ask that was set before
     QApplication.processEvents()
-    assert (found, devices._thread) == ([], None)
+    assert (found, devices.looking) == ([], None)
 
 
 def test_initials_are_remembered_and_survive_a_change_taken_back(qapp):

@@ -5,9 +5,13 @@ from types import SimpleNamespace
 import numba
 import pytest
 
-from study_app.devices.backends import NONE, NOT_HERE, READY, backends
+from study_app.devices.backends import backends
+from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY
 from study_app.devices.falcon.failures import UsbFailure
+from study_app.devices.falcon.probe import probe as probe_falcon
+from study_app.devices.falcon.probe import probe_ftdi
 from study_app.devices.registry import list_devices
+from study_app.devices.spacemouse.probe import probe as probe_spacemouse
 from study_app.devices.spacemouse.reports import MODELS
 
 
@@ -22,8 +26,14 @@ def bus(*emulators):
     return EmulatedBackend(*emulators)
 
 
-def by_name(**given):
-    return {(one.name, one.by.split()[0]): one for one in backends(**{"usb": bus(), "hid": hid(), **given})}
+def by_name(*, usb=None, spacemice=None, d2xx=None, platform="linux"):
+    hardware = [
+        *probe_spacemouse(spacemice or hid()),
+        probe_falcon(usb or bus(), platform),
+        probe_ftdi(d2xx, platform),
+    ]
+    looked_for = {(one.name, one.by.split()[0]): one for one in backends()}
+    return looked_for | {(one.name, one.by.split()[0]): one for one in hardware}
 
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="the emulated bus is compiled")
@@ -39,13 +49,13 @@ def test_without_hardware_each_says_what_is_missing():
     assert listed["mouse", "the"].state == READY
     for key in (("falcon", "libusb"), ("spacemouse", "hidapi")):
         assert listed[key].state == NONE
-        assert "plug" in listed[key].why
+        assert "connect" in listed[key].why
 
 
 def test_what_is_connected_is_named():
     from study_app.devices.falcon.emulator.emulator import Emulator
 
-    listed = by_name(usb=bus(Emulator(serial="FT1"), Emulator(serial="FT2")), hid=hid(MODELS[1], MODELS[1]))
+    listed = by_name(usb=bus(Emulator(serial="FT1"), Emulator(serial="FT2")), spacemice=hid(MODELS[1], MODELS[1]))
     assert listed["falcon", "libusb"].state == "connected: FT1, FT2"
     assert listed["falcon", "libusb"].why == ""
     assert listed["spacemouse", "hidapi"].state == "connected: SpaceNavigator"
@@ -67,7 +77,7 @@ def test_one_that_does_not_tell_its_number_says_why_that_may_be(platform, words)
 
 def test_ftdis_driver_is_for_windows(monkeypatch):
     assert "Windows" in by_name(platform="linux")["falcon", "ftd2xx"].why
-    assert by_name(platform="win32", d2xx=object())["falcon", "ftd2xx"].state == READY
+    assert by_name(platform="win32", d2xx=object())["falcon", "ftd2xx"].state == DRIVER_READY
 
     def missing():
         raise UsbFailure("no-ftd2xx", "loading FTDI's driver library")
@@ -83,8 +93,8 @@ def test_a_hidapi_that_does_not_load_is_told(monkeypatch):
         raise OSError(f"no {name}")
 
     monkeypatch.setattr(spacemouse_hid, "import_module", missing)
-    spacemouse = by_name(hid=None)["spacemouse", "hidapi"]
-    assert spacemouse.state == NOT_HERE
+    spacemouse = next(one for one in backends() if one.name == "spacemouse")
+    assert spacemouse.state == NOT_AVAILABLE
     assert "pip install hidapi" in spacemouse.why
 
 

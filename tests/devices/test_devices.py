@@ -8,7 +8,7 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices.registry import is_falcon, is_simulated, kind_of, list_devices, moves_by_itself, open_device
+from study_app.devices.registry import descriptor_of, list_devices, open_device
 from study_app.errors import DeviceNotFound
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
 from study_app.haptics.model.layout import new_reading
@@ -123,17 +123,17 @@ def test_an_unknown_device_is_refused_with_those_there_are():
 @pytest.mark.parametrize("name", ["mouse:2", "falcon-emulated:x", "falcon-sockets:x", ":"])
 def test_a_device_of_a_kind_that_has_but_one_is_not_known(name):
     with pytest.raises(DeviceNotFound, match="is not known"):
-        kind_of(name)
+        descriptor_of(name)
 
 
 def test_a_socket_needs_its_path():
     with pytest.raises(DeviceNotFound, match="falcon-socket:PATH"):
         open_device("falcon-socket")
-    assert kind_of("falcon-socket:/run/falcon:1") == "falcon-socket"
+    assert descriptor_of("falcon-socket:/run/falcon:1").name == "falcon-socket"
 
 
 @pytest.mark.parametrize(
-    ("name", "falcon", "by_itself", "simulated"),
+    ("name", "firmware", "by_itself", "simulated"),
     [
         ("mouse", False, False, False),
         ("falcon", True, False, False),
@@ -144,8 +144,10 @@ def test_a_socket_needs_its_path():
         ("falcon-socket:/x", True, False, True),
     ],
 )
-def test_who_holds_a_device_follows_from_its_name(name, falcon, by_itself, simulated):
-    assert (is_falcon(name), moves_by_itself(name), is_simulated(name)) == (falcon, by_itself, simulated)
+def test_who_holds_a_device_follows_from_its_name(name, firmware, by_itself, simulated):
+    device = descriptor_of(name)
+    assert [option.name for option in device.options] == ["firmware"] * firmware
+    assert (device.doctor is not None, device.moves_by_itself, device.simulated) == (firmware, by_itself, simulated)
 
 
 def test_naming_the_devices_loads_no_compiler():

@@ -14,12 +14,14 @@ if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
 from study_app.cli import commands
-from study_app.cli.devices import _Terminal
-from study_app.devices.falcon.diagnosis import MODES, UDEV_RULE
+from study_app.cli.devices import Terminal
 from study_app.devices.falcon.doctor.examine import examine
 from study_app.devices.falcon.emulator.emulator import Emulator
+from study_app.devices.falcon.failure_modes import MODES, UDEV_RULE
 from study_app.devices.falcon.mechanics.calibration import calibration_file, load
 from study_app.devices.registry import list_devices
+
+pytestmark = pytest.mark.slow
 
 
 def liquid_study(*words, **options):
@@ -37,7 +39,7 @@ def test_the_list_names_every_device_with_what_it_can_do(words):
     assert listed.exit_code == 0
     for name in (*list_devices(), "falcon-socket:PATH"):
         assert f"\n{name} " in "\n" + listed.output
-    assert "seen, not felt" in listed.output
+    assert "visual only, no force" in listed.output
     assert "libusb" in listed.output
 
 
@@ -47,7 +49,7 @@ class TestDoctor:
         assert told.exit_code == 0, told.output
         assert told.output.startswith("Preparing …\n")
         assert (
-            "Nothing wrong was found. Not looked at: the servo keeps its rate, and the force does not jump."
+            "Nothing wrong was found. Not checked: the servo keeps its rate, and the force does not jump."
             in told.output
         )
         assert told.output.count(" ok ") >= 15
@@ -58,7 +60,7 @@ class TestDoctor:
         assert told.exit_code == 3
         rows = [line for line in told.output.splitlines() if line[:2].strip().isdigit()]
         assert "FOUND" in rows[0]
-        for state in ("not looked at", " ok "):
+        for state in ("not checked", " ok "):
             numbers = [int(row[:2]) for row in rows if state in row]
             assert numbers == sorted(numbers)
         assert len(rows) == len(MODES)
@@ -127,7 +129,7 @@ class TestTheTerminal:
     def pipe(self):
         reading, writing = os.pipe()
         with os.fdopen(writing, "wb", buffering=0) as typing:
-            yield _Terminal(reading), typing
+            yield Terminal(reading), typing
         os.close(reading)
 
     def until(self, answered):
@@ -154,7 +156,7 @@ class TestCalibrate:
         told = liquid_study("calibrate", "--device", "falcon-emulated", "--grams", "400")
         assert told.exit_code == 0, told.output
         assert "Hang the weight of 400 g" in told.output
-        assert "motor units for a newton metre" in told.output
+        assert "motor units per newton metre" in told.output
         assert len([line for line in told.output.splitlines() if " +0.0" in line or " -0.0" in line]) >= 20
         file = calibration_file("EMULATED-WEIGHED")
         assert str(file) in told.output

@@ -8,7 +8,8 @@ if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
 from study_app.devices.mouse import MouseDevice
-from study_app.haptics.model.scene import Liquid, Scene, Wake
+from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.scene import Liquid, Scene
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 
@@ -101,6 +102,7 @@ def test_a_pointer_outside_the_workspace_counts_as_its_border():
 pointers = st.lists(st.tuples(st.tuples(*[st.floats(-0.2, 0.2)] * 3), st.integers(1, 250)), min_size=1, max_size=20)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("liquid", LIQUIDS)
 @settings(deadline=None, max_examples=25)
 @given(pointers)

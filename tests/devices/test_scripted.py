@@ -75,7 +75,7 @@ def test_an_order_that_is_half_written_is_left_for_later():
     readings = Readings(device)
     device.hold(0.01, 0, 0)
     readings.after(1)
-    hand = device._state.hand
+    hand = device.state.hand
     hand.serial += 1
     hand.posted.target_m = (0.02, 0.0, 0.0)
     readings.after(1)
@@ -231,7 +231,7 @@ def test_the_hand_moves_to_the_same_bits_as_plain_ieee_arithmetic():
     """So no machine's fused multiplication or sine can make it another hand."""
     target = (0.03, 0.02, 0.01)
     device = ScriptedDevice(Random(7))  # noqa: S311
-    hand = device._state.hand
+    hand = device.state.hand
     device.reach_to(*target)
     readings = Readings(device)
     readings.after(1)

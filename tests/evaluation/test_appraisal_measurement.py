@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import io
-import json
 import math
-import os
-import signal
 from dataclasses import replace
 
 import numba
@@ -16,9 +12,10 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("costs are those of compiled code", allow_module_level=True)
 
+from study_app.errors import StudyError
 from study_app.evaluation import appraisal_measurement
 from study_app.evaluation.appraisal import Costs
-from study_app.evaluation.appraisal_worker import Appraiser, serve
+from study_app.evaluation.appraisal_worker import Question, appraise, start_appraisal_worker
 from study_app.evaluation.fastest import withheld_share
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.liquid import Box
@@ -26,7 +23,9 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Line, Raw
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.load import load, load_scenes
-from study_app.protocol.trials.task import Explore, Reach, Stroke, fastest_stroke
+from study_app.protocol.trials.tasks.explore import Explore
+from study_app.protocol.trials.tasks.reach import Reach
+from study_app.protocol.trials.tasks.stroke import Stroke
 
 THESIS, PHYSICAL = load_scenes("rek2024"), load_scenes("physical_liquids")
 SHAKE = Stroke(5.0, 0.03)
@@ -37,11 +36,11 @@ def test_costs_name_every_effect_and_why_it_is_not_there() -> None:
     found = {it.effect: it for it in appraisal_measurement.costs(THESIS["water"], batches=5).effects}
     assert found["wake"].ns is not None
     assert found["wake"].ns > 0
-    assert (found["history"].ns, found["history"].why) == (None, "not asked for")
+    assert (found["history"].ns, found["history"].why) == (None, "not used")
     chosen = {it.effect: it for it in appraisal_measurement.costs(PHYSICAL["water"], batches=5).effects}
     assert chosen["buoyancy"].ns is None
     assert chosen["buoyancy"].why.startswith("out, 0.")
-    assert chosen["current"].why == "not asked for"
+    assert chosen["current"].why == "not used"
 
 
 @pytest.mark.parametrize("name", ["water", "light_oil", "syrup"])
@@ -90,14 +89,14 @@ def test_the_lag_of_a_filter_is_that_of_its_closed_form(velocity: Ewma, lag_ms: 
 
 def test_an_exploration_may_be_shaken_and_a_reach_goes_as_far_as_its_targets() -> None:
     tank_m = (0.1, 0.06, 0.06)
-    assert fastest_stroke(Explore(kind="explore", min_s=1, max_s=3, instruction="Explore."), tank_m) == SHAKE
-    assert fastest_stroke(Explore(kind="explore", min_s=1, max_s=3, instruction="Explore."), (0.04, 0.06, 0.06)) == (
+    assert Explore(kind="explore", min_s=1, max_s=3, instruction="Explore.").fastest_stroke(tank_m) == SHAKE
+    assert Explore(kind="explore", min_s=1, max_s=3, instruction="Explore.").fastest_stroke((0.04, 0.06, 0.06)) == (
         5.0,
         0.02,
     )
     reach = load("rek2024").tasks["reach"]
     assert isinstance(reach, Reach)
-    stroke = fastest_stroke(reach, tank_m)
+    stroke = reach.fastest_stroke(tank_m)
     following = zip(reach.targets_m, (*reach.targets_m[1:], reach.targets_m[0]), strict=True)
     assert 2 * stroke.amplitude_m == pytest.approx(max(math.dist(*pair) for pair in following))
     assert stroke.frequency_hz == pytest.approx(1 / 0.6)
@@ -136,44 +135,39 @@ def test_what_is_withheld_depends_on_the_device_and_the_rate() -> None:
     assert set(delays) == {3}
 
 
-def test_the_process_answers_the_newest_question_and_ends_when_told() -> None:
-    appraiser = Appraiser()
+@pytest.mark.slow
+def test_the_process_answers_the_newest_question_and_ends_when_closed() -> None:
+    worker = start_appraisal_worker()
     try:
-        appraiser.ask(THESIS["honey"])
+        worker.order(Question(THESIS["honey"]))
         device = Dynamics(2e-3, mass_kg=0.05)
-        newest = appraiser.ask(THESIS["light_oil"], QUICK, device)
+        newest = worker.order(Question(THESIS["light_oil"], QUICK, device))
         answered: dict[int, list[object]] = {}
         while len(answered.get(newest, [])) < 2:
-            told = appraiser.answers(wait_s=120.0)  # the first time it compiles
+            told = worker.answers(wait_s=120.0)  # the first time it compiles
             assert told
             for number, answer in told:
                 answered.setdefault(number, []).append(answer)
+        assert answered[1][-1] is None, "it was given up for the newer one"
         first, second = answered[newest]
         assert isinstance(first, Costs)
         assert [it.effect for it in first.effects if it.ns is not None] == ["drag", "wake"]
         share = withheld_share(THESIS["light_oil"], QUICK, device)
         assert share != withheld_share(THESIS["light_oil"], QUICK, UNKNOWN)
         assert second == replace(appraisal_measurement.errors(THESIS["light_oil"]), withheld=share)
-        assert appraiser.works
+        assert worker.works
     finally:
-        appraiser.close()
-    assert not appraiser.works
-    appraiser._listening.join(20.0)
-    assert appraiser._process.returncode is not None
-    appraiser.ask(THESIS["honey"])
-    assert appraiser.answers() == []
+        worker.close()
+    assert not worker.works
+    worker.wait_until_ended()
+    assert worker.ended
+    worker.order(Question(THESIS["honey"]))
+    assert worker.answers() == []
 
 
-def test_what_cannot_be_measured_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "nice", lambda _by: 0)  # the tests go on in this process
+def test_what_cannot_be_measured_is_said() -> None:
     wild = THESIS["water"].model_copy(update={"rate_hz": 100.0})  # slower than any loop that is known to be stable
-    question = json.dumps({"number": 7, "scene": wild.model_dump(mode="json")})
-    out = io.StringIO()
-    before = signal.getsignal(signal.SIGINT)
-    try:
-        serve([question], out)
-    finally:
-        signal.signal(signal.SIGINT, before)
-    (told,) = (json.loads(line) for line in out.getvalue().splitlines())
-    assert told["number"] == 7
-    assert "no stable force is known" in told["why"]
+    told: list[object] = []
+    with pytest.raises(StudyError, match="no stable force is known"):
+        appraise(Question(wild), told.append, lambda: False)
+    assert told == []

@@ -6,7 +6,9 @@ import pytest
 
 from study_app.evaluation import cost
 from study_app.evaluation.cost import hand, measure, report
-from study_app.haptics.model.scene import Box, Liquid, Scene, Uniform, Wake
+from study_app.haptics.model.effects.current import Uniform
+from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.scene import Box, Liquid, Scene
 from tests.haptics.scenes import COMPILED
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="measures compiled code")
@@ -33,14 +35,14 @@ class Clock:
         def run(bench, ticks):
             self.now_ns += ticks * cost_ns(bench.scene)
 
-        original = cost._Bench.__init__
+        original = cost.Bench.__init__
 
         def begin(bench, scene):
             bench.scene = scene
             original(bench, scene)
 
-        monkeypatch.setattr(cost._Bench, "__init__", begin)
-        monkeypatch.setattr(cost._Bench, "_run", run)
+        monkeypatch.setattr(cost.Bench, "__init__", begin)
+        monkeypatch.setattr(cost.Bench, "run", run)
 
 
 PRICES = {"drag": 2, "wake": 40, "current": 5, "buoyancy": 3, "surface": 7, "added_mass": 11, "history": 90}
@@ -68,7 +70,7 @@ def test_a_report_has_the_gates_table_with_costs_and_the_whole(monkeypatch):
     lines = report(Scene(liquids=(RIVER,)), batches=1).splitlines()
     assert lines[0].startswith("river: effects named")
     assert [line.split()[3] for line in lines[2:4]] == ["2", "40"]
-    assert lines[-1] == "one tick: 62 ns, 0.01 % of the time between two; 20 ns of it without any liquid"
+    assert lines[-1] == "one tick: 62 ns, 0.01 % of the tick period; 20 ns of it without liquids"
 
 
 def test_the_servos_own_tick_is_what_is_measured():

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from study_app.evaluation.reference_model import respond, wakes
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Given, Liquid, Scene, Wake
+from study_app.haptics.model.scene import Given, Liquid, Scene
 
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from study_app.errors import StudyError
 from study_app.evaluation import reference_solutions
 from study_app.evaluation.hand_motions import stir, with_velocity
 from study_app.evaluation.reference_model import exact_wakes, respond, wakes
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Drag, Given, Liquid, MotionBox, Scene, Wake
+from study_app.haptics.model.scene import Given, Liquid, MotionBox, Scene
 from tests.haptics.scenes import COMPILED
 
 HONEY = Liquid(id="honey", density_kg_m3=1420, viscosity_pa_s=10)
@@ -130,41 +131,6 @@ def test_the_start_has_the_published_factors():
     assert case.counted[10:].all()
 
 
-TABLE = """# title: start and stop
-# density_kg_m3: 1420
-# viscosity_pa_s: 10
-# diameter_m: 0.068
-# computing_s_per_s: 1.5
-# command: solve it
-# machine: two cores
-t_s,velocity_mps,force_n
-0,0,0
-0.01,0.1,-1
-0.02,0.1,-0.9
-"""
-
-
-def test_a_stored_table_is_taken_for_its_own_liquid_alone(tmp_path):
-    (tmp_path / "start.csv").write_text(TABLE, encoding="utf-8")
-    (tmp_path / "steady.csv").write_text("reynolds,drag_coefficient\n1,27\n", encoding="utf-8")
-    (truth,) = reference_solutions.stored(scene(), tmp_path)
-    (case,) = truth.cases
-    assert (truth.name, truth.computing_s, truth.machine) == ("start and stop", 1.5, "two cores")
-    assert len(case.motion.t_s) == 20
-    assert case.motion.velocity_mps[5, 0] == pytest.approx(0.05)
-    assert case.force_n[5, 0] == pytest.approx(-0.5)
-    assert case.motion.position_m[10, 0] == pytest.approx(0.5e-3)
-    assert reference_solutions.stored(scene(HONEY.model_copy(update={"viscosity_pa_s": 1.41})), tmp_path) == ()
-    assert reference_solutions.stored(scene(), tmp_path / "absent") == ()
-
-
-@pytest.mark.parametrize("broken", [TABLE.replace("0.9", "?"), TABLE.replace("# diameter_m: 0.068\n", "")])
-def test_a_stored_table_that_is_broken_is_named(tmp_path, broken):
-    (tmp_path / "start.csv").write_text(broken, encoding="utf-8")
-    with pytest.raises(StudyError, match=r"start\.csv cannot be used"):
-        reference_solutions.stored(scene(), tmp_path)
-
-
 def test_a_stirring_hand_brings_the_velocities_of_its_places():
     motion = stir(10, 1000)
     by_differences = with_velocity(Motion(motion.t_s, motion.position_m)).velocity_mps
@@ -174,6 +140,7 @@ def test_a_stirring_hand_brings_the_velocities_of_its_places():
     assert not speed_mps[3100:3900].any()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="many thousands of elements")
 def test_the_exact_definition_agrees_with_the_literal_one_on_a_whole_motion():
     water = Liquid(

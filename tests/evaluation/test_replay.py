@@ -36,13 +36,13 @@ from study_app.session.transitions.events import (
 from study_app.store import recording_files
 from study_app.store.clock import SessionClock
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.reopen import reopen
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.session import small
-from tests.store.verification.forging import Lines, forge
+from tests.store.forging import Lines, forge
 
 pytestmark = needs_servo
 
@@ -65,14 +65,16 @@ def begun(folder: Path, device: ScriptedDevice, servo: Servo) -> SessionStore:
         folder,
         small.protocol(),
         b"small",
-        "P001",
-        seed=1,
-        operator="",
-        language="en",
-        device=device.describe(),
-        screens={},
-        simulated=True,
-        recordings=True,
+        SessionStart(
+            "P001",
+            seed=1,
+            operator="",
+            language="en",
+            device=device.describe(),
+            screens={},
+            simulated=True,
+            recordings=True,
+        ),
         clock=SessionClock(servo.now_ns),
     )
 
@@ -201,6 +203,24 @@ def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tm
         replay(place)
 
 
+@pytest.mark.parametrize("ticks", [200, 450, 550, 650])
+def test_a_trial_soon_after_a_short_preflight_comes_out_to_the_last_bit(tmp_path: Path, ticks: int) -> None:
+    """The recording begins while the servo's start fade is under way, of which 0.1 s are over by then."""
+    with ScriptedDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        servo.advance(100)
+        with begun(tmp_path / "results", device, servo) as store:
+            runner, wait = held(store, device, servo)
+            runner.post(Begin(store.clock.seconds()))
+            wait(ticks - 100)
+            runner.post(Continue(store.clock.seconds()))
+            wait(1500)
+            runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
+            place: Path = store.folder.path
+    found = replay(place)
+    assert (found.differences, found.uncompared) == ((), ())
+    assert (found.recordings, found.proved) == (1, True)
+
+
 def rewrite(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
     """Change the columns of a recording and keep its checks, as a mistake or a forger would."""
     facts = parquet.read_metadata(path).metadata[b"liquid_study"]
@@ -251,14 +271,14 @@ def test_recordings_that_are_lost_or_missing_are_named(rehearsed: Path, tmp_path
     found = replay(place)
     assert found.uncompared == (
         "trial 1, attempt 1: has no recording: the disk was full",
-        "trial 2, attempt 1: has no recording: no line of the journal says why",
+        "trial 2, attempt 1: has no recording: the journal gives no reason",
     )
     assert (found.recordings, found.differences, found.missing) == (2, (), ())
     assert found.proved
     (place / "recordings" / "trial-004.parquet").unlink()
     found = replay(place)
     assert found.missing == (
-        "trial 4, attempt 1: recordings/trial-004.parquet is missing, though the journal tells of it",
+        "trial 4, attempt 1: recordings/trial-004.parquet is missing, but the journal mentions it",
     )
     assert (found.recordings, found.proved) == (1, False)
 
@@ -270,7 +290,7 @@ def test_what_goes_on_from_a_lost_recording_is_not_said_to_differ(tmp_path: Path
     found = replay(place)
     assert len(found.missing) == 1
     assert found.uncompared == tuple(
-        f"trial 1, attempt {attempt}: goes on from the force of a recording that is not there, or has a gap"
+        f"trial 1, attempt {attempt}: continues from the force of a recording that is missing or has a gap"
         for attempt in (2, 3, 4)  # each began while the one before it could still be felt
     )
     assert (found.recordings, found.differences) == (1, ())
@@ -289,7 +309,7 @@ def test_a_receipt_that_lacks_what_ran_is_one_sentence(rehearsed: Path, tmp_path
     receipt = json.loads((place / "receipt.json").read_text())
     for changed, said in (
         ({other: value for other, value in receipt.items() if other != name}, f"lacks '{name}': restore it"),
-        (receipt | {name: "?"}, f"is no receipt .{name} is '.'"),
+        (receipt | {name: "?"}, f"is not a receipt .{name} is '.'"),
     ):
         (place / "receipt.json").write_text(json.dumps(changed))
         with pytest.raises(StoreError, match=said) as raised:

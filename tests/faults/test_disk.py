@@ -49,6 +49,7 @@ def answers(world: StoredWorld) -> list[tuple[str, str, str]]:
         return [(row["trial"], row["item"], row["response"]) for row in csv.DictReader(file)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phase", [Phase.READING, Phase.TASK, Phase.ANSWERING])
 @pytest.mark.parametrize("room", [0, 1, 40])
 def test_a_disk_that_fills_up_is_waited_for_and_nothing_is_lost_or_doubled(

@@ -20,6 +20,7 @@ from tests.compiled import needs_servo
 FROZEN_S = 1.5
 
 pytestmark = [
+    pytest.mark.slow,
     needs_servo,
     pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="needs a system that stops processes"),
 ]

@@ -10,18 +10,20 @@ from typing import Any
 import pytest
 
 from study_app.protocol.load import load
+from study_app.protocol.orders.block_orders import orders_of
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.tables import session_tables
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults.support import short
-from tests.faults.support.killer_runs import needs_fork, outcomes_of
+from tests.faults.support.killer_runs import outcomes_of
+from tests.platforms import needs_fork
 
 TIMES = {"answered_at", "onset_s", "first_choice_s", "last_change_s", "attempt"}
 WHAT_RAN = ("trial", "block", "phase", "part", "index", "of", "code", "outcome")
 
-pytestmark = [needs_servo, needs_fork]
+pytestmark = [pytest.mark.slow, needs_servo, needs_fork]
 
 
 def session(study: Path) -> SessionFolder:
@@ -53,11 +55,18 @@ def last_attempts(study: Path) -> list[tuple[str, ...]]:
     return [tuple(str(row[name]) for name in WHAT_RAN) for row in session_tables.latest(typed(rows(study, "trials")))]
 
 
-@pytest.mark.parametrize(("resume", "count"), [("trial", 35), ("block", 15)])
+@pytest.mark.parametrize(
+    ("resume", "count"),
+    [
+        ("trial", 35),
+        ("block", 15),
+        pytest.param("trial", 2000, marks=[pytest.mark.nightly, pytest.mark.timeout(4 * 3600)]),
+    ],
+)
 def test_killed_at_random_moments_a_session_is_completed_as_if_nothing_had_been(
     tmp_path: Path, resume: str, count: int
 ) -> None:
-    outcomes = outcomes_of("killer", short.write(tmp_path, resume=resume), tmp_path, count, 1)
+    outcomes = outcomes_of("killer", short.write(tmp_path, resume=resume), tmp_path, count, 1, limit_s=150 + 5 * count)
     assert len(outcomes) == count
     whole = tmp_path / "whole"
     interrupted = 0
@@ -76,7 +85,7 @@ def test_killed_at_random_moments_a_session_is_completed_as_if_nothing_had_been(
         assert lines[-1]["status"] == "completed"
         assert answers(study) == answers(whole)
         assert last_attempts(study) == last_attempts(whole)
-        assert len(answers(study)) == short.ANSWERS == load(str(tmp_path / "short.toml")).responses_per_participant()
+        assert len(answers(study)) == short.ANSWERS == orders_of(load(str(tmp_path / "short.toml"))).answers
         told_answers(before, rows(study, "responses"))
     assert interrupted >= count / 3
     study = next(Path(outcome["folder"]) for outcome in outcomes if outcome["resumed"] == 0)

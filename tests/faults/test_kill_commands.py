@@ -12,9 +12,10 @@ from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.command_killer import COMMANDS
-from tests.faults.support.killer_runs import needs_fork, outcomes_of
+from tests.faults.support.killer_runs import outcomes_of
+from tests.platforms import needs_fork
 
-pytestmark = [needs_servo, needs_fork]
+pytestmark = [pytest.mark.slow, needs_servo, needs_fork]
 
 
 @pytest.fixture(scope="module")

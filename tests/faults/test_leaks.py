@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from PySide6.QtWidgets import QApplication
 
 from study_app import app
 from study_app.gui.operator import OperatorWindow
@@ -23,9 +23,9 @@ from study_app.store.folders import StudyFolder
 from study_app.store.verification.leaks import Telltales, leaks, telltales
 from tests.compiled import needs_servo
 from tests.faults.support import short
-from tests.faults.support.windows import Person
+from tests.faults.support.windows import Person, traces_of, words_of
 
-pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
+pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
 
 # Ids, parameters and delays that occur nowhere by chance.
 CONCEALED = (
@@ -62,30 +62,6 @@ def concealed(tmp_path: Path, blinding: str) -> Path:
         assert found, pattern
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def words_of(top: QWidget) -> set[str]:
-    """Return all that a window says: titles, texts, tips and names for those who cannot see."""
-    found = {top.windowTitle()}
-    for widget in (top, *top.findChildren(QWidget)):
-        found |= {widget.accessibleName(), widget.accessibleDescription(), widget.toolTip(), widget.windowTitle()}
-        found |= {widget.objectName(), widget.statusTip(), widget.whatsThis()}
-        text = getattr(widget, "text", None)
-        if callable(text):
-            found.add(str(text()))
-    return found
-
-
-def traces_of(operator: OperatorWindow) -> set[str]:
-    """Return names and labels of all that is plotted, and what stands where the force would be."""
-    named = set()
-    plots = [operator.lateness.plot, operator.position.plot]
-    if isinstance(operator.force, ForceCard):
-        plots += [operator.force.plot, operator.force.wake]
-    for plot in plots:
-        for item in plot.items():
-            named |= {str(getattr(item, "toPlainText", str)()), str(getattr(item, "labelText", ""))}
-    return named | {label.text() for label in operator.force.findChildren(QLabel)}
 
 
 def test_nothing_seen_written_or_logged_tells_a_condition(

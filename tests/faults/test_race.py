@@ -11,13 +11,14 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.verification.verify_study import verify
+from tests.platforms import needs_fork
 from tests.session import small
 
 TIMES = 100
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
+pytestmark = [pytest.mark.slow, needs_fork]
 
 
 def race(folder: Path, start: Any, won: Any) -> None:
@@ -30,13 +31,15 @@ def race(folder: Path, start: Any, won: Any) -> None:
                 folder,
                 small.protocol(),
                 b"small",
-                f"P{number:03d}",
-                seed=1,
-                operator=str(os.getpid()),
-                language="en",
-                device={"name": "memory"},
-                screens={},
-                simulated=False,
+                SessionStart(
+                    f"P{number:03d}",
+                    seed=1,
+                    operator=str(os.getpid()),
+                    language="en",
+                    device={"name": "memory"},
+                    screens={},
+                    simulated=False,
+                ),
             )
         except StoreError as error:
             taken.append((number, str(error)))

@@ -30,6 +30,7 @@ TEXTS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_free_text_survives_journal_tables_and_readers(tmp_path: Path, text: str) -> None:
     world = StoredWorld(tmp_path / "study")

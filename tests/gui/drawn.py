@@ -18,15 +18,13 @@ MODULES = tuple(
     f"study_app.gui.participant.{name}"
     for name in (
         "tank_widget",
-        "pages.answer_cell",
+        "forms.option_button",
         "pages.column_labels",
         "pages.key_caps",
         "pages.language_switch",
         "pages.notices",
         "pages.progress_line",
-        "pages.questionnaire",
         "pages.reading_page",
-        "pages.statement_row",
         "pages.text_page",
     )
 )

@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from study_app.protocol.trials.task import Explore, Reach
+from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks.explore import Explore
+from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks.reach import Reach
 from study_app.session.pages import ItemView, Progress, QuestionnairePage, TaskPage, TextPage
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
@@ -73,7 +76,11 @@ def explore() -> Explore:
     return Explore(kind="explore", min_s=30, max_s=120, instruction="Move the ball through the liquid")
 
 
-def task_page(task: Explore | Reach | None = None, **changed: Any) -> TaskPage:
+def follow(**changed: Any) -> Follow:
+    return Follow.model_validate({"kind": "follow", "instruction": "Keep the ball on the target"} | changed)
+
+
+def task_page(task: AnyTask | None = None, **changed: Any) -> TaskPage:
     task = task or reach()
     fields: dict[str, Any] = {
         "trial": 3,
@@ -94,9 +101,11 @@ def view(
     dwell: float = 0.0,
     elapsed_s: float = 12.0,
     sample_ns: int = 7_000_000_000,
+    target_m: tuple[float, float, float] | None = None,
+    ball_hidden: bool = False,
 ) -> TankView:
-    task = TaskView(lit=lit, reached=reached, of=12, dwell=dwell, elapsed_s=elapsed_s)
-    return TankView(position_m=np.array(position_m), task=task, sample_time_ns=sample_ns)
+    task = TaskView(lit=lit, reached=reached, of=12, dwell=dwell, elapsed_s=elapsed_s, target_m=target_m)
+    return TankView(position_m=np.array(position_m), task=task, sample_time_ns=sample_ns, ball_hidden=ball_hidden)
 
 
 def text_page(kind: Any = "instructions", **changed: Any) -> TextPage:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import QTimer
 
 from study_app.errors import DeviceError, DeviceNotFound
 from study_app.gui.home.startup_window import FIRST_TIME, OpeningWindow
@@ -31,8 +32,8 @@ def test_what_nobody_felt_is_kept_apart(tmp_path, device, folder):
 
 def test_firmware_is_for_falcons_alone(tmp_path):
     study = load("demo")
-    chosen = replace(CHOSEN, results=tmp_path, firmware=tmp_path / "file.bin")
-    with pytest.raises(DeviceError, match="only a Falcon takes firmware, not device 'mouse'"):
+    chosen = replace(CHOSEN, results=tmp_path, device_options={"firmware": tmp_path / "file.bin"})
+    with pytest.raises(DeviceError, match="device 'mouse' takes no firmware; only these do: Novint Falcon,"):
         check(chosen, study)
     check(replace(chosen, device="falcon"), study)
     with pytest.raises(DeviceNotFound, match="falcon-socket:PATH"):
@@ -40,15 +41,16 @@ def test_firmware_is_for_falcons_alone(tmp_path):
 
 
 def test_the_note_says_what_the_device_asks_for_and_goes_on_saying_it(qtbot):
-    note = OpeningWindow("Preparing demo", "Participant P001")
+    now = [0.0]
+    note = OpeningWindow("Preparing demo", "Participant P001", now_s=lambda: now[0])
     qtbot.addWidget(note)
     note.say("Pull the grip out.")
     assert note.step.text() == "Pull the grip out."
-    note._since = type("Long", (), {"elapsed": lambda _self: 60_000})()
-    note._tell()
+    now[0] = 60.0
+    note.findChild(QTimer).timeout.emit()
     assert note.step.text() == "Pull the grip out."
-    other = OpeningWindow("Preparing demo", "Participant P001")
+    other = OpeningWindow("Preparing demo", "Participant P001", now_s=lambda: now[0])
     qtbot.addWidget(other)
-    other._since = note._since
-    other._tell()
+    now[0] = 120.0
+    other.findChild(QTimer).timeout.emit()
     assert other.step.text() == FIRST_TIME

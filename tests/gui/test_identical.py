@@ -24,6 +24,8 @@ from study_app.session.trial import SETTLED_S
 from tests.gui.small import ManualClock
 from tests.session.fakes import FakeJournal, FakeServo
 
+pytestmark = pytest.mark.slow
+
 STEP_S = 0.02
 LASTS_S = 3.0
 LOOKS_S = (0.30, 0.74, 1.28, 1.66, 2.42)  # seconds into the trial; between them the ring closes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace
 from itertools import combinations, pairwise
 from typing import Any
@@ -15,16 +15,18 @@ from PySide6.QtGui import QFontMetricsF, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel
 
-from study_app.gui.participant.pages.answer_cell import Cell
+from study_app.gui.participant.forms.option_button import RadioOption
 from study_app.gui.participant.pages.language_switch import LanguageButton
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.participant.pages.statement_row import Row
+from study_app.gui.participant.pages.statement_field import StatementField
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import font
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import EndPage, Page, PausePage, Progress, QuestionnairePage, TroublePage
 from tests.gui.drawn import Drawn, drawn_by
 from tests.gui.small import STATEMENTS, ManualClock, explore, questionnaire, task_page, text_page, view
+
+pytestmark = pytest.mark.slow
 
 SIZES = [(1366, 768), (1920, 1080), (3840, 2160)]
 SCALES = [1.0, 1.25, 1.5, 1.75, 2.0]
@@ -77,7 +79,7 @@ def show(window: ParticipantWindow, page: Page) -> None:
         window.show_view(view((0.02, 0.0, 0.0), lit=lit, dwell=0.6, elapsed_s=3.0))
     if isinstance(window.widget, QuestionnaireWidget):
         window.widget.submit()
-        QTest.mouseMove(window.widget._shown()[-1].cells[2])
+        QTest.mouseMove([row for row in window.widget.fields if row.isVisible()][-1].options[2])
     QApplication.processEvents()
 
 
@@ -131,13 +133,13 @@ def test_edges_of_cells_and_the_ring_of_the_keyboard_stand_out(
     window = open_window(size)
     show(window, pages()["answers"])
     light = luminances(window.grab().toImage())
-    for cell in window.findChildren(Cell):
-        if cell.column == 7 and not cell.isChecked():
+    for cell in window.findChildren(RadioOption):
+        if cell.accessibleName() == "Cannot judge" and not cell.isChecked():
             continue  # its dashes are tested with the words beside them: the column has a name and a dash
         middle = cell.mapTo(window, cell.rect().center())
         left = cell.mapTo(window, QPoint(0, 0)).x()
         assert contrast(light, QRect(left - 4, middle.y(), 12, 1)) >= 3.0, cell.accessibleName()
-    row = next(row for row in window.findChildren(Row) if row.hasFocus())
+    row = next(row for row in window.findChildren(StatementField) if row.hasFocus())
     top = row.mapTo(window, QPoint(row.width() // 2, 0))
     assert contrast(light, QRect(top.x(), top.y() - 3, 1, 8)) >= 3.0
 
@@ -191,9 +193,16 @@ def longer(text: str, share: float = 0.35) -> str:
 def in_longer_words() -> Words:
     english = words("en")
     kept = {"language", "small_numbers", "space_key", "enter_key", "escape_key"}
-    return replace(
-        english, **{one.name: longer(getattr(english, one.name)) for one in fields(Words) if one.name not in kept}
-    )
+    named = {one.name: getattr(english, one.name) for one in fields(Words) if one.name not in kept}
+    return replace(english, **{name: _longer(value) for name, value in named.items()})
+
+
+def _longer(value: str | tuple[str, ...] | Mapping[str, str]) -> Any:
+    if isinstance(value, str):
+        return longer(value)
+    if isinstance(value, Mapping):
+        return {name: longer(text) for name, text in value.items()}
+    return tuple(map(longer, value))
 
 
 def with_longer_texts(page: QuestionnairePage) -> QuestionnairePage:
@@ -264,7 +273,7 @@ def test_nine_statements_stand_on_one_page_as_long_as_their_words_can_be_read(
         window = open_window((1366, 768), text_scale=text_scale)
         show(window, questionnaire())
         assert isinstance(window.widget, QuestionnaireWidget)
-        shown.append(len(window.widget._shown()))
+        shown.append(sum(row.isVisible() for row in window.widget.fields))
     assert shown[:3] == [9, 9, 9]
     assert all(one >= other for one, other in pairwise(shown))
 
@@ -279,16 +288,16 @@ def test_all_is_mirrored_but_the_order_of_the_scale(open_window: Callable[..., P
         show(window, page)
     assert isinstance(here.widget, QuestionnaireWidget)
     assert isinstance(there.widget, QuestionnaireWidget)
-    row, mirror = here.widget.rows[0], there.widget.rows[0]
+    row, mirror = here.widget.fields[0], there.widget.fields[0]
     width = row.width()
     assert mirror.geometry() == row.geometry()
-    cells = [cell.geometry().left() for cell in mirror.cells]
-    assert cells[:7] == sorted(cells[:7])
-    assert cells[7] < cells[0]
-    assert mirror.cells[0].geometry().left() == pytest.approx(width - row.cells[6].geometry().right() - 1, abs=2)
+    here_at, there_at = ([left for left, _ in one.columns] for one in (row, mirror))
+    assert there_at[:7] == sorted(there_at[:7])
+    assert there_at[7] < there_at[0]
+    assert there_at[0] == pytest.approx(width - here_at[6] - row.columns[6][1], abs=2)
     assert there.widget.button.geometry().left() < 60 < here.widget.button.geometry().left()
     told = {one.text: one for one in drawn_by(there)}
-    assert told[STATEMENTS[0]].ink.right() > mirror.cells[6].mapTo(there, QPoint(0, 0)).x() + 120
+    assert told[STATEMENTS[0]].ink.right() > mirror.options[6].mapTo(there, QPoint(0, 0)).x() + 120
 
 
 def test_right_and_left_keys_go_along_the_scale_in_every_language(
@@ -297,7 +306,7 @@ def test_right_and_left_keys_go_along_the_scale_in_every_language(
     window = open_window((1366, 768), words("ar"))
     window.show_page(questionnaire())
     assert isinstance(window.widget, QuestionnaireWidget)
-    row = window.widget.rows[0]
+    row = window.widget.fields[0]
     QTest.keyClick(row, Qt.Key.Key_Right)
     QTest.keyClick(row, Qt.Key.Key_Right)
     QTest.keyClick(row, Qt.Key.Key_Space)
@@ -310,7 +319,7 @@ def test_tank_and_patch_stay_where_they_are(open_window: Callable[..., Participa
         window = open_window((1366, 768), words(language))
         show(window, task_page(progress=None))
         assert window.tank is not None
-        assert window.tank._patch_place().right() == window.tank.width()
+        assert window.tank.patch_area().right() == window.tank.width()
         picture = window.grab().toImage()
         pictures.append(picture.copy(QRect(300, 100, 760, 480)))
     assert pictures[0] == pictures[1]

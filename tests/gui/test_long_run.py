@@ -16,7 +16,7 @@ from tests.compiled import needs_servo
 FLAT_BYTES = 5 * 2**20
 HALF_AN_HOUR = 0.5
 
-pytestmark = needs_servo
+pytestmark = [pytest.mark.slow, needs_servo]
 
 
 @pytest.mark.usefixtures("qapp")

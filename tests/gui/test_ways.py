@@ -10,8 +10,7 @@ from PySide6.QtGui import QAccessible, QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.participant.pages import questionnaire as page_module
-from study_app.gui.participant.pages import statement_row as rows_module
+from study_app.gui.participant.forms import options_field, question_field, questions_page
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.pages.text_page import TextWidget
 from study_app.gui.participant.window import ParticipantWindow
@@ -87,8 +86,8 @@ def column(value: int | None) -> int:
 
 
 def test_all_is_answered_by_the_mouse_alone(opened: Opened) -> None:
-    for row, value in zip(opened.page.rows, GIVEN, strict=True):
-        QTest.mouseClick(row.cells[column(value)], Qt.MouseButton.LeftButton)
+    for row, value in zip(opened.page.fields, GIVEN, strict=True):
+        QTest.mouseClick(row.options[column(value)], Qt.MouseButton.LeftButton)
     QTest.mouseClick(opened.page.button, Qt.MouseButton.LeftButton)
     assert opened.values == list(GIVEN)
     assert isinstance(opened.told[-1], Submitted)
@@ -117,14 +116,14 @@ def test_all_is_answered_by_the_keyboard_alone(opened: Opened) -> None:
 
 def test_backspace_goes_back_and_changes_nothing(opened: Opened) -> None:
     press(KEY.Key_6, KEY.Key_5, KEY.Key_Backspace)
-    assert opened.page.rows[1].hasFocus()
+    assert opened.page.fields[1].hasFocus()
     press(KEY.Key_Backspace, KEY.Key_Backspace)
-    assert opened.page.rows[0].hasFocus()
+    assert opened.page.fields[0].hasFocus()
     press(KEY.Key_2)
     assert opened.values == [6, 5, 2]
     opened.page.button.setFocus()
     press(KEY.Key_Backspace)
-    assert opened.page.rows[8].hasFocus()
+    assert opened.page.fields[8].hasFocus()
 
 
 def test_arrows_on_the_button_move_among_the_statements(opened: Opened) -> None:
@@ -132,16 +131,16 @@ def test_arrows_on_the_button_move_among_the_statements(opened: Opened) -> None:
     press(KEY.Key_Left, KEY.Key_Right)
     assert opened.page.button.hasFocus()
     press(KEY.Key_Up)
-    assert opened.page.rows[8].hasFocus()
+    assert opened.page.fields[8].hasFocus()
 
 
 # by touch alone
 
 
 def test_all_is_answered_by_touch_alone(opened: Opened, finger: QPointingDevice) -> None:
-    for row, value in zip(opened.page.rows, GIVEN, strict=True):
-        tap(finger, row.cells[column(value)])
-    tap(finger, opened.page.rows[0].cells[1], QPoint(2, 2))  # a change, at the corner of its cell
+    for row, value in zip(opened.page.fields, GIVEN, strict=True):
+        tap(finger, row.options[column(value)])
+    tap(finger, opened.page.fields[0].options[1], QPoint(2, 2))  # a change, at the corner of its cell
     tap(finger, opened.page.button)
     assert opened.values == [*GIVEN, 2]
     assert isinstance(opened.told[-1], Submitted)
@@ -149,13 +148,13 @@ def test_all_is_answered_by_touch_alone(opened: Opened, finger: QPointingDevice)
 
 def test_a_finger_that_is_lifted_points_at_nothing(opened: Opened, finger: QPointingDevice) -> None:
     fixed = opened.page.heading
-    tap(finger, opened.page.rows[2].cells[1])
+    tap(finger, opened.page.fields[2].options[1])
     assert opened.page.heading == fixed
-    assert not any(cell._pointed for row in opened.page.rows for cell in row.cells)
+    assert not any(cell.pointed for row in opened.page.fields for cell in row.options)
 
 
 def test_a_click_leaves_the_label_of_the_column_that_the_mouse_is_on(opened: Opened) -> None:
-    cell = opened.page.rows[4].cells[1]
+    cell = opened.page.fields[4].options[1]
     QTest.mouseMove(cell)
     QTest.mouseClick(cell, Qt.MouseButton.LeftButton)
     assert "Mostly disagree" in opened.page.heading
@@ -166,14 +165,14 @@ def test_touch_names_what_is_missing_and_goes_from_part_to_part(qtbot: Any, fing
     opened.window.setMinimumSize(1, 1)
     opened.window.resize(880, 640)
     QApplication.processEvents()
-    tap(finger, opened.page._tabs[1])
-    assert [row.item.number for row in opened.page.rows if row.isVisible()] == [6, 7, 8, 9]
+    tap(finger, opened.page.tabs[1])
+    assert [row.view.number for row in opened.page.fields if row.isVisible()] == [6, 7, 8, 9]
     tap(finger, opened.page.button)
     assert opened.page.message.endswith("6, 7, 8 and 9.")
-    for row in opened.page.rows[5:]:
-        tap(finger, row.cells[2])
+    for row in opened.page.fields[5:]:
+        tap(finger, row.options[2])
     tap(finger, opened.page.button)
-    assert [row.item.number for row in opened.page.rows if row.isVisible()] == [1, 2, 3, 4, 5]
+    assert [row.view.number for row in opened.page.fields if row.isVisible()] == [1, 2, 3, 4, 5]
     opened.close()
 
 
@@ -200,31 +199,31 @@ def told_of(widget: QWidget) -> Any:
 
 def test_a_screen_reader_finds_groups_of_radio_buttons_with_names_and_states(opened: Opened) -> None:
     role, text = QAccessible.Role, QAccessible.Text
-    labels = [*(f"{n} {label}" for n, label in enumerate(opened.page._page.labels, 1)), "Cannot judge"]
-    for number, (row, statement) in enumerate(zip(opened.page.rows, STATEMENTS, strict=True), 1):
+    labels = [*(f"{n} {label}" for n, label in enumerate(opened.window.page.labels, 1)), "Cannot judge"]
+    for number, (row, statement) in enumerate(zip(opened.page.fields, STATEMENTS, strict=True), 1):
         group = told_of(row)
         assert (group.role(), group.text(text.Name)) == (role.Grouping, f"{number}. {statement}")
-        assert group.text(text.Description) == "not answered"
-        for cell, label in zip(row.cells, labels, strict=True):
+        assert group.text(text.Description) == "no answer yet"
+        for cell, label in zip(row.options, labels, strict=True):
             button = told_of(cell)
             assert (button.role(), button.text(text.Name)) == (role.RadioButton, label)
             assert button.text(text.Description) == statement
             assert button.state().checkable
             assert not button.state().checked
     press(KEY.Key_3)
-    first = opened.page.rows[0]
-    assert [bool(told_of(cell).state().checked) for cell in first.cells] == [n == 2 for n in range(8)]
+    first = opened.page.fields[0]
+    assert [bool(told_of(cell).state().checked) for cell in first.options] == [n == 2 for n in range(8)]
     assert told_of(first).text(text.Description) == "chosen: 3 Somewhat disagree"
 
 
 def test_a_screen_reader_can_choose_by_itself(opened: Opened) -> None:
-    told_of(opened.page.rows[3].cells[5]).actionInterface().doAction("Toggle")
+    told_of(opened.page.fields[3].options[5]).actionInterface().doAction("Toggle")
     assert opened.values == [6]
 
 
 def test_what_is_pointed_at_chosen_and_missing_is_said(opened: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
-    for module in (rows_module, page_module):
+    for module in (options_field, question_field, questions_page):
         monkeypatch.setattr(module, "say", lambda _widget, text: said.append(text))
     press(KEY.Key_Right, KEY.Key_Space, KEY.Key_4)
     assert said == ["1 Completely disagree", "chosen: 1 Completely disagree", "chosen: 4 Neutral"]

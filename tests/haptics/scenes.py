@@ -8,9 +8,13 @@ import numpy as np
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.model.effects.current import Vortex
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.effects.local_wake import LocalWake
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, Cylinder, Drag, Knee, Liquid, LocalWake, Scene, Vortex, Wake
+from study_app.haptics.model.scene import Box, Cylinder, Knee, Liquid, Scene
 from study_app.haptics.runtime.pack import pack
 
 COMPILED = not numba.config.DISABLE_JIT
@@ -72,7 +76,13 @@ BED = POOL.model_copy(
         "effects": ("drag", "wake", "buoyancy", "added_mass", "history"),
     }
 )
-EVERYTHING = {"tail": scene(POOL), "places": scene(PLACES), "two liquids": scene(POOL, BED)}
+FINITE = POOL.model_copy(update={"effects": ("current", "buoyancy", "surface", "unsteady_drag")})
+EVERYTHING = {
+    "tail": scene(POOL),
+    "places": scene(PLACES),
+    "two liquids": scene(POOL, BED),
+    "unsteady drag": scene(FINITE),
+}
 
 
 def stroke(ticks: int) -> Any:
@@ -107,7 +117,7 @@ def vectors(table: Any, kind: str) -> Any:
 
 
 class Hand:
-    """Moves a model as a servo would: one call, one turn of 1 ms unless said otherwise."""
+    """Moves a model as a servo would: one call, one tick of 1 ms unless said otherwise."""
 
     def __init__(self, felt: Scene, *, faded_in: bool = True, dynamics: Dynamics = UNKNOWN) -> None:
         self.model = pack(felt, dynamics=dynamics)
@@ -116,8 +126,8 @@ class Hand:
         self.sample = records(SAMPLE, 1)
         self.time_ns = 0
 
-    def turn(self, position_m: Any = None, *, after_ns: int = TICK_NS) -> Any:
-        """Take one turn, with a new sample at ``position_m`` (hand frame), or without one; return a copy of it."""
+    def tick(self, position_m: Any = None, *, after_ns: int = TICK_NS) -> Any:
+        """Take one tick, with a new sample at ``position_m`` (hand frame), or without one; return a copy of it."""
         self.time_ns += after_ns
         sample = self.sample[0]
         sample.time_ns = self.time_ns
@@ -129,4 +139,4 @@ class Hand:
 
     def sweep(self, speed_mps: float, ticks: int, *, start_m: float = 0.0) -> list[Any]:
         """Move along x at ``speed_mps`` of the hand from ``start_m`` on; return every sample."""
-        return [self.turn((start_m + speed_mps * 1e-3 * k, 0.0, 0.0)) for k in range(1, ticks + 1)]
+        return [self.tick((start_m + speed_mps * 1e-3 * k, 0.0, 0.0)) for k in range(1, ticks + 1)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from random import Random
 
+from study_app.devices.rig import Rig
 from study_app.devices.scripted import ScriptedDevice
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
@@ -26,7 +27,7 @@ def scripted() -> ScriptedDevice:
 
 def live_with(device: ScriptedDevice, *, elements: int = 10_000) -> Live:
     """Return the lab's device and servo, not begun."""
-    return Live(device, Servo(device, clock=VirtualClock(), elements=elements))
+    return Live(Rig(device, Servo(device, clock=VirtualClock(), elements=elements)))
 
 
 def run(live: Live, ticks: int, batch: int = 33) -> None:

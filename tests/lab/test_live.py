@@ -10,6 +10,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
 from study_app.devices.mouse import MouseDevice
+from study_app.devices.rig import Rig
 from study_app.errors import ServoFault, StudyError
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NAMES, LIMITER_SLEW, LIMITER_STOP
 from study_app.haptics.model.scene import Kalman
@@ -65,6 +66,7 @@ def test_exchanging_what_is_not_felt_leaves_the_servo_alone() -> None:
     live.close()
 
 
+@pytest.mark.slow
 def test_a_number_that_is_dragged_is_felt_by_the_next_tick_with_the_wake_going_on() -> None:
     live = live_with(scripted())
     sides = bench()
@@ -157,7 +159,7 @@ def test_closing_ends_with_zero_force_then_the_servo_then_the_device() -> None:
     live.feel(bench("honey", "water"))
     live.play("circle")
     run(live, 1500)
-    handle = device._state.handle
+    handle = device.state.handle
     assert np.linalg.norm(handle.force_n) > 0.5
     order: list[str] = []
     stop, close = live.servo.stop, device.close
@@ -205,7 +207,7 @@ def test_an_exception_on_the_way_ends_in_zero_force() -> None:
 
     with pytest.raises(RuntimeError):
         feels_and_fails()
-    assert np.linalg.norm(device._state.handle.force_n) == 0.0
+    assert np.linalg.norm(device.state.handle.force_n) == 0.0
 
 
 def test_a_fault_is_told_and_nothing_more_is_presented() -> None:
@@ -217,13 +219,14 @@ def test_a_fault_is_told_and_nothing_more_is_presented() -> None:
     run(live, 5)
     reading = live.reading()
     assert reading is not None
-    assert "stopped answering" in reading.fault
+    assert "stopped responding" in reading.fault
     assert not reading.force_on
-    with pytest.raises(StudyError, match="stopped answering"):
+    with pytest.raises(StudyError, match="stopped responding"):
         live.feel(bench())
     live.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TITLES)
 def test_programmed_paths_fit_the_workspace_and_the_hand_goes_along_them(name: str) -> None:
     live = live_with(scripted())
@@ -235,30 +238,30 @@ def test_programmed_paths_fit_the_workspace_and_the_hand_goes_along_them(name: s
     steps_mps = np.linalg.norm(np.diff(motion.position_m, axis=0), axis=1) * 1000
     assert steps_mps.max() < 0.15 + 0.01
     live.play(name)
-    whole = led_to(motion, live._hand.aim_m)  # type: ignore[union-attr]
+    whole = led_to(motion, live.hand.aim_m)  # type: ignore[union-attr]
     lasts = round(whole.t_s[-1] * 1000)
     run(live, lasts)
     places_m = live.servo.telemetry.ring.position_m[60 : 60 + lasts]
     assert np.abs(places_m - whole.position_m[:lasts]).max() < 0.02  # the hand is a spring against the liquid
     run(live, 200)
     assert live.path == name
-    assert live._hand is not None and live._hand.moving  # noqa: PT018 - again from the start
+    assert live.hand is not None and live.hand.moving  # noqa: PT018 - again from the start
     live.play(None)
     run(live, 50)
-    assert not live._hand.moving
+    assert not live.hand.moving
     live.close()
 
 
 def test_an_unknown_path_is_refused() -> None:
     live = live_with(scripted())
-    with pytest.raises(StudyError, match="no programmed path 'square'"):
+    with pytest.raises(StudyError, match="unknown path 'square'"):
         live.play("square")
     live.close()
 
 
 def test_the_pointer_moves_the_mouse_unless_a_path_does() -> None:
     device = MouseDevice(workspace_m=(0.05, 0.03, 0.03))
-    live = Live(device, Servo(device, clock=VirtualClock(), elements=10_000))
+    live = Live(Rig(device, Servo(device, clock=VirtualClock(), elements=10_000)))
     live.feel(bench())
     live.point_to(0.02, 0.01, 0.0)
     run(live, 600)
@@ -282,7 +285,7 @@ def test_the_pointer_moves_the_mouse_unless_a_path_does() -> None:
 def test_a_path_beside_a_hand_that_takes_no_orders_is_computed_alone() -> None:
     """The device goes on as it is; trace and tails are those of the path."""
     probe = Probe(velocity_mps=(0.0, 0.0, 0.0))
-    live = Live(probe, Servo(probe, clock=VirtualClock(), elements=10_000))  # type: ignore[arg-type]
+    live = Live(Rig(probe, Servo(probe, clock=VirtualClock(), elements=10_000)))  # type: ignore[arg-type]
     probe.workspace_m = (0.05, 0.03, 0.03)
     live.feel(bench())
     run(live, 100)
@@ -346,6 +349,7 @@ def test_a_scene_of_another_rate_is_felt_at_the_servos() -> None:
     live.close()
 
 
+@pytest.mark.slow
 def test_the_lab_beside_a_servo_in_its_own_thread_sees_every_tick_of_it() -> None:
     live = open_live("scripted")
     try:
@@ -360,4 +364,4 @@ def test_the_lab_beside_a_servo_in_its_own_thread_sees_every_tick_of_it() -> Non
         assert live.servo.fault is None
     finally:
         live.close()
-    assert np.linalg.norm(live.device._state.handle.force_n) == 0.0  # type: ignore[attr-defined]
+    assert np.linalg.norm(live.device.state.handle.force_n) == 0.0  # type: ignore[attr-defined]

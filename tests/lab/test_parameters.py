@@ -5,9 +5,12 @@ from __future__ import annotations
 import pytest
 
 from study_app.errors import StudyError
-from study_app.haptics.model.scene import Channel, Given, Liquid, Scene
+from study_app.haptics.model.effect import Parameter
+from study_app.haptics.model.effects.current import Channel
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.scene import Given, Liquid, Scene
 from study_app.lab.changes import changed
-from study_app.lab.parameters import Parameter, parameter, sections, value_of
+from study_app.lab.parameters import parameter, sections, value_of
 from study_app.protocol.load import load_scenes, shipped
 
 SCENES = {f"{file}/{name}": scene for file in shipped() for name, scene in load_scenes(file).items()}
@@ -28,6 +31,7 @@ def test_every_value_of_a_preset_can_be_set_again(name: str) -> None:
         assert changed(scene, it.name, value) == scene, it.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_both_ends_of_every_range_are_taken(name: str) -> None:
     scene = SCENES[name]
@@ -131,3 +135,15 @@ def test_the_lab_takes_one_liquid_and_no_given_velocity() -> None:
         sections(Scene())
     with pytest.raises(StudyError, match="estimator"):
         sections(water.model_copy(update={"velocity": Given()}))
+
+
+def test_a_linear_damper_has_its_damping_as_a_parameter() -> None:
+    honey = SCENES["physical_liquids/honey"]
+    assert "drag.damping_nspm" not in {it.name for section in sections(honey) for it in section.parameters}
+    damper = changed(honey, "drag.law", "linear")
+    assert damper.liquids[0].drag == Drag(law="linear", damping_nspm=8)
+    found = parameter(damper, "drag.damping_nspm")
+    assert (found.least, found.most, found.unit) == (0.01, 200, "N·s/m")
+    heavier = changed(damper, "drag.damping_nspm", 20.0)
+    assert value_of(heavier, "drag.damping_nspm") == 20
+    assert changed(heavier, "drag.law", "constant").liquids[0].drag == Drag()

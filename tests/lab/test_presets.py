@@ -39,6 +39,7 @@ def edited(scene: Scene) -> Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", shipped())
 @pytest.mark.parametrize("edit", [False, True])
 def test_a_preset_reads_back_as_it_was_and_check_takes_it(source: str, edit: bool, tmp_path: Path) -> None:

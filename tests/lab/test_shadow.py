@@ -1,4 +1,4 @@
-"""What was felt, computed again beside the servo: the same bits, and the other liquid on the same motion."""
+"""What was felt, recomputed outside the servo: the same bits, and the other liquid on the same motion."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_so_they_are_with_every_effect(name: str) -> None:
 
 def test_so_they_are_with_the_kalman_filter_on_a_light_handle() -> None:
     device = scripted()
-    device._state.handle.mass_kg = 0.05
+    device.state.handle.mass_kg = 0.05
     live = live_with(device)
     scene = SCENES["honey"].model_copy(update={"velocity": Kalman()})
     live.feel(Workbench(Setting("honey", scene, scene), bench().b))
@@ -71,7 +71,7 @@ def test_so_they_are_with_the_kalman_filter_on_a_light_handle() -> None:
 def test_the_other_sides_kalman_filter_knows_the_force_that_was_sent() -> None:
     """Both sides fill a wake by the same velocity, although their forces differ."""
     device = scripted()
-    device._state.handle.mass_kg = 0.05
+    device.state.handle.mass_kg = 0.05
     live = live_with(device)
     thin = SCENES["water"].model_copy(update={"velocity": Kalman()})
     thick = changed(thin, "liquid.density_kg_m3", 4000.0)

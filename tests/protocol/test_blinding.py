@@ -7,7 +7,7 @@ import pytest
 from study_app.errors import ProtocolError
 from study_app.protocol.describe import describe
 from study_app.protocol.load import parse, source_bytes
-from study_app.protocol.model import schema
+from study_app.protocol.source.json_schema import schema
 from study_app.store.receipt import without_conditions
 
 DEMO = source_bytes("demo").decode()

@@ -4,7 +4,7 @@ import pytest
 
 from study_app.protocol.describe import describe, expected_duration_s
 from study_app.protocol.load import load, parse
-from tests.protocol.cases import ORDER, SOUND
+from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")
 
@@ -156,3 +156,12 @@ def test_what_was_decided_about_the_analysis_or_that_nothing_was():
     assert "p of at most 0.01" in told
     assert "Primary          cold" in told
     assert "Equivalent       not tested" in told
+
+
+def test_a_new_study_that_accepts_trials_without_a_target_is_warned_of():
+    demo = load("demo")
+    later = demo.model_copy(update={"format": 2})
+    assert "tasks.reach: a trial that ends without any target reached is valid" in describe(later)
+    limits = demo.limits.model_copy(update={"targets_percent": 50})
+    assert "without any target" not in describe(later.model_copy(update={"limits": limits}))
+    assert "Warnings" not in describe(demo)

@@ -9,7 +9,7 @@ from study_app.protocol.differences import CONDITIONS_DIFFER, differences
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.store.receipt import without_conditions
-from tests.protocol.cases import ORDER, SOUND
+from tests.protocol.sound import ORDER, SOUND
 
 SMALL = parse(SOUND.encode(), "small")
 

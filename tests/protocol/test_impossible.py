@@ -12,9 +12,10 @@ from study_app.errors import ProtocolError
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.felt import LEAST_N, force_n
 from study_app.protocol.load import load, parse, shipped
-from study_app.protocol.trials.task import Explore, Stroke, fastest_stroke
+from study_app.protocol.trials.tasks.explore import Explore
+from study_app.protocol.trials.tasks.stroke import Stroke
 from tests.compiled import needs_servo
-from tests.protocol.cases import DECIDED, SOUND
+from tests.protocol.sound import DECIDED, SOUND
 
 THICK = "[liquids.thick]\ndensity_kg_m3 = 1400\n"
 THIN = 'effects = ["drag", "wake"]\nwake = { length = 100, scaling = 200, exponent = 0.5 }'
@@ -212,7 +213,7 @@ def test_the_estimated_force_is_near_that_of_the_model(name: str) -> None:
     from study_app.haptics.runtime.offline import simulate
 
     protocol = load(name)
-    stroke = fastest_stroke(Explore(kind="explore", min_s=1, max_s=2, instruction="x"), protocol.device.workspace_m)
+    stroke = Explore(kind="explore", min_s=1, max_s=2, instruction="x").fastest_stroke(protocol.device.workspace_m)
     assert stroke == Stroke(5.0, 0.03)
     for condition in protocol.conditions:
         weak = protocol.scene_for(condition)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import pytest
 
+from study_app.haptics.model.effects.drag import resistance_n
+from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.limits import slope_limit
 from study_app.protocol.describe import describe
 from study_app.protocol.liquid_summary import effects, warnings
 from study_app.protocol.load import load, load_scene, load_scenes, parse
-from tests.protocol.cases import SOUND
+from study_app.protocol.orders.block_orders import orders_of
+from tests.protocol.sound import SOUND
 
 PHYSICAL = load("physical_liquids")
+LAWS = ("constant", "haider-levenspiel")
 
 
 def dense(other_kg_m3: float | str, **more: str):
@@ -67,10 +71,33 @@ def test_the_thesis_liquids_need_no_warning(name: str):
     assert "Warnings" not in describe(protocol)
 
 
-def test_of_the_physical_liquids_only_the_tar_of_the_demonstration_is_warned_of():
-    (warning,) = warnings(PHYSICAL)
+@pytest.mark.parametrize("name", ["physical_liquids", "physical2"])
+def test_of_the_physical_liquids_only_the_tar_of_the_demonstration_is_warned_of(name: str):
+    protocol = load(name)
+    (warning,) = warnings(protocol)
     assert warning.startswith("tar is clipped")
-    assert describe(PHYSICAL).endswith(f"Warnings\n  {warning}")
+    assert describe(protocol).endswith(f"Warnings\n  {warning}")
+
+
+def test_the_second_edition_of_the_physical_liquids_differs_in_what_auto_chooses_alone():
+    first, second = (load(name) for name in ("physical_liquids", "physical2"))
+    assert (first.liquids, first.conditions, first.scene) == (second.liquids, second.conditions, second.scene)
+    chosen = {name: resolve(second.scene_of(name)).liquids[0].effects for name in second.liquids}
+    assert chosen.pop("water") == ("drag", "added_mass")
+    assert all("unsteady_drag" in effects and "drag" not in effects for effects in chosen.values())
+    assert not any("unsteady_drag" in resolve(first.scene_of(name)).liquids[0].effects for name in first.liquids)
+
+
+def test_a_constant_coefficient_in_a_viscous_liquid_is_warned_of_with_its_error():
+    study = dense("1400\nviscosity_pa_s = 10")
+    (told,) = [warning for warning in warnings(study) if "ignores it" in warning]
+    assert told.startswith(
+        "thick has a viscosity, but its constant drag coefficient ignores it: at 0.1 m/s of the hand"
+    )
+    named_n, true_n = (resistance_n(study.scene_of("thick"), study.liquids["thick"].alone, 1.0, law) for law in LAWS)
+    assert f"is {named_n:.2f} instead of {true_n:.2f} N, an error of {true_n - named_n:.2f} N" in told
+    assert true_n - named_n > 5
+    assert not any("ignores it" in warning for warning in warnings(dense("1400\nviscosity_pa_s = 1e-3")))
 
 
 def test_every_liquid_has_its_table_of_effects():
@@ -107,7 +134,7 @@ def test_the_physical_study():
     assert all(liquid.effects == "auto" for liquid in PHYSICAL.liquids.values())
     presented = {name for condition in PHYSICAL.conditions.values() for name in condition.liquid_ids}
     assert set(PHYSICAL.liquids) - presented == {"olive_oil", "tar"}
-    assert PHYSICAL.responses_per_participant() == 42
+    assert orders_of(PHYSICAL).answers == 42
 
 
 def test_the_scene_of_a_liquid_has_all_that_the_file_says():

@@ -11,7 +11,8 @@ from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse, protocol_hash, shipped, source_bytes
 from study_app.protocol.orders import constrained
 from study_app.protocol.orders.schedule import build_schedule
-from tests.protocol.cases import BROKEN, CASES, EVERY_ORDER, ORDER, SOUND, Case
+from tests.protocol.cases import BROKEN, CASES, Case
+from tests.protocol.sound import EVERY_ORDER, ORDER, SOUND
 
 
 def problems_of(text: str | bytes):
@@ -159,6 +160,7 @@ LINES = EVERY_ORDER.splitlines()
 VALUES = ["3", "-1.5", "true", '""', '"thin"', "[]", "[1, [2]]", "{}", "{ en = 1 }", '["thin"]', "1979-05-27", "inf"]
 
 
+@pytest.mark.slow
 @given(
     st.lists(
         st.tuples(st.integers(0, len(LINES) - 1), st.sampled_from(["drop", "double", *VALUES])), min_size=1, max_size=5

@@ -6,8 +6,9 @@ from pydantic import ValidationError
 from study_app.errors import ProtocolError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Limits, Protocol
+from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.texts import tidy
-from tests.protocol.cases import SOUND
+from tests.protocol.sound import SOUND
 
 SMALL = parse(SOUND.encode(), "small.toml")
 
@@ -48,7 +49,7 @@ def test_blocks_come_in_the_order_of_the_sequence():
 
 
 def test_responses_count_repetitions():
-    assert SMALL.responses_per_participant() == 2 * 2 * 2 + 2 * 2
+    assert orders_of(SMALL).answers == 2 * 2 * 2 + 2 * 2
 
 
 def test_items_are_found_by_id():

@@ -10,8 +10,12 @@ from typing import Any
 import pytest
 
 from study_app.protocol.load import SceneFile
-from study_app.protocol.model import schema
-from tests.protocol.cases import SOUND, case
+from study_app.protocol.source.json_schema import schema
+from study_app.protocol.trials.kinds import DESIGN_KINDS
+from tests.protocol.cases import case
+from tests.protocol.forms.mixed import MIXED
+from tests.protocol.sound import SOUND
+from tests.protocol.trials.studies import BLOCK, HEAD
 
 SCHEMA = schema()
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
@@ -31,6 +35,10 @@ def complaints(value: Any, node: dict[str, Any], path: str = "") -> Iterator[str
     if "$ref" in node:
         yield from complaints(value, SCHEMA["$defs"][node["$ref"].rsplit("/", 1)[-1]], path)
         return
+    if "if" in node and not list(complaints(value, node["if"], path)):
+        yield from complaints(value, node["then"], path)
+    if "not" in node and not list(complaints(value, node["not"], path)):
+        yield f"{path}: is what it must not be"
     for key in ("anyOf", "oneOf"):
         if key in node and all(list(complaints(value, branch, path)) for branch in node[key]):
             yield f"{path}: none of the alternatives"
@@ -83,6 +91,40 @@ def test_the_schema_accepts_what_ships(name: str):
     assert list(complaints(document, SCHEMA)) == []
 
 
+def test_the_schema_accepts_what_format_2_leaves_out_and_format_1_may_not():
+    assert list(complaints(tomllib.loads(MIXED), SCHEMA)) == []
+    lacking = {one.rpartition(": ")[2] for one in complaints(tomllib.loads(MIXED) | {"format": 1}, SCHEMA)}
+    assert {"device is missing", "conditions is missing", "title is missing", "task is missing"} <= lacking
+
+
+LEVELS = HEAD + BLOCK
+
+
+@pytest.mark.parametrize("kind", DESIGN_KINDS)
+def test_the_schema_knows_every_kind_of_design(kind: str) -> None:
+    scale = 'scale = "agreement"' if kind == "rating" else ""
+    text = LEVELS.replace('design = "2ifc"', 'design = "own"') + f'[designs.own]\nkind = "{kind}"\n{scale}'
+    assert list(complaints(tomllib.loads(text), SCHEMA)) == []
+    assert list(complaints(tomllib.loads(text + "\npause_s = 99"), SCHEMA)) != []
+    assert list(complaints(tomllib.loads(text + "\npauses_s = 1"), SCHEMA)) != []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('vary = "viscosity_pa_s"', ""),
+        ("levels = [0.1, 0.8]", "levels = [0.1]"),
+        ("levels = [0.1, 0.8]", 'levels = [0.1, 0.8]\nspacing = "logarithmic"'),
+        ("repetitions = 8", "repetition = 8"),
+        ("level_error_percent = 100", "level_error_percent = 0"),
+        ("level_error_percent = 100", "attempts = 0"),
+    ],
+)
+def test_the_schema_refuses_stimuli_methods_and_limits_that_the_program_refuses(old: str, new: str) -> None:
+    assert list(complaints(tomllib.loads(LEVELS), SCHEMA)) == []
+    assert list(complaints(tomllib.loads(LEVELS.replace(old, new)), SCHEMA)) != []
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -93,7 +135,7 @@ def test_the_schema_accepts_what_ships(name: str):
         ('kind = "explore"', 'kind = "wander"'),
         ("[conditions.is_thick]", "[conditions.isThick]"),
         ('task = "reach"\n', ""),
-        ("format = 1", "format = 2"),
+        ("format = 1", "format = 3"),
     ],
 )
 def test_the_schema_refuses_what_the_program_refuses(old: str, new: str):
@@ -115,13 +157,14 @@ def test_every_reference_of_the_schema_leads_somewhere():
 def test_names_of_tables_are_not_asked_for_again():
     assert "id" not in SCHEMA["$defs"]["Block"]["properties"]
     assert "id" not in SCHEMA["$defs"]["StudyLiquid"]["then"]["required"]
-    assert "id" in SCHEMA["$defs"]["Item"]["required"]
+    assert "id" in SCHEMA["$defs"]["Statement"]["required"]
 
 
 def test_every_key_is_described():
     """An editor shows what a key means (the models of the force model describe theirs in the table)."""
-    ours = {"StudyHead", "DeviceNeeds", "SceneDefaults", "Condition", "Scale", "Item", "Questionnaire", "PageText",
-            "Block", "Limits", "Explore", "Reach"}  # fmt: skip
+    ours = {"StudyHead", "DeviceNeeds", "SceneDefaults", "Condition", "Scale", "Statement", "Questionnaire", "PageText",
+            "Block", "Limits", "Explore", "Reach", "Rating", "Slider", "Number", "Choice", "Option", "Text", "ShowIf",
+            "Score", "Stimulus", "Constant", *(kind.__name__ for kind in DESIGN_KINDS.values())}  # fmt: skip
     for name in ours:
         for key, node in SCHEMA["$defs"][name]["properties"].items():
             assert "description" in node or key == "kind", f"{name}.{key}"

@@ -12,6 +12,7 @@ import pytest
 from study_app.haptics.model.scene import Body, Ewma, Knee
 from study_app.protocol.load import load
 from study_app.protocol.model import Explore, Reach
+from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import build_schedule
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
@@ -23,9 +24,7 @@ REK = load("rek2024")
 def test_what_ships_is_sound_and_named_like_its_file(name: str):
     protocol = load(PROTOCOLS / f"{name}.toml")
     assert protocol.study.name == name.replace("_", "")
-    assert protocol.responses_per_participant() == sum(
-        len(trial.items) for trial in build_schedule(protocol, "P001", 1).trials
-    )
+    assert orders_of(protocol).answers == sum(len(trial.items) for trial in build_schedule(protocol, "P001", 1).trials)
 
 
 def keys_with_comments(text: str) -> tuple[set[str], set[str]]:
@@ -64,7 +63,7 @@ def test_every_kind_of_key_is_commented(name: str):
 
 
 def test_the_thesis_asks_62_times():
-    assert REK.responses_per_participant() == 62
+    assert orders_of(REK).answers == 62
     assert REK.parts == 2
 
 
@@ -200,5 +199,5 @@ def test_every_dutch_text_is_a_translation():
 
 def test_the_demo_needs_little():
     demo = load("demo")
-    assert demo.responses_per_participant() == 8
+    assert orders_of(demo).answers == 8
     assert demo.parts == 2

@@ -132,7 +132,7 @@ class World:
     With ``paints`` a tank's first frame is painted as soon as its page is presented.
     """
 
-    def __init__(self, seed: int = 1, recorder: Any = None) -> None:
+    def __init__(self, seed: int = 1, recorder: Any = None, **ports: Any) -> None:
         self.log: list[Any] = []
         self.servo = FakeServo(self.log)
         self.journal = FakeJournal(self.log)
@@ -140,7 +140,7 @@ class World:
         self.on_page: Callable[[Any], None] = lambda _page: None
         self.paints = True
         plan = small.opened(seed).plan
-        ports = Ports(self.servo, self.journal, self._present, self.clock, recorder, paints=False)
+        ports = Ports(self.servo, self.journal, self._present, self.clock, recorder, paints=False, **ports)
         self.runner = Runner(plan.protocol, plan.schedule, plan.key, ports, plan.language)
 
     def clock(self) -> float:

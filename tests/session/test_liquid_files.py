@@ -17,9 +17,9 @@ from study_app.evaluation.replay import replay
 from study_app.protocol.describe import describe
 from study_app.protocol.liquid_summary import warnings
 from study_app.protocol.load import load, load_scenes, parse, protocol_hash, source_bytes
-from study_app.protocol.model import schema
 from study_app.protocol.orders.block_orders import block_codes
 from study_app.protocol.orders.schedule import Trial, build_schedule, stream
+from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.liquid_files import unbundled
 from study_app.session.pages import TaskPage
 from study_app.session.request import resumed
@@ -29,7 +29,7 @@ from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import open_session
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
@@ -157,7 +157,7 @@ def test_a_ball_of_its_own_is_drawn_as_large_as_it_is_and_warned_of_where_it_tel
     assert "block liquids shows balls of different sizes (40, 68 mm)" in warned
     schedule = build_schedule(protocol, "P001", 1)
     codes = {
-        block: dict(zip(block_codes(protocol.blocks[block]), protocol.blocks[block].conditions, strict=True))
+        block: dict(zip(block_codes(protocol, protocol.blocks[block]), protocol.blocks[block].conditions, strict=True))
         for block in protocol.blocks
     }
     drawn = {}
@@ -176,6 +176,7 @@ def test_editors_are_told_of_file() -> None:
     assert (liquid["if"], liquid["then"]) == ({"not": {"required": ["file"]}}, {"required": ["density_kg_m3"]})
 
 
+@pytest.mark.slow
 @needs_servo
 def test_values_are_sealed_and_a_replay_needs_no_file(study: Path, tmp_path: Path) -> None:
     folder = rehearsal.rehearse(str(study), participants=1, seed=3, results=tmp_path / "results")
@@ -190,6 +191,7 @@ def test_values_are_sealed_and_a_replay_needs_no_file(study: Path, tmp_path: Pat
     assert verify(folder).sound
 
 
+@pytest.mark.slow
 @needs_servo
 @pytest.mark.parametrize("becomes", [None, SYRUP.replace("1387.25", "1100")])
 def test_an_interrupted_session_goes_on_with_the_sealed_liquid(
@@ -217,6 +219,8 @@ def test_an_interrupted_session_goes_on_with_the_sealed_liquid(
     if becomes is not None:
         with pytest.raises(StoreError, match="other conditions"):
             begin(
-                tmp_path / "results", load(study), source_bytes(study), "P002", seed=3, operator="", language="en",
-                device={}, screens={}, simulated=True,
-            )  # fmt: skip
+                tmp_path / "results",
+                load(study),
+                source_bytes(study),
+                SessionStart("P002", seed=3, operator="", language="en", device={}, screens={}, simulated=True),
+            )

@@ -15,6 +15,7 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import Timing
+from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.session import preflight_measurements
 from study_app.session.preflight import Facts, Screen, checks, refused
@@ -103,7 +104,7 @@ def test_what_was_not_granted_is_told_with_how_to_grant_it() -> None:
 def test_a_servo_below_500_hz_is_refused_whatever_it_achieves() -> None:
     slow = small.protocol().model_copy(update={"device": small.protocol().device.model_copy(update={"rate_hz": 400.0})})
     found = checks(replace(WELL, timing=Timing(800, 400.0, 1e-4, 2e-3, 0)), slow)
-    assert "servo rate: the servo turns 400 times a second" in refused(found)
+    assert "servo rate: the servo runs at 400 Hz" in refused(found)
     enough = slow.model_copy(update={"device": slow.device.model_copy(update={"rate_hz": 500.0})})
     assert refused(checks(replace(WELL, timing=Timing(1000, 500.0, 1e-4, 2e-3, 0)), enough)) == ""
 
@@ -164,3 +165,37 @@ def test_a_disk_that_takes_nothing_is_a_failure_with_its_reason(
     monkeypatch.setattr(preflight_measurements, "probe", full)
     facts = measured(tmp_path)
     assert "the disk is full" in refused(checks(facts, small.protocol()))
+
+
+DAMPERS = """\
+format = 2
+study.name = "dampers"
+[liquids.damper]
+drag = { law = "linear", damping_nspm = 16 }
+[tasks.stir]
+kind = "follow"
+[stimuli.damping]
+vary = "damping_nspm"
+levels = [0.02, 0.6]
+[blocks.thicker]
+stimulus = "damping"
+design = "2ifc"
+method = "constant"
+"""
+
+
+def test_levels_beyond_the_limit_of_the_measured_delay_are_refused_with_the_highest_that_is_not() -> None:
+    study = parse(DAMPERS.encode(), "dampers.toml")
+    (one,) = [check for check in checks(WELL, study) if check.name == "Levels"]
+    assert (one.verdict, one.value, one.about) == ("ok", "up to 25.6 N·s/m", "with a delay of 1 tick")
+    facts = replace(WELL, delay_ticks=2, dynamics=Dynamics(delay_s=1.6e-3))
+    (two,) = [check for check in checks(facts, study) if check.name == "Levels"]
+    assert (two.verdict, two.value, two.about) == ("failure", "up to 25.6 N·s/m", "with a delay of 2 ticks")
+    assert refused(checks(facts, study)) == (
+        "levels: standard 16 at level 0.6 gives 25.6 N·s/m at the hand; the slope limit (1000 Hz, ewma, 2 ticks) is "
+        "21.5: levels to 0.343, or the standard to 13.4"
+    )
+
+
+def test_a_study_without_levels_of_a_damper_says_nothing_of_them() -> None:
+    assert "Levels" not in verdicts()

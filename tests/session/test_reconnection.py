@@ -11,9 +11,9 @@ from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import advance
 from study_app.store.tables import session_tables
 from tests.faults.support.worlds import StoredWorld
-from tests.session.transitions.test_table import state_in
+from tests.session.transitions.states import state_in
 
-FAULT = "the device 'memory' stopped answering"
+FAULT = "the device 'memory' stopped responding"
 AGAIN = Reconnected(30.0, {"name": "memory", "force_limit_n": 8.0})
 
 
@@ -45,13 +45,13 @@ def test_a_failure_of_the_program_cannot_be_reconnected(failures: list[str]) -> 
     state = state_in(Phase.TASK)
     for by in failures:
         state, _ = advance(state, Broke(20.0, "a bug", by))  # type: ignore[arg-type]
-    with pytest.raises(SessionError, match="not stop because of its device"):
+    with pytest.raises(SessionError, match="was not stopped by its device"):
         advance(state, AGAIN)
 
 
 def test_a_session_that_broke_before_its_first_page_cannot_be_reconnected() -> None:
     trouble, _ = advance(state_in(Phase.OPENING), Broke(0.5, FAULT, "device"))
-    with pytest.raises(SessionError, match="not stop because of its device"):
+    with pytest.raises(SessionError, match="was not stopped by its device"):
         advance(trouble, AGAIN)
 
 

@@ -11,7 +11,7 @@ from study_app.app.session import entry
 from study_app.errors import StoreError
 from study_app.protocol.load import load, source_bytes
 from study_app.session.request import NewSession, resumed
-from study_app.store.sessions.begin import SessionStore, begin
+from study_app.store.sessions.begin import SessionStart, SessionStore, begin
 
 
 @pytest.fixture
@@ -21,13 +21,9 @@ def begun(tmp_path: Path) -> SessionStore:
         tmp_path / "results",
         load("demo"),
         source_bytes("demo"),
-        "P001",
-        seed=5,
-        operator="AK",
-        language="en",
-        device={"name": "mouse"},
-        screens={},
-        simulated=False,
+        SessionStart(
+            "P001", seed=5, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=False
+        ),
     )
 
 

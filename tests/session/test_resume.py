@@ -124,6 +124,30 @@ def test_later_trials_of_a_block_that_is_presented_again_count_their_attempts_to
     assert (state.trial.number, state.attempt) == (4, 1)
 
 
+def test_a_session_that_goes_on_by_block_goes_on_again_after_the_next_interruption() -> None:
+    _, lines = told(-1)
+    cut = max(n for n, line in enumerate(lines) if line["event"] == "choice" and line["trial"] == 3)
+    lines = [*lines[:cut], {"event": "session_resumed", "t_s": 100.0}]
+    protocol, presented = small.protocol(), {}
+    again = Protocol.model_validate(small.TABLES | {"study": small.TABLES["study"] | {"resume": "block"}})
+    schedule = build_schedule(again, "P001", 1)
+    for trial in (2, 3):
+        which = {"t_s": 101.0, "trial": trial, "attempt": 2}
+        lines.append({"event": "trial_started", **which})
+        presented[trial] = 2
+        start = resume_at(again, schedule, lines)
+        first = schedule.steps[start.step]
+        assert isinstance(first, Trial)
+        assert (first.block, first.index) == ("feeling", 1)
+        assert {number: start.presented[number] for number in presented} == presented
+        by_trial = resume_at(protocol, schedule, lines)
+        here = schedule.steps[by_trial.step]
+        assert isinstance(here, Trial)
+        assert here.number == trial
+        lines.append({"event": "trial_ended", **which, "outcome": "complete"})
+        lines.append({"event": "responses", **which, "items": []})
+
+
 def test_a_break_within_a_block_belongs_to_it() -> None:
     tables = small.TABLES | {
         "pages": small.TABLES["pages"] | {"rest": {"kind": "break", "title": "Rest", "body": "Breathe."}},

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.protocol.model import Explore, Reach
+from study_app.protocol.model import Explore, Follow, Reach
 from study_app.session.tasks import TargetReached, TaskView, Tracker, track
 from tests.session.small import samples
 
@@ -217,6 +217,7 @@ def slowly(task: Reach, rows: Any) -> tuple[list[tuple[int, int]], Any]:
     return found, start
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(
     st.lists(st.tuples(st.integers(1, 40), st.sampled_from([LEFT, RIGHT, AWAY])), min_size=1, max_size=40),
@@ -238,3 +239,25 @@ def test_however_the_samples_are_cut_the_result_is_that_of_one_at_a_time(
     assert [(reached.target, round(reached.t_task_s * 1e9)) for reached in found] == [
         (target, time - start) for target, time in expected
     ]
+
+
+def test_a_moving_target_is_where_it_was_at_the_time_that_is_drawn() -> None:
+    task = Follow(kind="follow", amplitude_mm=20, frequency_hz=1, cycles=2)
+    tracker = track(task)
+    assert tracker.at(0) == TaskView(0, 0, None, 0.0, 0.0, (0.0, 0.0, 0.0))
+    assert feed(tracker, (5.0, 7.3, AWAY)) == []
+    for elapsed_s in (0.0, 0.4, 1.25, 2.0):
+        seen = tracker.at(ns(5 + elapsed_s))
+        assert (seen.lit, seen.elapsed_s) == (0, elapsed_s)
+        assert seen.target_m == pytest.approx(task.target_m(elapsed_s))
+    assert tracker.at(ns(9)) == tracker.now()  # as far as it is known
+    assert not tracker.leave()
+
+
+def test_time_alone_ends_a_moving_target() -> None:
+    tracker = track(Follow(kind="follow", frequency_hz=2, cycles=3, lead_s=0.5))
+    feed(tracker, (1.0, 3.0, AWAY))
+    assert not tracker.done
+    feed(tracker, (3.0, 3.001, AWAY))
+    assert (tracker.outcome, tracker.end_ns) == ("complete", ns(3.0))
+    assert tracker.summary() == {"duration_s": 2.0, "targets_reached": None, "targets": None}

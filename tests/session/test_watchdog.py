@@ -46,7 +46,7 @@ def frames(bench: Bench, ticks: int) -> Any:
 
 
 def fail_by_silence(bench: Bench, _clock: VirtualClock) -> None:
-    bench.device._state.last_ns = 1 << 62  # nothing newer than this ever comes
+    bench.device.state.last_ns = 1 << 62  # nothing newer than this ever comes
 
 
 def fail_by_loss(bench: Bench, _clock: VirtualClock) -> None:
@@ -54,7 +54,7 @@ def fail_by_loss(bench: Bench, _clock: VirtualClock) -> None:
 
 
 def fail_by_a_force_that_is_no_number(bench: Bench, _clock: VirtualClock) -> None:
-    for model in bench.servo._loop._slots:
+    for model in bench.servo.loop.slots:
         model.liquids.drag.factor_kg_m = np.nan
 
 
@@ -62,8 +62,8 @@ def fail_by_a_force_that_is_no_number(bench: Bench, _clock: VirtualClock) -> Non
     ("fail", "said"),
     [
         (fail_by_silence, "nothing usable for 50 ms"),
-        (fail_by_loss, "stopped answering"),
-        (fail_by_a_force_that_is_no_number, "not a finite number"),
+        (fail_by_loss, "stopped responding"),
+        (fail_by_a_force_that_is_no_number, "non-finite force"),
     ],
 )
 def test_a_servo_that_faults_is_seen_within_100_ms_and_its_trial_is_marked(
@@ -77,7 +77,7 @@ def test_a_servo_that_faults_is_seen_within_100_ms_and_its_trial_is_marked(
     noticed_s = None
     for _ in range(10):
         bench.servo.advance(FRAME_TICKS)
-        clock._memory[0].now_ns += FRAME_TICKS * 1_000_000 if bench.servo.fault else 0  # the loop has ended
+        clock.memory[0].now_ns += FRAME_TICKS * 1_000_000 if bench.servo.fault else 0  # the loop has ended
         bench.runner.poll()
         if bench.runner.state.phase is Phase.TROUBLE:
             noticed_s = bench.clock()

@@ -16,7 +16,7 @@ from study_app.haptics.model.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.clock import SessionClock
-from study_app.store.sessions.begin import SessionStore, begin
+from study_app.store.sessions.begin import SessionStart, SessionStore, begin
 
 SEVEN = ("Completely disagree", "Mostly", "Somewhat", "Neutral", "Somewhat agree", "Mostly agree", "Completely agree")
 
@@ -101,22 +101,26 @@ def clock() -> SessionClock:
 
 @pytest.fixture
 def start(tmp_path: Path, protocol: Protocol, clock: SessionClock) -> Callable[..., SessionStore]:
-    """Begin a session of P007 in tmp_path/study; any argument of ``begin`` can be given."""
+    """Begin a session of P007 in tmp_path/study; any value of its ``SessionStart`` can be given, and of ``begin``."""
 
-    def begun(participant: str = "P007", **given: Any) -> SessionStore:
-        arguments: dict[str, Any] = {
-            "results": tmp_path / "study",
-            "protocol": protocol,
-            "source": SOURCE,
+    def begun(
+        participant: str = "P007",
+        *,
+        results: Path = tmp_path / "study",
+        protocol: Protocol = protocol,
+        source: bytes = SOURCE,
+        clock: SessionClock = clock,
+        **given: Any,
+    ) -> SessionStore:
+        values: dict[str, Any] = {
             "seed": 11,
             "operator": "AB",
             "language": "en",
             "device": {"name": "scripted", "rate_hz": 1000},
             "screens": {"participant": {"width": 1920, "height": 1080, "refresh_hz": 60.0}},
             "simulated": False,
-            "clock": clock,
         }
-        return begin(participant=participant, **(arguments | given))
+        return begin(results, protocol, source, SessionStart(participant, **(values | given)), clock=clock)
 
     return begun
 

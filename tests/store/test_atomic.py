@@ -12,13 +12,13 @@ from study_app.errors import StoreError
 from study_app.store.atomic import (
     OLD_S,
     append_line,
-    beside,
     create_folder,
     is_there,
     probe,
     sweep,
     sweep_old,
     temporaries,
+    temporary_path,
     write_file,
 )
 
@@ -110,7 +110,7 @@ def test_a_line_that_does_not_fit_is_taken_back(tmp_path: Path, files_up_to: Ful
 
 
 def test_what_is_half_written_is_known_by_its_name_and_swept(tmp_path: Path) -> None:
-    half = [beside(tmp_path / name) for name in ("table.csv", "trial-001.parquet", "folder")]
+    half = [temporary_path(tmp_path / name) for name in ("table.csv", "trial-001.parquet", "folder")]
     kept = [
         "table.csv",
         ".table.csv.tmp",
@@ -125,7 +125,7 @@ def test_what_is_half_written_is_known_by_its_name_and_swept(tmp_path: Path) -> 
     for name in kept:
         (tmp_path / name).write_text("kept")
     (tmp_path / "below").mkdir()
-    below = beside(tmp_path / "below" / "table.csv")
+    below = temporary_path(tmp_path / "below" / "table.csv")
     below.write_text("kept")
     assert temporaries(tmp_path) == tuple(sorted(half))
     assert sweep(tmp_path) == tuple(sorted(half))
@@ -141,11 +141,14 @@ def test_where_one_can_write_free_space_is_told_and_nothing_left(tmp_path: Path)
 
 
 def test_where_one_cannot_write_is_told_before_anything_is_begun(tmp_path: Path, files_up_to: FullDisk) -> None:
-    with files_up_to(3), pytest.raises(StoreError, match=r"results cannot be written \(File too large\): free space"):
+    with (
+        files_up_to(3),
+        pytest.raises(StoreError, match=r"results cannot be written \(File too large\): free disk space"),
+    ):
         probe(tmp_path / "results")
     assert names_in(tmp_path) == []
     (tmp_path / "file").touch()
-    with pytest.raises(StoreError, match=r"file cannot be written \(Not a directory\)"):
+    with pytest.raises(StoreError, match=r"file cannot be written \(a file is where a folder is needed\)"):
         probe(tmp_path / "file")
 
 

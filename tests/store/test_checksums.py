@@ -39,7 +39,7 @@ def test_what_is_known_is_not_computed_again(session: SessionFolder) -> None:
 @pytest.mark.parametrize("content", [b"no checksum\n", b"\xff\n", b"ab  journal.jsonl\n"])
 def test_what_is_no_list_is_named(session: SessionFolder, content: bytes) -> None:
     session.checksums.write_bytes(content)
-    with pytest.raises(StoreError, match=r"checksums\.sha256 (is no list|has a line that is no checksum)"):
+    with pytest.raises(StoreError, match=r"checksums\.sha256 (is not a list|has a line that is not a checksum)"):
         read_checksums(session)
 
 

@@ -17,6 +17,8 @@ from study_app.store.sessions.rebuild import rebuild
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
+pytestmark = pytest.mark.slow
+
 HELD = Path(__file__).parent / "earlier_format"
 ENDED = "data/sub-P001/ses-01"
 KILLED = "data/sub-P002/ses-01"
@@ -36,8 +38,8 @@ def warned(study: Path) -> str:
 
 def test_it_verifies_with_a_note(study: Path) -> None:
     found = warned(study)
-    assert "data: 2 journals are of format 1, whose lines do not tell whether a line before was changed" in found
-    assert f"{KILLED}: is unfinished: resume it, or leave it so" in found
+    assert "data: 2 journals are of format 1, whose lines cannot show whether an earlier line was changed" in found
+    assert f"{KILLED}: is unfinished: resume it, or leave it unfinished" in found
     changed = StudyFolder(study).session("P001", 1).journal
     content = changed.read_bytes()
     changed.write_bytes(content.replace(b'"value":4', b'"value":5', 1))

@@ -96,11 +96,11 @@ def test_what_cannot_be_left_out_is_refused_untouched(folder: Path, given: dict[
 def test_what_is_left_out_already_is_refused(folder: Path) -> None:
     exclude(folder, "P007", 1, trial=2, by="AB", reason="the phone rang", now=NOW)
     with pytest.raises(
-        StoreError, match=r"session 1, trial 2 is left out already, since 2026-03-02.*\(the phone rang\)"
+        StoreError, match=r"session 1, trial 2 is already excluded, since 2026-03-02.*\(the phone rang\)"
     ):
         exclude(folder, "P007", 1, trial=2, by="CD", reason="again")
     exclude(folder, "P007", 1, by="AB", reason="all of it")
-    with pytest.raises(StoreError, match=r"trial 3 is left out already.*\(all of it\)"):
+    with pytest.raises(StoreError, match=r"trial 3 is already excluded.*\(all of it\)"):
         exclude(folder, "P007", 1, trial=3, by="CD", reason="again")
     assert len(exclusions(folder)) == 2
 
@@ -125,15 +125,18 @@ def test_a_full_disk_leaves_the_list_as_it_was(folder: Path, files_up_to: FullDi
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        (b"", "its columns must be participant, session, trial, rule_or_person, reason, excluded_at, found "),
-        (b"participant,why\n", "found participant, why"),
-        (b"\xff", "is no UTF-8"),
-        (b"x" * 200_000, "is no CSV (field larger than field limit"),
+        (b"", "its columns must be participant, session, trial, rule_or_person, reason, excluded_at, but are "),
+        (b"participant,why\n", "but are participant, why"),
+        (b"\xff", "is not UTF-8"),
+        (b"x" * 200_000, "is not CSV (field larger than field limit"),
         (
             b"participant,session,trial,rule_or_person,reason,excluded_at\nP007,one,1,AB,x,y\n",
             "row 2: 'P007,one,1,AB,x,y'",
         ),
-        (b"participant,session,trial,rule_or_person,reason,excluded_at\nP007,1\n", "row 2: 'P007,1' is no exclusion"),
+        (
+            b"participant,session,trial,rule_or_person,reason,excluded_at\nP007,1\n",
+            "row 2: 'P007,1' is not an exclusion",
+        ),
     ],
 )
 def test_a_list_that_makes_no_sense_is_named(folder: Path, content: bytes, sentence: str) -> None:
@@ -175,6 +178,7 @@ for line in sys.stdin:
 """
 
 
+@pytest.mark.slow
 def test_of_two_people_at_once_no_decision_is_lost(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
     """Whoever is told that it was written finds it in the list; the other is told to try again."""
     for number in range(40):
@@ -223,7 +227,7 @@ def test_an_exclusion_is_taken_back_and_stays_on_record(folder: Path) -> None:
 def test_what_is_not_left_out_cannot_be_taken_back(folder: Path) -> None:
     exclude(folder, "P007", 1, trial=2, by="AB", reason="the phone rang", now=NOW)
     before = (folder / "exclusions.csv").read_bytes()
-    with pytest.raises(StoreError, match=r"participant P007, session 1 is not left out; left out: .*trial 2"):
+    with pytest.raises(StoreError, match=r"participant P007, session 1 is not excluded; excluded: .*trial 2"):
         include(folder, "P007", 1, by="CD", reason="wrong")
     with pytest.raises(StoreError, match="--reason is empty"):
         include(folder, "P007", 1, trial=2, by="CD", reason=" ")

@@ -7,7 +7,7 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store.folders import StudyFolder, locate, study_folder
-from study_app.store.sessions.participant_ids import check_participant, check_unused, suggest_id
+from study_app.store.sessions.participant_ids import check_participant, check_unused, used_ids
 
 
 def with_sessions(path: Path, *names: str) -> StudyFolder:
@@ -66,7 +66,7 @@ def test_anything_else_is_refused_with_the_id_and_what_is_permitted(bad: str) ->
 
 @pytest.mark.parametrize("reserved", ["test", "pilot", "Test", "PILOT"])
 def test_the_ids_of_trial_runs_are_refused_but_in_a_pilot(reserved: str) -> None:
-    with pytest.raises(StoreError, match=rf"'{reserved}' is kept for pilot sessions"):
+    with pytest.raises(StoreError, match=rf"'{reserved}' is reserved for pilot sessions"):
         check_participant(reserved)
     check_participant(reserved, pilot=True)
 
@@ -83,9 +83,9 @@ def test_sessions_are_found_in_order_and_strangers_passed_over(tmp_path: Path) -
 
 
 def test_the_next_free_id_is_suggested(tmp_path: Path) -> None:
-    assert suggest_id(StudyFolder(tmp_path / "none")) == "P001"
+    assert used_ids(StudyFolder(tmp_path / "none")).suggested() == "P001"
     folder = with_sessions(tmp_path, "sub-P010/ses-01", "sub-anna/ses-01", "sub-p011/ses-01")
-    assert suggest_id(folder) == "P012"
+    assert used_ids(folder).suggested() == "P012"
 
 
 def test_a_used_session_is_refused_with_three_ways_to_go_on(tmp_path: Path) -> None:
@@ -103,7 +103,7 @@ def test_a_used_session_is_refused_with_three_ways_to_go_on(tmp_path: Path) -> N
 def test_an_id_that_differs_in_capitals_alone_is_refused(tmp_path: Path) -> None:
     """Some file systems cannot tell them apart, and neither can people."""
     folder = with_sessions(tmp_path, "sub-P002/ses-01")
-    with pytest.raises(StoreError, match="'p002' differs from the used 'P002' in capitals alone"):
+    with pytest.raises(StoreError, match="'p002' differs from the used 'P002' only in capitalisation"):
         check_unused(folder, "p002", 2)
 
 
@@ -129,5 +129,5 @@ def test_a_sessions_folder_is_known_from_its_path(tmp_path: Path) -> None:
 def test_other_folders_are_no_sessions(tmp_path: Path, name: str) -> None:
     if name != "gone":
         (tmp_path / name).mkdir(parents=True)
-    with pytest.raises(StoreError, match="is no session's folder: name one such as results/rek2024/data"):
+    with pytest.raises(StoreError, match="is not a session folder: name one such as results/rek2024/data"):
         locate(tmp_path / name)

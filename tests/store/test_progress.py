@@ -71,7 +71,12 @@ def test_it_stands_at_the_first_step_that_was_not_left(
     events: list[dict[str, Any]], step: int, under_way: dict[str, Any]
 ) -> None:
     lines = lines_of(*events)
-    assert progress_of(lines) == Progress(lines[0], step=step, t_s=progress_of(lines).t_s, **under_way)
+    assert place(progress_of(lines)) == place(Progress(lines[0], step=step, **under_way))
+
+
+def place(told: Progress) -> dict[str, Any]:
+    names = ("start", "step", "page", "trial", "attempt", "task_done", "answers", "ended", "resumed", "language")
+    return {name: getattr(told, name) for name in names}
 
 
 def test_choices_of_the_attempt_are_told_as_they_would_be_answered() -> None:
@@ -95,6 +100,19 @@ def test_choices_of_the_attempt_are_told_as_they_would_be_answered() -> None:
 def test_a_new_attempt_forgets_the_choices_of_the_one_before() -> None:
     lines = lines_of(started(1), ended(1), chosen("wet", 5, 5.0), started(1, 2), ended(1, 2))
     assert progress_of(lines).answers == {}
+
+
+def test_choices_that_no_confirmation_followed_are_kept_by_attempt() -> None:
+    removed = {"event": "answer_removed", "trial": 1, "item": "wet"}
+    second = (started(1, 2), ended(1, 2), chosen("wet", 2, 7.0), removed, chosen("calm", None, 8.0))
+    lines = lines_of(started(1), ended(1), chosen("wet", 5, 5.0), *second)
+    assert unconfirmed(lines) == {(1, 1): {"wet": 5}, (1, 2): {"calm": None}}
+    assert unconfirmed(lines_of(*lines[1:], ANSWERED | {"attempt": 2})) == {(1, 1): {"wet": 5}}
+
+
+def unconfirmed(lines: list[dict[str, Any]]) -> dict[tuple[int, int], dict[str, Any]]:
+    found = progress_of(lines).unconfirmed
+    return {which: {item: given.value for item, given in chosen.items()} for which, chosen in found.items()}
 
 
 def test_the_latest_moment_counts_however_lines_are_ordered() -> None:
@@ -133,7 +151,7 @@ def test_a_torn_line_counts_as_never_written(start: Callable[..., SessionStore])
 
 
 def test_what_is_no_session_is_named(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
-    with pytest.raises(StoreError, match="is no session's folder: name one such as"):
+    with pytest.raises(StoreError, match="is not a session folder: name one such as"):
         progress(tmp_path)
     with pytest.raises(StoreError, match="does not begin with session_started"):
         progress_of([])

@@ -48,7 +48,7 @@ def test_a_receipt_comes_back(tmp_path: Path) -> None:
 def test_what_is_no_receipt_is_named(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "receipt.json"
     path.write_bytes(content)
-    with pytest.raises(StoreError, match=r"receipt\.json is no receipt"):
+    with pytest.raises(StoreError, match=r"receipt\.json is not a receipt"):
         read(path)
 
 

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,7 @@ def recorder(tmp_path: Path) -> Iterator[Recorder]:
 class Disk:
     """Files that are written only while the disk is let to."""
 
-    def __init__(self) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.works = threading.Event()
         self.asked = threading.Event()
         disk = self
@@ -44,13 +43,12 @@ class Disk:
                 assert disk.works.wait(20)
                 super().write(samples)
 
-        self.files = SimpleNamespace(SamplesFile=SlowFile, write_frames=recording.write_frames)
+        monkeypatch.setattr(recording, "SamplesFile", SlowFile)
 
 
-def slow(folder: Path, **given: Any) -> tuple[Recorder, Disk]:
-    recorder, disk = Recorder(folder, FACTS, **given), Disk()
-    recorder._files = disk.files  # type: ignore[assignment]
-    return recorder, disk
+@pytest.fixture
+def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
+    return Disk(monkeypatch)
 
 
 def record(recorder: Recorder, samples: Any, *, trial: int = 3, attempt: int = 1, chunk: int = 17) -> None:
@@ -81,6 +79,7 @@ def test_a_trial_is_on_the_disk_under_its_name_after_its_end(
     assert recorder.kept() == ()
 
 
+@pytest.mark.slow
 def test_the_same_samples_give_the_same_file_however_they_came(tmp_path: Path, samples_of: Make) -> None:
     samples = samples_of(65_000)
     sums = set()
@@ -126,9 +125,11 @@ def test_between_trials_nothing_is_kept(recorder: Recorder, samples_of: Make) ->
     assert [kept.samples.rows for kept in recorder.kept() if isinstance(kept, Recorded)] == [5]
 
 
-def test_a_disk_that_stands_still_holds_nobody_up_and_drops_are_counted(tmp_path: Path, samples_of: Make) -> None:
+def test_a_disk_that_stands_still_holds_nobody_up_and_drops_are_counted(
+    tmp_path: Path, samples_of: Make, disk: Disk
+) -> None:
     """Handing over goes on in this thread while the other waits for the disk; what finds no room is counted."""
-    recorder, disk = slow(tmp_path / "recordings", room=40_000)
+    recorder = Recorder(tmp_path / "recordings", FACTS, room=40_000)
     recorder.start(1, 1, 1000.0)
     samples = samples_of(100_000)
     recorder.append(samples[:30_000])
@@ -161,8 +162,8 @@ def test_a_full_disk_loses_a_recording_with_its_reason_and_the_next_is_kept(
     recorder = Recorder(tmp_path / "recordings", FACTS, waits=True)
     with files_up_to(size):
         record(recorder, samples_of(70_000), trial=1)
-        with recorder._changed:
-            assert recorder._changed.wait_for(lambda: recorder._kept, 20)
+        with recorder.changed:
+            assert recorder.changed.wait_for(lambda: recorder.lost, 20)
     assert recorder.kept() == (Lost(1, 1, "File too large"),)
     record(recorder, samples_of(200), trial=2)
     recorder.close()
@@ -189,7 +190,7 @@ def test_the_folder_is_on_the_disk_before_its_first_file(
 
 
 def test_what_cannot_even_be_taken_away_loses_one_recording_and_not_the_next(
-    recorder: Recorder, samples_of: Make
+    recorder: Recorder, samples_of: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Stuck(SamplesFile):
         def finish(self, dropped: int = 0) -> recording.Written:
@@ -199,11 +200,11 @@ def test_what_cannot_even_be_taken_away_loses_one_recording_and_not_the_next(
             super().abandon()
             raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
-    recorder._files = SimpleNamespace(SamplesFile=Stuck, write_frames=recording.write_frames)  # type: ignore[assignment]
-    record(recorder, samples_of(200), trial=1)
-    with recorder._changed:
-        assert recorder._changed.wait_for(lambda: recorder._kept, 20)
-    recorder._files = recording
+    with monkeypatch.context() as patched:
+        patched.setattr(recording, "SamplesFile", Stuck)
+        record(recorder, samples_of(200), trial=1)
+        with recorder.changed:
+            assert recorder.changed.wait_for(lambda: recorder.lost, 20)
     record(recorder, samples_of(200), trial=2)
     recorder.close()
     lost, kept = recorder.kept()
@@ -211,18 +212,20 @@ def test_what_cannot_even_be_taken_away_loses_one_recording_and_not_the_next(
     assert isinstance(kept, Recorded)
 
 
-def test_any_failure_loses_one_recording_and_tells_it_at_once(recorder: Recorder, samples_of: Make) -> None:
+def test_any_failure_loses_one_recording_and_tells_it_at_once(
+    recorder: Recorder, samples_of: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
     class Broken(SamplesFile):
         def write(self, samples: Any) -> None:
             raise ValueError("a column of another length")
 
-    recorder._files = SimpleNamespace(SamplesFile=Broken, write_frames=recording.write_frames)  # type: ignore[assignment]
-    record(recorder, samples_of(200), trial=1)
-    with recorder._changed:
-        assert recorder._changed.wait_for(lambda: recorder._lost, 20)
+    with monkeypatch.context() as patched:
+        patched.setattr(recording, "SamplesFile", Broken)
+        record(recorder, samples_of(200), trial=1)
+        with recorder.changed:
+            assert recorder.changed.wait_for(lambda: recorder.lost, 20)
     lost = Lost(1, 1, "ValueError: a column of another length")
     assert recorder.lost == (lost,)
-    recorder._files = recording
     record(recorder, samples_of(200), trial=2)
     recorder.close()
     told, kept = recorder.kept()
@@ -240,19 +243,22 @@ def test_a_folder_that_cannot_be_made_loses_every_recording(tmp_path: Path, samp
     assert recorder.kept() == (Lost(1, 1, "File exists"), Lost(2, 1, "File exists"))
 
 
-def test_the_end_of_a_session_does_not_wait_for_ever(tmp_path: Path, samples_of: Make) -> None:
-    recorder, disk = slow(tmp_path / "recordings")
+def test_the_end_of_a_session_does_not_wait_for_ever(tmp_path: Path, samples_of: Make, disk: Disk) -> None:
+    recorder = Recorder(tmp_path / "recordings", FACTS)
     record(recorder, samples_of(40_000), chunk=5_000)
     assert disk.asked.wait(20)
     recorder.close(patience_s=0.0)
-    assert recorder.kept() == (Lost(3, 1, "the disk did not take it in time"),)
+    assert recorder.kept() == (Lost(3, 1, "the disk was too slow"),)
     disk.works.set()
     recorder.close()
     assert recorder.kept() == ()
+    assert recorder.thread is not None
+    recorder.thread.join(20)
+    assert list((tmp_path / "recordings").iterdir()) == [], "it was said to be lost"
 
 
-def test_whether_all_is_on_the_disk_is_told_without_waiting(tmp_path: Path, samples_of: Make) -> None:
-    recorder, disk = slow(tmp_path / "recordings")
+def test_whether_all_is_on_the_disk_is_told_without_waiting(tmp_path: Path, samples_of: Make, disk: Disk) -> None:
+    recorder = Recorder(tmp_path / "recordings", FACTS)
     record(recorder, samples_of(40_000), chunk=5_000)
     assert disk.asked.wait(20)
     before = time.perf_counter()
@@ -267,9 +273,9 @@ def test_whether_all_is_on_the_disk_is_told_without_waiting(tmp_path: Path, samp
 
 
 def test_a_disk_that_never_comes_back_is_given_up_without_waiting(
-    tmp_path: Path, samples_of: Make, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, samples_of: Make, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    recorder, disk = slow(tmp_path / "recordings")
+    recorder = Recorder(tmp_path / "recordings", FACTS)
     record(recorder, samples_of(40_000), chunk=5_000)
     assert disk.asked.wait(20)
     assert not recorder.settled()
@@ -277,10 +283,10 @@ def test_a_disk_that_never_comes_back_is_given_up_without_waiting(
     monkeypatch.setattr("study_app.store.recorder.time.monotonic", lambda: later)
     assert recorder.settled()
     recorder.close()
-    assert recorder.kept() == (Lost(3, 1, "the disk did not take it in time"),)
+    assert recorder.kept() == (Lost(3, 1, "the disk was too slow"),)
     disk.works.set()
-    assert recorder._thread is not None
-    recorder._thread.join(20)
+    assert recorder.thread is not None
+    recorder.thread.join(20)
 
 
 def test_after_its_end_it_keeps_nothing(recorder: Recorder, samples_of: Make) -> None:
@@ -292,7 +298,7 @@ def test_after_its_end_it_keeps_nothing(recorder: Recorder, samples_of: Make) ->
 
 def test_a_session_without_trials_starts_no_thread(recorder: Recorder) -> None:
     recorder.close()
-    assert "recorder" not in {thread.name for thread in threading.enumerate()}
+    assert recorder.thread is None
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
@@ -302,18 +308,19 @@ def test_a_thread_that_ends_loses_its_trial_at_once_and_the_next_trial_starts_an
     class Ended(BaseException):
         """What no guard for exceptions holds back."""
 
-    def ends(_begin: Any) -> None:
+    threads = []
+
+    def ends(*_arguments: Any) -> None:
+        threads.append(threading.current_thread())
         raise Ended("pulled")
 
     with monkeypatch.context() as patched:
-        patched.setattr(recorder, "_record", ends)
+        patched.setattr(recording, "SamplesFile", ends)
         patched.setattr(threading, "excepthook", lambda _arguments: None)
         recorder.start(1, 1, 1000.0)
-        with recorder._changed:
-            assert recorder._changed.wait_for(lambda: recorder._lost, 10.0)
-        for thread in threading.enumerate():
-            if thread.name == "recorder":
-                thread.join(10.0)
+        with recorder.changed:
+            assert recorder.changed.wait_for(lambda: recorder.lost, 10.0)
+        threads[0].join(10.0)
         assert recorder.lost == (Lost(1, 1, "its thread ended: Ended: pulled"),)
         recorder.append(samples_of(10))
         recorder.stop()
@@ -328,7 +335,7 @@ def test_a_thread_that_ends_loses_its_trial_at_once_and_the_next_trial_starts_an
 def test_a_thread_that_cannot_be_started_loses_recordings_and_not_the_session(
     recorder: Recorder, samples_of: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuses(_thread: threading.Thread) -> None:
+    def refuses(thread: threading.Thread) -> None:
         raise RuntimeError("can't start new thread")
 
     with monkeypatch.context() as patched:

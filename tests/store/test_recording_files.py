@@ -80,6 +80,7 @@ def test_a_first_force_that_is_no_number_is_none(tmp_path: Path, samples_of: Mak
     assert np.array_equal(read["device_force_n"][0], [np.nan, 0.0, 0.0], equal_nan=True)
 
 
+@pytest.mark.slow
 @given(
     position=st.lists(st.floats(width=64), min_size=3, max_size=3),
     time_ns=st.integers(-(2**62), 2**62),
@@ -203,7 +204,7 @@ def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None
         (read_frames, samples, "holds samples, not frames"),
         (read_samples, frames, "holds frames, not samples"),
         (read_checks, frames, "holds frames, not samples"),
-        (read_samples, other, "is no recording of ours"),
+        (read_samples, other, "is not a recording of this program"),
         (read_samples, torn, "is damaged"),
         (read_facts, torn, "is damaged"),
         (read_samples, tmp_path / "none.parquet", "cannot be read"),

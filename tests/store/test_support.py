@@ -53,7 +53,7 @@ def plant(caplog: pytest.LogCaptureFixture) -> None:
     try:
         fails()
     except ValueError as error:
-        log.exception("the session broke: %s", error)  # noqa: TRY401 - as the program does
+        log.exception("the session failed: %s", error)  # noqa: TRY401 - as the program does
         log.exception("the panel %r failed: %d times", ID, 6)
     log.warning("the session waits: %s", StoreError(f"/home/tester-home/results/data/sub-{ID}/journal.jsonl: no space"))
     log.warning("%(answer)s of %(who)s", {"answer": ANSWER, "who": ID})
@@ -88,7 +88,7 @@ def test_nothing_of_a_study_is_in_it(
         *("README.txt", "versions.json", "settings.json", "log.txt", "last-error.txt", "diagnosis.txt", "crash-1.txt")
     }
     assert "tests/store/test_support.py" not in everything  # outside the package: the file's name alone
-    assert "the session broke: ValueError" in found["log.txt"]
+    assert "the session failed: ValueError" in found["log.txt"]
     assert "the panel … failed: … times" in found["last-error.txt"]
     assert "test_support.py:" in found["last-error.txt"]
     assert "in fails" in found["last-error.txt"]
@@ -104,12 +104,13 @@ def test_a_failure_of_the_device_is_told_in_full_and_is_the_last_error(
     logged: logging.Logger, caplog: pytest.LogCaptureFixture
 ) -> None:
     log.error("a bug")
-    log.info(DEVICE_FAILED, DeviceLost("the device 'falcon' stopped answering"))
-    log.info("the device was connected again")
+    log.info(DEVICE_FAILED, DeviceLost("the device 'falcon' stopped responding"))
+    log.info("the device was reconnected")
     caplog.clear()
-    assert last_error(kept_log()).endswith("the device failed: the device 'falcon' stopped answering")
+    assert last_error(kept_log()).endswith("the device failed: the device 'falcon' stopped responding")
 
 
+@pytest.mark.slow
 def test_the_log_is_kept_within_bounds_and_one_that_cannot_be_written_disturbs_nobody(
     logged: logging.Logger, capfd: pytest.CaptureFixture[str]
 ) -> None:

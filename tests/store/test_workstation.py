@@ -78,10 +78,10 @@ def _full(_descriptor):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("{", "no JSON"),
-        ("", "no JSON"),
-        ("\udc00".encode("utf-8", "surrogatepass"), "no JSON"),
-        ("[1]", "no table"),
+        ("{", "not JSON"),
+        ("", "not JSON"),
+        ("\udc00".encode("utf-8", "surrogatepass"), "not JSON"),
+        ("[1]", "not a table"),
         ('{"viewing_distnce_mm": 600}', 'did you mean "viewing_distance_mm"?'),
         ('{"display_offset": {"mean": 20}}', 'did you mean "mean_ms"?'),
         ('{"viewing_distance_mm": "600"}', "must be a number"),

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from study_app.errors import StoreError
-from study_app.haptics.model.scene import Wake
+from study_app.haptics.model.effects.wake import Wake
 from study_app.validation import thesis_figures, thesis_motions
 from study_app.validation.thesis_motions import EXPONENTS, FIGURES, LENGTH, figure_3, figure_4, figure_5, figure_6
 from tests.haptics.scenes import COMPILED, WATER_FACTOR, vectors
@@ -136,6 +136,7 @@ def test_figure_8_the_wake_fills_as_the_power_of_the_share_that_is_filled():
     assert halves == sorted(halves)
 
 
+@pytest.mark.slow
 def test_every_figure_is_drawn_whole():
     """Title, caption and named curves; nothing is cut off."""
     for make in FIGURES:
@@ -170,6 +171,7 @@ def test_the_force_is_drawn_per_axis_over_time():
     assert len({line.get_color() for line in lines.values()}) == 3
 
 
+@pytest.mark.slow
 def test_the_same_bytes_every_time_in_three_formats_with_the_caption_as_text(monkeypatch, tmp_path):
     monkeypatch.setattr(thesis_figures, "FIGURES", [figure_3, thesis_motions.figure_8])
     first, second = thesis_figures.figures(tmp_path / "new" / "a"), thesis_figures.figures(tmp_path / "b")

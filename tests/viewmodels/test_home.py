@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 import pytest
@@ -10,10 +11,13 @@ from study_app.protocol.load import load, source_bytes
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.store.exclusions import exclude
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.viewmodels.home import BrokenFacts, StudyFacts, held, interrupted, sources, study_facts
+from study_app.viewmodels.session.columns import incidents, matching, states_of, status_chip, validity_chip
+from study_app.viewmodels.session.record import read_record
 from study_app.viewmodels.sessions import sessions, started_words
+from tests.protocol.groups.grouped import GROUPS, STUDY
 
 
 def start(results, participant, status=None, *, simulated=False):
@@ -22,13 +26,15 @@ def start(results, participant, status=None, *, simulated=False):
         results / "demo",
         protocol,
         source_bytes("demo"),
-        participant,
-        seed=1,
-        operator="AK",
-        language="en",
-        device={"name": "scripted"},
-        screens={},
-        simulated=simulated,
+        SessionStart(
+            participant,
+            seed=1,
+            operator="AK",
+            language="en",
+            device={"name": "scripted"},
+            screens={},
+            simulated=simulated,
+        ),
     )
     if status is None:
         store.close()
@@ -36,20 +42,22 @@ def start(results, participant, status=None, *, simulated=False):
         store.finish(status)
 
 
-def stop_at(results, participant, steps, *, screens=None):
+def stop_at(results, participant, steps, *, screens=None, source="demo", then=()):
     """Leave a session unfinished after so many steps of its schedule, or in the middle of the next one."""
-    protocol = load("demo")
+    protocol = load(source)
     store = begin(
         results / "demo",
         protocol,
-        source_bytes("demo"),
-        participant,
-        seed=1,
-        operator="AK",
-        language="en",
-        device={"name": "mouse"},
-        screens=screens or {"participant": {}},
-        simulated=False,
+        source_bytes(source),
+        SessionStart(
+            participant,
+            seed=1,
+            operator="AK",
+            language="en",
+            device={"name": "mouse"},
+            screens=screens or {"participant": {}},
+            simulated=False,
+        ),
     )
     schedule = build_schedule(protocol, participant, 1)
     for step in schedule.steps[:steps]:
@@ -65,6 +73,8 @@ def stop_at(results, participant, steps, *, screens=None):
             for n, item in enumerate(step.items, 1)
         ]
         store.append("responses", trial=step.number, attempt=1, items=rows)
+    for event, said in then:
+        store.append(event, **said)
     store.close()
 
 
@@ -75,7 +85,7 @@ def stop_at(results, participant, steps, *, screens=None):
         (1, "in part 1, liquid setting 1 of 2", 0),
         (2, "in part 1, liquid setting 2 of 2", 2),
         (4, "in part 2, delay setting 1 of 2", 4),
-        (7, "after its last page", 8),
+        (7, "after the last page", 8),
     ],
 )
 def test_an_interrupted_session_is_told_by_where_it_stopped_and_what_is_on_disk(tmp_path, steps, where, answers):
@@ -100,6 +110,23 @@ def test_only_what_can_go_on_here_is_offered(tmp_path):
     opening = open_alone(tmp_path / "demo" / "data" / "sub-P003" / "ses-01")
     assert interrupted(sessions(tmp_path, {}), studies, now) is None
     opening.release()
+
+
+def test_a_session_of_a_study_whose_liquid_file_is_lost_is_offered(tmp_path):
+    source, liquid = tmp_path / "mine.toml", tmp_path / "thick.toml"
+    table = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]\n'
+    text = source_bytes("demo").decode()
+    assert table in text
+    source.write_text(text.replace(table, '[liquids.thick]\nfile = "thick.toml"\n'), encoding="utf-8")
+    liquid.write_text(f"format = 1\n{table}", encoding="utf-8")
+    results, now = tmp_path / "results", datetime.now().astimezone()
+    stop_at(results, "P001", 2, source=source)
+    whole = interrupted(sessions(results, {}), [study_facts("demo"), study_facts(str(source))], now)
+    liquid.unlink()
+    broken = study_facts(str(source))
+    assert isinstance(broken, BrokenFacts)
+    assert whole.source == str(source)
+    assert interrupted(sessions(results, {}), [broken, study_facts("demo")], now) == whole
 
 
 def test_the_shipped_protocols_are_at_hand_the_demo_last():
@@ -135,6 +162,32 @@ def test_sessions_that_need_care_stand_first_then_the_newest(tmp_path):
         ("P001", "completed"),
     ]
     assert (found[0].answers, found[0].answers_of) == (0, 8)
+
+
+def test_a_session_open_in_a_program_is_running_until_that_ends(tmp_path):
+    start(tmp_path, "P001")
+    opening = open_alone(sessions(tmp_path, {})[0].folder)
+    (running,) = sessions(tmp_path, {})
+    assert (running.status, status_chip(running)[2], running.needs_care) == ("running", "Running", False)
+    assert ("running", "Running") in states_of([running])
+    assert validity_chip(replace(running, validity="valid"))[2] == "Open"
+    opening.release()
+    (stopped,) = sessions(tmp_path, {})
+    assert (stopped.status, status_chip(stopped)[2]) == ("unfinished", "Interrupted")
+
+
+def test_lost_recordings_and_a_reconnected_device_show_in_the_row(tmp_path):
+    lost = {"trial": 1, "attempt": 1, "reason": "the disk is full"}
+    device = {"device": "mouse", "described": {}}
+    stop_at(tmp_path, "P001", 3, then=[("recording_lost", lost), ("device_reconnected", device)])
+    stop_at(tmp_path, "P002", 3, then=[("note", {"kind": "note", "text": '"event":"recording_lost",'})])
+    rows = {row.participant: row for row in sessions(tmp_path, {})}
+    assert validity_chip(rows["P001"])[2] == "Recording lost"
+    assert incidents(rows["P001"]) == "1 recording lost, device reconnected"
+    assert ("lost", "Recording lost") in states_of(rows.values())
+    assert [row for row in rows.values() if matching("", "lost")(row)] == [rows["P001"]]
+    assert incidents(rows["P002"]) == ""
+    assert incidents(read_record(rows["P001"].folder).facts) in read_record(rows["P001"].folder).about
 
 
 def test_simulated_sessions_are_not_counted_as_held(tmp_path):
@@ -191,3 +244,11 @@ def test_a_session_whose_journal_tells_nothing_is_still_listed(tmp_path):
     found = sessions(tmp_path, {})
     assert [(one.participant, one.status) for one in found] == [("P001", "damaged"), ("P002", "completed")]
     assert found[0].answers == 0
+
+
+def test_the_extent_of_a_study_with_groups_is_a_range(tmp_path):
+    (tmp_path / "grouped.toml").write_text(STUDY + GROUPS)
+    facts = study_facts(str(tmp_path / "grouped.toml"))
+    assert isinstance(facts, StudyFacts)
+    assert facts.extent == "2 parts, 6 settings, 6 to 7 answers"
+    assert facts.duration == "about 1 to 2 min"

@@ -7,8 +7,9 @@ import dataclasses
 import pytest
 
 from study_app.protocol.model import Limits
-from study_app.store.tables.columns import TRIALS, header
-from study_app.store.tables.session_tables import beyond_limits
+from study_app.store.limits import beyond_limits
+from study_app.store.tables.column import header
+from study_app.store.tables.columns import TRIALS
 from study_app.viewmodels.number_words import duration_words, grouped, minutes
 from study_app.viewmodels.operator import MEASURES
 
@@ -128,10 +129,10 @@ def test_a_stopped_force_is_a_state_of_its_own(told):
 
 def test_trouble_is_said_and_nothing_but_the_end_is_offered(told):
     told.welcome()
-    told.tell("broke", what="the device 'mouse' stopped answering")
+    told.tell("broke", what="the device 'mouse' stopped responding")
     view = told.view(force_on=False)
     assert view.state == "trouble"
-    assert "stopped answering" in view.trouble
+    assert "stopped responding" in view.trouble
     assert [view.may_pause, view.may_resume, view.may_repeat] == [False, False, False]
 
 
@@ -240,6 +241,7 @@ def test_a_trial_out_of_limits_says_which_and_by_how_much_the_newest_first(told)
 def test_what_tells_a_condition_is_judged_before_an_operator_who_sees_forces_alone(told, blinding):
     if blinding == "single":
         told.make_single_blind()
+    told.welcome()
     told.start(1)
     told.end(1, withheld_share=0.0712, delay_error_p95_ms=27.211752)
     said = [line.partition(" out of limits: ")[2] for line in told.view().beyond]

@@ -11,7 +11,7 @@ from PySide6.QtCore import QSize
 from study_app.gui.results.figure_view import drawn, themed_svg
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.viewmodels.results import Opened, StudyChoice, in_figures
-from study_app.viewmodels.session_columns import matching, states_of
+from study_app.viewmodels.session.columns import matching, states_of
 from tests.gui.results.sample import COLOURS, SVG, facts
 
 
@@ -20,7 +20,7 @@ def test_who_is_in_the_figures_and_why_the_others_are_not():
     assert in_figures(held) == ("12 of 12 sessions in the figures", "")
     held += [facts("P013", status="unfinished"), facts("P014", excluded="asleep")]
     assert in_figures(held) == ("12 of 14 sessions in the figures", "P013 is not complete; P014 is excluded.")
-    assert in_figures([]) == ("No session yet", "")
+    assert in_figures([]) == ("No sessions yet", "")
     assert in_figures(held[:1])[0] == "1 of 1 session in the figures"
 
 

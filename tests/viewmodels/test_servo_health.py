@@ -42,7 +42,7 @@ def test_a_batch_longer_than_the_ring_keeps_its_newest():
     health = ServoHealth(10.0)
     late = np.arange(5000)
     health.take(samples(5000, lateness_ns=late))
-    kept = np.sort(health._lateness_ns)
+    kept = np.sort(health.lateness_ns)
     assert kept.tolist() == late[-LATENESS_WINDOW_S * 10 :].tolist()
 
 

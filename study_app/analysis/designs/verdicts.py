@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, TypeAlias
 
-from study_app.analysis.findings.item_test import Tested, Verdict
+from study_app.analysis.results.item_test import Tested, Verdict
 from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.tables.planned_analysis import Decided

@@ -8,11 +8,14 @@ from dataclasses import asdict
 from typing import Any
 
 from study_app import __version__
+from study_app.analysis.export.level_tables import names_of_sealed
 from study_app.analysis.tables.compared_blocks import Block
+from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.tables.study import Study
 from study_app.store.blinded import blinding
-from study_app.store.tables.columns import MISSING, SEALED, Column
+from study_app.store.tables.column import MISSING, Column
+from study_app.store.tables.columns import SEALED
 from study_app.store.tables.formulas import COMPUTED
 
 
@@ -46,7 +49,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         f"{COMPUTED} has an apostrophe before it",
         "missing": MISSING,
         "blinded": not study.revealed,
-        "sealed_columns": [] if study.revealed else sorted(SEALED),
+        "sealed_columns": [] if study.revealed else sorted(SEALED | names_of_sealed(study)),
         "key_opened": list(blinding.reveals(study.folder)),
         "doubts": [
             {"file": doubt.path.relative_to(study.folder).as_posix(), "what": doubt.what} for doubt in study.doubts
@@ -74,6 +77,9 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
             }
             for block in study.blocks
         ],
+        **({"levels": [_levels(block) for block in study.levels]} if study.levels else {}),
+        **({"questions": _questions(study)} if study.others.questions else {}),
+        **({"scores": _scores(study)} if study.others.scores else {}),
         "measures": {
             "quartiles": QUARTILES,
             "agree_percent": f"levels {AGREEMENT[0]} to {AGREEMENT[-1]}, of the valid answers",
@@ -83,6 +89,53 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         },
         "files": files,
     }
+
+
+def _levels(block: LevelBlock) -> dict[str, Any]:
+    """Return how a block of levels is built and, once the key is open, what it varies."""
+    stimulus = block.stimulus
+    return {
+        "block": block.id,
+        "title": block.title,
+        "phase": block.phase,
+        "design": block.design.kind,
+        "item": block.design.name,
+        **(
+            {}
+            if stimulus is None
+            else {"vary": stimulus.vary, "level": stimulus.level_kind, "direction": stimulus.direction}
+        ),
+    }
+
+
+def _questions(study: Study) -> list[dict[str, Any]]:
+    """Return the questions that no block of statements holds."""
+    return [
+        {
+            "form" if one.where.is_form else "block": one.where.id,
+            "id": one.id,
+            "kind": one.question.kind_id,
+            "text": one.text,
+            "short": one.short,
+            **({"levels": one.levels} if one.levels else {}),
+            **({"cannot_judge": one.cannot_judge} if one.cannot_judge else {}),
+            **({"range": list(one.bounds)} if one.bounds else {}),
+            **({"show_if": one.question.show_if.model_dump(mode="json")} if one.question.show_if else {}),
+        }
+        for one in study.others.questions
+    ]
+
+
+def _scores(study: Study) -> list[dict[str, Any]]:
+    return [
+        {
+            "form" if one.where.is_form else "block": one.where.id,
+            "name": one.name,
+            "instrument": one.instrument,
+            **one.score.model_dump(mode="json", exclude_defaults=True),
+        }
+        for one in study.others.scores
+    ]
 
 
 def _presentations(study: Study, block: Block) -> dict[str, Any]:

@@ -8,8 +8,9 @@ from typing import Final, Literal, TypeAlias
 
 from study_app.analysis.export import psychds_dataset, spss
 from study_app.analysis.export.codebook import codebook_bytes
+from study_app.analysis.export.delivered import Delivered
 from study_app.analysis.export.frame_csv import table_bytes
-from study_app.analysis.export.typed_tables import Delivered, deliver
+from study_app.analysis.export.typed_tables import deliver
 from study_app.analysis.export.wide_table import wide
 from study_app.analysis.tables.study import Study, load_study
 from study_app.store.output_files import write_files
@@ -25,13 +26,15 @@ def export(
     extras: Collection[Extra] = NOTHING_ELSE,
     warn: Callable[[str], object] | None = None,
 ) -> tuple[Path, ...]:
-    """Write responses, trials, aggregate and codebook of a study into the folder ``to``; return the files.
+    """Write the tables and the codebook of a study into the folder ``to``; return the files.
 
-    Files that are not as they were recorded are used as they are: ``warn`` is told of each, and the codebook names it.
+    Tables: responses, trials, aggregate; of a study with levels also intervals and, once its key is open, tracks.
+
+    Files that are not as they were recorded are used as they are: ``warn`` receives each, and the codebook names it.
 
     Parameters
     ----------
-    extras : what is written beside
+    extras : what is written in addition
         "wide": the answers, a row a participant; "parquet": the tables as Parquet; "sav": the answers, long and wide,
         for SPSS; "psych-ds": a folder of all tables that keeps the rules of Psych-DS.
 
@@ -51,7 +54,7 @@ def export(
 
 
 def export_files(study: Study, extras: Collection[Extra] = NOTHING_ELSE) -> dict[str, bytes]:
-    """Return responses, trials, aggregate and codebook of a study, and the ``extras``, by the names of their files."""
+    """Return the tables and the codebook of a study, and the ``extras``, by the names of their files."""
     tables = list(deliver(study))
     responses = tables[0]
     across, cells = wide(study) if extras else (None, {})
@@ -61,14 +64,13 @@ def export_files(study: Study, extras: Collection[Extra] = NOTHING_ELSE) -> dict
     columns = {_name(study, table, "csv"): table.columns for table in tables}
     files["codebook.json"] = codebook_bytes(study, columns)
     if "parquet" in extras:
-        from study_app.analysis.export.parquet import (  # noqa: PLC0415 - loads its library where it is asked for
-            parquet_bytes,
-        )
+        from study_app.analysis.export.parquet import parquet_bytes  # noqa: PLC0415 - loads its library where it is asked for
 
         files |= {_name(study, table, "parquet"): parquet_bytes(table) for table in tables}
     if across is not None and "sav" in extras:
         files[_name(study, responses, "sav")] = spss.long_sav(study, responses)
         files[_name(study, across, "sav")] = spss.wide_sav(study, across, cells)
+        files |= {_name(study, one, "sav"): spss.tracks_sav(study, one) for one in tables if one.name == "tracks"}
     if across is not None and "psych-ds" in extras:
         held = {_name(study, table, "csv"): table for table in dict.fromkeys((*tables, across))}
         contents = {name: files.get(name) or table_bytes(table) for name, table in held.items()}

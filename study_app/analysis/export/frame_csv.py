@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import pandas as pd
 
-from study_app.analysis.export.typed_tables import Delivered
-from study_app.store.tables.columns import header
+from study_app.analysis.export.delivered import Delivered
+from study_app.store.tables.column import header
 from study_app.store.tables.csv_files import cell_text
 
 ROWS_AT_ONCE: Final = 20_000
@@ -32,9 +32,5 @@ def _parts(table: Delivered) -> Iterator[bytes]:
 def _texts(column: pd.Series[Any]) -> list[str]:
     """Return the cells of a column; every value that occurs is written once and used again."""
     values = column.tolist()
-    written = {value: _text(value) for value in dict.fromkeys(values)}
+    written = {value: cell_text(None if value is pd.NA else value) for value in dict.fromkeys(values)}
     return [written[value] for value in values]
-
-
-def _text(value: Any) -> str:
-    return cell_text(None if value is pd.NA else value)

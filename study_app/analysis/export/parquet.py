@@ -11,8 +11,8 @@ from typing import Final
 import pyarrow as pa  # type: ignore[import-untyped]
 from pyarrow import parquet
 
-from study_app.analysis.export.typed_tables import Delivered
-from study_app.store.tables.columns import Column
+from study_app.analysis.export.delivered import Delivered
+from study_app.store.tables.column import Column
 
 _TYPES: Final = {
     "text": pa.string(),
@@ -37,5 +37,5 @@ def _field(column: Column) -> pa.Field:
     kind = _TYPES[column.kind]
     if column.kind == "integer" and column.maximum is not None and column.maximum <= 127:
         kind = pa.int8()
-    told = {"description": column.description, "unit": column.unit}
-    return pa.field(column.name, kind, metadata={name: text for name, text in told.items() if text})
+    texts = {"description": column.description, "unit": column.unit}
+    return pa.field(column.name, kind, metadata={name: text for name, text in texts.items() if text})

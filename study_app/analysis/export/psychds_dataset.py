@@ -10,7 +10,8 @@ from study_app import __version__
 from study_app.analysis.export.codebook import codebook_bytes
 from study_app.analysis.tables.compared_blocks import spoken, text_in
 from study_app.analysis.tables.study import Study
-from study_app.store.tables.columns import Column, variable
+from study_app.store.tables.cells import variable
+from study_app.store.tables.column import Column
 
 FOLDER: Final = "psych-ds"
 KEYWORDS: Final = ("haptics", "psychophysics", "liquids", "Likert scale")
@@ -34,13 +35,15 @@ def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> byt
     """Return the dataset's description; a column that several tables share is described once."""
     every = {column.name: column for of_table in columns.values() for column in of_table}
     head = study.protocol.get("study", {})
-    told = head.get("description") or study.title
+    description = head.get("description") or study.title
     content = {
         "@context": "https://schema.org/",
         "@type": "Dataset",
         "name": study.name,
         "alternateName": study.title,
-        "description": text_in(told, spoken(study.protocol)) if isinstance(told, Mapping) else str(told).strip(),
+        "description": text_in(description, spoken(study.protocol))
+        if isinstance(description, Mapping)
+        else str(description).strip(),
         "version": study.version,
         "keywords": [*KEYWORDS, *(["simulated"] if study.simulated else [])],
         "variableMeasured": [variable(column) for column in every.values()],

@@ -10,18 +10,20 @@ import importlib
 import re
 import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.export.typed_tables import Delivered
-from study_app.analysis.export.wide_table import Cells
+from study_app.analysis.export.delivered import Delivered
+from study_app.analysis.export.wide_table import Cells, QuestionCells
+from study_app.analysis.tables.asked_questions import AskedScore
 from study_app.analysis.tables.measures import LEVELS
 from study_app.analysis.tables.study import Study
 from study_app.errors import AnalysisError
-from study_app.store.tables.columns import Column
+from study_app.store.tables.column import Column
 
 CANNOT_JUDGE: Final = 98
 NOT_ANSWERED: Final = 99
@@ -51,6 +53,8 @@ def require() -> None:
 def long_sav(study: Study, table: Delivered) -> bytes:
     """Return the long table of responses as a .sav file."""
     frame = table.frame
+    if study.protocol_format > 1:  # the answers of all kinds in one column are texts, without levels
+        return _sav(study, table, {})
     answers = frame["response"].astype("Float64").fillna(NOT_ANSWERED).mask(frame["cannot_judge"], CANNOT_JUDGE)
     labels = {block.labels for block in study.blocks}
     levels = dict(zip(LEVELS, next(iter(labels)), strict=True)) if len(labels) == 1 else {}
@@ -59,18 +63,49 @@ def long_sav(study: Study, table: Delivered) -> bytes:
     return _sav(study, Delivered(table.name, table.columns, frame.assign(response=answers)), coded)
 
 
-def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells]) -> bytes:
+def tracks_sav(study: Study, table: Delivered) -> bytes:
+    """Return the table of tracks as a .sav file."""
+    return _sav(study, table, {})
+
+
+def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | QuestionCells]) -> bytes:
     """Return the wide table as a .sav file."""
     answers = study.responses[study.responses["counted"]]
     off = answers[answers["cannot_judge"]].groupby(["block", "code", "item"])["participant"].agg(set).to_dict()
     frame = table.frame.copy()
     coded = {}
     for name, one in cells.items():
+        if isinstance(one, QuestionCells):
+            frame[name], coded[name] = _question(study, one, frame[name], frame["participant"])
+            continue
         values = frame[name].astype("Float64")
         judged = frame["participant"].isin(off.get((one.block.id, one.setting.code, one.item.id), set()))
         frame[name] = values.mask(values.isna() & judged, CANNOT_JUDGE).fillna(NOT_ANSWERED)
         coded[name] = _levels(dict(zip(LEVELS, one.block.labels, strict=True)), one.block.cannot_judge or "")
-    return _sav(study, Delivered(table.name, table.columns, frame), coded)
+    numbered = {name for name, found in coded.items() if found}
+    columns = tuple(replace(one, kind="number") if one.name in numbered else one for one in table.columns)
+    return _sav(study, Delivered(table.name, columns, frame), {name: coded[name] for name in numbered})
+
+
+def _question(
+    study: Study, cells: QuestionCells, values: pd.Series[Any], people: pd.Series[Any]
+) -> tuple[pd.Series[Any], dict[int, str]]:
+    """Return the cells of another question and its levels: options are numbered from 1; others have no levels."""
+    asked = cells.asked
+    if isinstance(asked, AskedScore) or not asked.levels:
+        return values, {}
+    if asked.question.value_type == "text":
+        if getattr(asked.question, "several", False):
+            return values, {}
+        numbers = {option: number for number, option in enumerate(asked.levels, start=1)}
+        coded = values.map(numbers).astype("Float64").fillna(NOT_ANSWERED)
+        return coded, _levels({numbers[option]: words for option, words in asked.levels.items()}, "")
+    answers = study.answers_to(asked)
+    if cells.setting is not None:
+        answers = answers[answers["code"] == cells.setting.code]
+    judged = people.isin(set(answers.loc[answers["cannot_judge"], "participant"]))
+    coded = values.astype("Float64").mask(values.isna() & judged, CANNOT_JUDGE).fillna(NOT_ANSWERED)
+    return coded, _levels({int(point): words for point, words in asked.levels.items()}, asked.cannot_judge or "")
 
 
 def _levels(levels: Mapping[int, str], cannot_judge: str) -> dict[int, str]:

@@ -1,36 +1,30 @@
 """The tables that are handed out, as typed frames with a description of every column; formats are made from them.
 
 Settings are codes until the key was opened, and the sealed columns are left out; then condition, liquid and delay
-(asked for, and achieved) stand beside.
+(asked for, and achieved) are columns.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 import pandas as pd
 
+from study_app.analysis.export.delivered import JUDGED, Delivered, delivered
+from study_app.analysis.export.level_tables import level_tables
 from study_app.analysis.tables.compared_blocks import Setting
 from study_app.analysis.tables.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.tables.study import Study
-from study_app.store.tables.columns import PARTICIPANTS, RESPONSES, TRIALS, Column, header, unsealed
+from study_app.store.tables.column import Column, header, unsealed
+from study_app.store.tables.columns import RESPONSES, TRIALS_2, tables_of
 
-_STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
-_BY_NAME: Final = {column.name: column for column in (*TRIALS, *RESPONSES)}
+OF_A_FORM: Final = Setting("")
+"""Stands for the setting of an answer in a form, which has none."""
 
-JUDGED: Final = (
-    Column("session_status", "text", "How the row's session ended.", levels=_STATUS.levels),
-    Column("excluded", "flag", "true where exclusions.csv leaves out the row's session or trial."),
-    Column("exclusion_reason", "text", "Why it is left out.", may_miss=True),
-    Column(
-        "counted",
-        "flag",
-        "true where the row is in the aggregate and the figures: main trial, completed session, last attempt, not "
-        "excluded.",
-    ),
-)
+_BY_NAME: Final = {column.name: column for column in (*TRIALS_2, *RESPONSES)}
+
 OPENED: Final = (
     Column("condition", "text", "Id of the condition that the code stands for."),
     Column("liquid", "text", "Id of the liquid that was felt."),
@@ -52,7 +46,7 @@ MEASURED: Final = (
     Column(
         "presented_excluded",
         "integer",
-        "Presentations beside these that exclusions.csv leaves out one by one, with their answers.",
+        "Presentations besides these that exclusions.csv leaves out one by one, with their answers.",
         minimum=0,
     ),
     Column("n", "integer", "Valid answers.", minimum=0),
@@ -74,29 +68,29 @@ MEASURED: Final = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Delivered:
-    """A table: its name, its columns in their order, and a frame that has them."""
-
-    name: str
-    columns: tuple[Column, ...]
-    frame: pd.DataFrame
+def _may_miss(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+    """Return columns about a trial's setting where some rows have none: those of forms, and of tracks."""
+    return tuple(replace(column, may_miss=True) for column in columns)
 
 
 def deliver(study: Study) -> tuple[Delivered, ...]:
-    """Return responses, trials and aggregate of a study."""
+    """Return responses, trials and aggregate of a study; with levels, also its intervals and opened tracks."""
     opened = OPENED if study.revealed else ()
     achieved = (*OPENED, ACHIEVED) if study.revealed else ()
-    trials = TRIALS if study.revealed else unsealed(TRIALS)
+    trials = tables_of(study.protocol_format)["trials"]
+    trials = trials if study.revealed else unsealed(trials)
+    responses = tables_of(study.protocol_format)["responses"]
+    about = achieved if responses is RESPONSES else _may_miss(achieved)
     return (
-        _delivered("responses", (*RESPONSES, *JUDGED, *achieved), _named(study, _with_delay_error(study))),
-        _delivered("trials", (*trials, *JUDGED, *achieved), _named(study, study.trials)),
-        _delivered("aggregate", (*_aggregate_head(), *opened, *MEASURED), _aggregate(study)),
+        delivered("responses", (*responses, *JUDGED, *about), _named(study, _with_delay_error(study))),
+        delivered(
+            "trials",
+            (*trials, *JUDGED, *(_may_miss(achieved) if study.levels else achieved)),
+            _named(study, study.trials),
+        ),
+        delivered("aggregate", (*_aggregate_head(), *opened, *MEASURED), _aggregate(study)),
+        *level_tables(study),
     )
-
-
-def _delivered(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) -> Delivered:
-    return Delivered(name, columns, frame[list(header(columns))])
 
 
 def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
@@ -106,7 +100,7 @@ def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
     pairs = list(zip(table["block"].to_numpy(), table["code"].to_numpy(), strict=True))
     places = {pair: place for place, pair in enumerate(dict.fromkeys(pairs))}
     which = np.fromiter((places[pair] for pair in pairs), dtype=np.int64, count=len(pairs))
-    settings = [study.settings[pair] for pair in places]
+    settings = [OF_A_FORM if pd.isna(pair[0]) else study.settings[pair] for pair in places]
     delay_ms = _delays_ms(settings)[which]
     return table.assign(
         condition=pd.array([one.condition for one in settings], dtype="string").take(which),
@@ -117,15 +111,17 @@ def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _delays_ms(settings: list[Setting]) -> Any:
-    return np.array([setting.delay_ms or 0.0 for setting in settings], dtype=np.float64)
+    return np.array(
+        [np.nan if setting.delay_ms is None else setting.delay_ms for setting in settings], dtype=np.float64
+    )
 
 
 def _with_delay_error(study: Study) -> pd.DataFrame:
     """Return the responses with the delay error of the trial each followed."""
     if not study.revealed:
-        return study.responses
+        return study.answered
     trial = ["participant", "session", "trial", "attempt"]
-    return study.responses.merge(study.trials[[*trial, "delay_error_mean_ms"]], on=trial, how="left")
+    return study.answered.merge(study.trials[[*trial, "delay_error_mean_ms"]], on=trial, how="left")
 
 
 def _aggregate_head() -> tuple[Column, ...]:
@@ -137,17 +133,20 @@ def _aggregate(study: Study) -> pd.DataFrame:
     for block in study.blocks:
         settings = {setting.code: setting for setting in block.settings}
         found = study.aggregate(block)
-        told = [settings[code] for code in found["code"]]
+        presented = [settings[code] for code in found["code"]]
         frames.append(
             found.assign(
                 study=study.name,
                 simulated=study.simulated,
                 pilot=study.pilot,
                 block=block.id,
-                condition=pd.array([setting.condition for setting in told], dtype="string"),
-                liquid=pd.array([setting.liquid for setting in told], dtype="string"),
-                delay_ms=np.array([setting.delay_ms for setting in told], dtype=np.float64),
+                condition=pd.array([setting.condition for setting in presented], dtype="string"),
+                liquid=pd.array([setting.liquid for setting in presented], dtype="string"),
+                delay_ms=np.array([setting.delay_ms for setting in presented], dtype=np.float64),
                 short=found["item"].map({item.id: item.short for item in block.items}),
             )
         )
+    if not frames:
+        names = [*header(_aggregate_head()), *header(OPENED), *header(MEASURED)]
+        return pd.DataFrame({name: pd.Series(dtype=object) for name in names})
     return pd.concat(frames, ignore_index=True)

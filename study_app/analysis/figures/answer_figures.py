@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
 from matplotlib.figure import Figure
 
-from study_app.analysis import style
+from study_app import figure_style as style
 from study_app.analysis.figures import captions, diverging_bars, small_multiples
 from study_app.analysis.figures.page_layout import Mark
 from study_app.analysis.tables.compared_blocks import Block, Kind
 from study_app.analysis.tables.measures import by_participant
-from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.tables.study import Study
 from study_app.errors import AnalysisError
-from study_app.store.output_files import write_files
 
 KINDS: Final[tuple[Kind, ...]] = ("liquids", "delays")
 
@@ -103,35 +101,6 @@ def render(study: Study, block: Block, form: str, lowest: Mapping[str, float] = 
         else delays(study, block, fonts=fonts, lowest=lowest)
     )
     return style.file_bytes(drawn, form, f"{study.name}: {captions.title(block)}")
-
-
-def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None) -> tuple[Path, ...]:
-    """Write every figure of a study as PNG, SVG and PDF, each with its caption as text, into the folder ``to``.
-
-    The same results give the same bytes. Returns the files written. Files that are not as they were recorded are used
-    as they are: ``warn`` is told of each, and the captions say how many.
-
-    Raises
-    ------
-    AnalysisError
-        The results cannot be evaluated, or ``to`` cannot be written; nothing was.
-    StoreError
-        The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
-    """
-    study = load_study(folder)
-    if not study.blocks:
-        raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to draw")
-    files: dict[str, bytes] = {}
-    for kind in KINDS:
-        blocks = study.blocks_of(kind)
-        for block in blocks:
-            name = kind if len(blocks) == 1 else f"{kind}-{block.id}"
-            for form in style.FORMATS:
-                files[f"{name}.{form}"] = render(study, block, form)
-            files[f"{name}.txt"] = f"{captions.caption(study, block)}\n".encode()
-    written = write_files(Path(to), files)
-    study.tell_doubts(warn)
-    return written
 
 
 def _only(study: Study, kind: Kind) -> Block:

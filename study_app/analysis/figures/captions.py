@@ -14,7 +14,7 @@ from study_app.analysis.tables.study import Study
 
 REASONS: Final = 5
 REASON_SIGNS: Final = 80
-"""Of so many reasons for exclusions so much is told; the codebook of an export holds all."""
+"""How many reasons for exclusions a caption names; the codebook of an export holds all."""
 
 FILES: Final = 3
 """Of files that are not as recorded so many are named."""
@@ -166,9 +166,9 @@ def _excluded_trials(study: Study, block: Block) -> str:
 def _reasons(rows: pd.DataFrame) -> str:
     """List why rows are excluded: each reason once, with its number where it is not the only one."""
     counted = Counter(_shortened(str(reason)) for reason in rows["exclusion_reason"].fillna("no reason given"))
-    told = [f"{count} × {reason}" if len(counted) > 1 else reason for reason, count in counted.most_common(REASONS)]
+    reasons = [f"{count} × {reason}" if len(counted) > 1 else reason for reason, count in counted.most_common(REASONS)]
     more = sum(counted.values()) - sum(count for _, count in counted.most_common(REASONS))
-    return "; ".join([*told, *([f"{more} × other"] if more else [])])
+    return "; ".join([*reasons, *([f"{more} × other"] if more else [])])
 
 
 def _shortened(reason: str) -> str:

@@ -13,7 +13,7 @@ from typing import Final
 import pandas as pd
 from matplotlib.axes import Axes
 
-from study_app.analysis import style
+from study_app import figure_style as style
 from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 from study_app.analysis.tables.measures import COUNT_COLUMNS, NEUTRAL
 

@@ -15,14 +15,14 @@ from matplotlib.patches import FancyBboxPatch
 from matplotlib.text import Text
 from matplotlib.transforms import Affine2D
 
-from study_app.analysis import style
+from study_app import figure_style as style
 
 MARGIN_PT = 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """What must not be overlooked, said beside a figure's title: words, their colour and the ground under them."""
+    """What must not be overlooked, written next to a figure's title: words, their colour and the ground under them."""
 
     words: str
     ink: str
@@ -114,7 +114,7 @@ class Sheet:
         self.figure.add_artist(line)
 
     def heading(self, title: str, marks: Sequence[Mark], counts: Sequence[str]) -> None:
-        """Write the title, the marks beside it and, at the right, the first of ``counts`` that fits the line."""
+        """Write the title, the marks next to it and, at the right, the first of ``counts`` that fits the line."""
         baseline, x = 15.0, MARGIN_PT
         self.text(x, baseline, title, size=10, weight="bold")
         x += self.text_width(title, 10, "bold") + 8

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from matplotlib.axes import Axes
 
-from study_app.analysis import style
+from study_app import figure_style as style
 from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 from study_app.analysis.statistics.psychometrics.psychometric import Curve, share
 from study_app.analysis.statistics.psychometrics.threshold import Threshold

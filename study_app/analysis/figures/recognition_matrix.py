@@ -1,6 +1,6 @@
 """The figure of recognition: which name was given to which liquid, as counts; the right name framed.
 
-Darker means more, and every count stands in its cell, so that nothing is told by colour alone.
+Darker means more, and every count stands in its cell, so that nothing depends on colour alone.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Final
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from study_app.analysis import style
+from study_app import figure_style as style
 from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 
 CELL_PT: Final = (52.0, 26.0)
@@ -49,8 +49,8 @@ def draw(
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, fonts)
     first_pt = max(ruler.text_width(name, 7.5) for name in settings) + 10
     width, height = CELL_PT
-    told = [ruler.wrap(names[place], width - 4, 7) for place in kept]
-    top = TOP_PT + NAMES_PT + 8.5 * (max(map(len, told)) - 1)
+    names_wrapped = [ruler.wrap(names[place], width - 4, 7) for place in kept]
+    top = TOP_PT + NAMES_PT + 8.5 * (max(map(len, names_wrapped)) - 1)
     sheet = Sheet(style.PAGE_WIDTH_PT, top + height * len(settings) + FOOT_PT, fonts)
     sheet.heading(title, marks, counts)
     left = MARGIN_PT + first_pt
@@ -58,7 +58,7 @@ def draw(
         gap = 8.0 if place >= len(labels) else 0.0
         x = left + column * width + gap
         colour = style.TEXT if place < len(labels) else style.TEXT_SOFT
-        for number, line in enumerate(reversed(told[column])):
+        for number, line in enumerate(reversed(names_wrapped[column])):
             sheet.text(x + width / 2, top - 4 - 8.5 * number, line, size=7, colour=colour, ha="center")
         axes = sheet.axes(x, top, width, height * len(settings))
         axes.set_label(f"name{place + 1}")

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from study_app.analysis import style
+from study_app import figure_style as style
 from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 from study_app.analysis.tables.measures import LEVELS, Array, quartiles
 

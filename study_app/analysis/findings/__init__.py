@@ -1,1 +1,17 @@
-"""Results of the analysis as typed values, with the words for them."""
+"""What is asked of the answers of a block: a module a finding, whose ``FINDING`` says all that the others need."""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from typing import Any
+
+from study_app.analysis.results.finding import Finding
+from study_app.discovery import modules_of
+
+
+@cache
+def all_findings() -> tuple[Finding[Any], ...]:
+    """Return the ``FINDING`` of every module of this folder, in the order of their places."""
+    found = (module.FINDING for module in modules_of(sys.modules[__name__]))
+    return tuple(sorted(found, key=lambda finding: finding.place))

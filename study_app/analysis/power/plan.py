@@ -11,9 +11,11 @@ from study_app.analysis.tables.compared_blocks import Item, Kind, spoken, text_i
 from study_app.analysis.tables.planned_analysis import Decided
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
+from study_app.protocol.forms.scale import POINTS
+from study_app.protocol.forms.simulated_observer import OPINIONS, Felt
+from study_app.protocol.groups.steps import groups_with
 from study_app.protocol.model import Protocol
-from study_app.protocol.questions.rating import POINTS
-from study_app.protocol.questions.simulated_answers import OPINIONS, Felt
+from study_app.protocol.questions.question import Question
 
 Feelings: TypeAlias = Mapping[tuple[str, str], Sequence[Felt]]
 """(Block, condition) → what was felt there in rehearsed trials."""
@@ -24,7 +26,7 @@ class Planned:
     """A main block that asks something.
 
     ``names`` are of its settings, in the order of the tests: delays ascending. ``delays_ms`` is None where liquids are
-    compared. ``felt`` has what was felt in each setting.
+    compared. ``felt`` has what was felt in each setting. ``groups`` are those that have the block, where not all do.
     """
 
     id: str
@@ -35,6 +37,7 @@ class Planned:
     items: tuple[Item, ...]
     felt: tuple[tuple[Felt, ...], ...]
     repetitions: int
+    groups: tuple[str, ...] = ()
 
     @property
     def k(self) -> int:
@@ -67,11 +70,11 @@ def plan(protocol: Protocol, felt: Feelings) -> Plan:
         No block of it compares settings and asks about them.
     """
     language = spoken({"study": {"languages": protocol.study.languages}})
-    asked = [block for block in protocol.main_blocks if block.questionnaire is not None and len(block.conditions) > 1]
+    asked = [block for block in protocol.main_blocks if _statements(protocol, block) and len(block.conditions) > 1]
     if not asked:
         raise AnalysisError(
             f"{protocol.study.name} compares nothing: power needs a main block of two or more conditions and a "
-            "questionnaire"
+            "questionnaire with statements"
         )
     table = None if protocol.analysis is None else protocol.analysis.model_dump(mode="json")
     return Plan(
@@ -88,10 +91,9 @@ def _planned(protocol: Protocol, block: Block, felt: Feelings, language: str) ->
     delays = {name: protocol.conditions[name].delay_ms for name in conditions}
     kind = protocol.compared_in(block.id)
     assert kind is not None  # noqa: S101 - a main block
+    having = groups_with(protocol, block.id)
     if kind == "delays":
         conditions.sort(key=delays.__getitem__)
-    questionnaire = protocol.questionnaire_of(block.id)
-    assert questionnaire is not None  # noqa: S101 - chosen so
     return Planned(
         id=block.id,
         title=text_in(block.title, language),
@@ -99,11 +101,19 @@ def _planned(protocol: Protocol, block: Block, felt: Feelings, language: str) ->
         names=tuple(f"{delays[name]:g} ms" if kind == "delays" else name.replace("_", " ") for name in conditions),
         delays_ms=tuple(delays[name] for name in conditions) if kind == "delays" else None,
         items=tuple(
-            Item(item.id, text_in(item.text, language), text_in(item.short, language)) for item in questionnaire.items
+            Item(item.id, text_in(item.text, language), text_in(item.short, language))
+            for item in _statements(protocol, block)
         ),
         felt=tuple(tuple(felt[block.id, name]) for name in conditions),
         repetitions=block.repetitions,
+        groups=having if len(having) < len(protocol.groups) else (),
     )
+
+
+def _statements(protocol: Protocol, block: Block) -> tuple[Question, ...]:
+    """Return the statements that a block asks about; power is planned for no other questions."""
+    questionnaire = protocol.questionnaire_of(block.id)
+    return () if questionnaire is None else questionnaire.statements
 
 
 LOWEST, HIGHEST = 1, POINTS

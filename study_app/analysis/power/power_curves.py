@@ -9,7 +9,7 @@ from typing import Final, Literal, TypeAlias
 
 import numpy as np
 
-from study_app.analysis.power.counts import FULL, Counts
+from study_app.analysis.power.batch_counts import FULL, Counts
 from study_app.analysis.power.plan import Plan, Planned
 from study_app.analysis.tables.measures import Array
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from study_app.analysis import style
-from study_app.analysis.power import figure
+from study_app import figure_style as style
+from study_app.analysis.power import power_figure
 from study_app.analysis.power.power_curves import Powers
 from study_app.analysis.power.power_tables import power_csv, power_markdown
 from study_app.store.output_files import write_files
@@ -23,6 +23,6 @@ def write(found: Powers, to: Path) -> tuple[Path, ...]:
     for block in found.plan.blocks:
         title = f"{found.plan.name}: power of {block.title}"
         for form in style.FORMATS:
-            drawn = figure.draw(found, block, style.fonts_for(form)).figure
+            drawn = power_figure.draw(found, block, style.fonts_for(form)).figure
             files[f"power-{block.id}.{form}"] = style.file_bytes(drawn, form, title)
     return write_files(Path(to), files)

@@ -8,11 +8,11 @@ from typing import Any, Final
 import numpy as np
 
 from study_app import __version__
-from study_app.analysis.findings.words import enough
-from study_app.analysis.power.counts import EFFECTS
+from study_app.analysis.power.batch_counts import EFFECTS
 from study_app.analysis.power.permutation_tests import DRAWS
 from study_app.analysis.power.power_curves import WANTED, Curve, Powers, Question, interval
-from study_app.store.tables.columns import Column
+from study_app.analysis.results.words import enough
+from study_app.store.tables.column import Column
 from study_app.store.tables.csv_files import csv_bytes
 
 COLUMNS: Final = (
@@ -96,8 +96,8 @@ def power_markdown(found: Powers) -> str:
             curves = [one for one in found.curves if (one.block, one.question) == (block.id, question)]
             if curves:
                 lines += ["", f"## {block.title}: {head[:1].lower()}{head[1:]}", "", *_explained(question, found), ""]
-                told = [*curves, *_truly_equal(curves)] if question == "equivalence" else curves
-                lines += _table(told, found, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
+                shown = [*curves, *_truly_equal(curves)] if question == "equivalence" else curves
+                lines += _table(shown, found, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
             if any(one.detectable for one in curves):
                 lines += ["", "The smallest difference of mean answers that 80 % of studies show, in points:", ""]
                 lines += _table([one for one in curves if one.detectable], found, first, _detectable_cell)
@@ -110,7 +110,7 @@ def _preface(found: Powers) -> list[str]:
     lines = [
         f"**SIMULATED.** {found.studies} studies of each size were answered by the rehearsals' answer model (seed "
         f"{found.seed}, liquid-study {__version__}), whose shapes and constants are plausible and not measured: real "
-        "effects may be smaller. Read the tables of the smallest detectable difference beside those of power.",
+        "effects may be smaller. Read the tables of the smallest detectable difference together with those of power.",
         "",
         f"Tests at α = {decided.alpha:g}; p from {DRAWS} random rearrangements of each participant's answers. "
         "Statements that the protocol calls primary are corrected by Holm, the others by Benjamini and Hochberg. "
@@ -122,6 +122,15 @@ def _preface(found: Powers) -> list[str]:
     if found.plan.unknown:
         named = ", ".join(found.plan.unknown)
         lines += ["", f"The model knows nothing of {named}: no effect is simulated there, and what is found is chance."]
+    lines += [
+        line
+        for block in found.plan.blocks
+        if block.groups
+        for line in (
+            "",
+            f"{block.title}: n counts participants of {' and '.join(block.groups)}; no other group has it.",
+        )
+    ]
     return lines
 
 

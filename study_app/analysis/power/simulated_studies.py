@@ -14,7 +14,7 @@ import numpy as np
 
 from study_app.analysis.power.plan import HIGHEST, LOWEST, Plan, Planned
 from study_app.analysis.tables.measures import Array
-from study_app.protocol.questions.simulated_answers import Rater, opinions, rater
+from study_app.protocol.forms.simulated_observer import Rater, opinions, rater
 
 UNIFORM = 12
 """The answer model's noise is the sum of so many uniform numbers, less six."""
@@ -25,7 +25,7 @@ class Opinions:
     """What people think in a block, and what else is in their answers (participants, repetitions, settings, items)."""
 
     thought: Array
-    beside: Array
+    noise: Array
 
     def answers(self, effect: float) -> Array:
         """Return the answers (participants, settings, items) where settings differ ``effect`` times as much.
@@ -33,7 +33,7 @@ class Opinions:
         The median over repetitions, as everywhere in the analysis.
         """
         middle = self.thought.mean(axis=2, keepdims=True)
-        points = middle + effect * (self.thought - middle) + self.beside
+        points = middle + effect * (self.thought - middle) + self.noise
         given = np.clip(np.floor(points + 0.5), LOWEST, HIGHEST)
         return np.asarray(given[:, 0] if given.shape[1] == 1 else np.median(given, axis=1))
 
@@ -47,7 +47,7 @@ def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinio
         for place, block in enumerate(plan.blocks):
             found[place].append(_person(block, person, rng))
     return tuple(
-        Opinions(np.array([thought for thought, _ in block]), np.array([beside for _, beside in block]))
+        Opinions(np.array([thought for thought, _ in block]), np.array([noise for _, noise in block]))
         for block in found
     )
 

@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from study_app.analysis.findings.block_results import BlockFound, Results
-from study_app.analysis.findings.delivered_delay import Delivered
-from study_app.analysis.findings.words import counted, listed, ms, name, number, settings_noun
 from study_app.analysis.report.html_page import bullets, heading, paragraph, table
+from study_app.analysis.results.block_results import BlockFound, Results
+from study_app.analysis.results.delivered_delay import Delivered
+from study_app.analysis.results.words import counted, listed, ms, name, number, settings_noun, short
+from study_app.analysis.tables.group_means import group_counts, group_means
 from study_app.analysis.tables.performance import DEFINITIONS as TRIAL_DEFINITIONS
 from study_app.analysis.tables.performance import OF_REACHES, OF_TRIALS, Performance
 from study_app.analysis.tables.reaches import DEFINITIONS as REACH_DEFINITIONS
@@ -31,6 +32,10 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         f"{listed([f'{count} {status}' for status, count in states.most_common()])}. Counted: "
         f"{counted(study.n, 'participant')}."
     )
+    masked = Counter(map(str, study.participants["motors_masked"].dropna()))
+    if masked:
+        answers = [f"{means} in {counted(count, 'session')}" for means, count in masked.most_common()]
+        yield paragraph(f"Motors masked: {listed(answers)}.")
     yield heading(3, "Exclusions")
     gone = [f"{named(one)}: {one.reason} ({one.rule_or_person}, {one.excluded_at})" for one in study.exclusions]
     if study.left_out:
@@ -43,6 +48,38 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         )
     yield from _delivered(study, results)
     yield from _orders(results)
+
+
+def groups(study: Study, results: Results) -> Iterator[str]:
+    """Yield the section on groups: their sizes, and the answers in each block by group; nothing without groups."""
+    counts = group_counts(study)
+    if not counts:
+        return
+    yield heading(2, "Groups")
+    yield table(("Group", "participants"), [[group, str(count)] for group, count in counts.items()])
+    means = list(group_means(study))
+    for found in results.blocks:
+        rows = [
+            [
+                short(found, one.item),
+                name(found, one.code),
+                one.group,
+                str(one.n),
+                number(one.mean, 2),
+                "–" if one.sd is None else number(one.sd, 2),
+            ]
+            for one in means
+            if one.block == found.id
+        ]
+        if rows:
+            yield heading(3, found.title)
+            head = ("Statement", settings_noun(found).capitalize(), "Group", "n", "mean", "SD")
+            yield table(head, rows, words=3)
+    yield paragraph(
+        "Mean and standard deviation over participants, each with the mean of their answers. Differences between "
+        "groups are described, not tested.",
+        "soft",
+    )
 
 
 def _first(lines: list[str]) -> list[str]:
@@ -112,17 +149,13 @@ def _orders(results: Results) -> Iterator[str]:
         counts = results.orders.get(found.id)
         if counts is None or not counts.orders or len(counts.codes) < 2:
             continue
-        names = {code: _order_name(found, code) for code in counts.codes}
+        names = {code: name(found, code) if found.revealed else code for code in counts.codes}
         yield paragraph(f"{found.title}, {counted(counts.orders, 'order')}: {_evenness(counts)}")
         yield table(
             ("Place", *names.values()),
             [[str(place), *(str(count) for count in line)] for place, line in enumerate(counts.positions, start=1)],
         )
     yield paragraph("How often each setting came at each place of its block.", "soft")
-
-
-def _order_name(found: BlockFound, code: str) -> str:
-    return name(found, code) if found.revealed else code
 
 
 def _evenness(counts: Evenness) -> str:
@@ -207,15 +240,15 @@ def _label(measure: str) -> str:
 def _recordings(measured: Performance) -> str:
     if not measured.trials:
         return "No trial that counts was one of reaching, so that there are no measures of reaches."
-    told = f"Reaches: from the recordings of {measured.recorded} of {measured.trials} trials of reaching"
+    text = f"Reaches: from the recordings of {measured.recorded} of {measured.trials} trials of reaching"
     if measured.unread:
-        told += f"; of the others: {'; '.join(measured.unread)}"
+        text += f"; of the others: {'; '.join(measured.unread)}"
     if not measured.judged:
-        return f"{told}. Whether trials kept to the protocol's limits of timing was not measured."
+        return f"{text}. Whether trials kept to the protocol's limits of timing was not measured."
     invalid = (
         f" {counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's limits of timing and "
         f"{'is' if measured.invalid == 1 else 'are'} in these numbers."
         if measured.invalid
         else " No trial that counts exceeded the protocol's limits of timing."
     )
-    return f"{told}.{invalid}"
+    return f"{text}.{invalid}"

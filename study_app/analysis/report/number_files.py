@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import partial
 from importlib import metadata
@@ -11,51 +11,23 @@ from platform import python_version
 from typing import Any, Final
 
 from study_app import __version__
-from study_app.analysis.designs.verdicts import ALONE, HOLM
 from study_app.analysis.export.codebook import head
-from study_app.analysis.findings.block_results import BlockFound, Results, plain
-from study_app.analysis.findings.contrast_with_control import ContrastWithControl
-from study_app.analysis.findings.item_test import Tested
-from study_app.analysis.findings.section_failures import Failure, Failures
-from study_app.analysis.findings.words import name
-from study_app.analysis.statistics.outcome import Outcome
+from study_app.analysis.findings import all_findings
+from study_app.analysis.report.json_values import plain
+from study_app.analysis.report.test_rows import TESTS
+from study_app.analysis.results.block_results import Results
+from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.words import name
 from study_app.analysis.tables.study import Study
 from study_app.store.blinded import blinding
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
-from study_app.store.tables.columns import Column
+from study_app.store.tables.column import Column
 from study_app.store.tables.csv_files import csv_bytes
 
 FORMAT: Final = 1
 LIBRARIES: Final = ("numpy", "scipy", "pandas", "matplotlib", "pyarrow")
 
-TESTS: Final = (
-    Column("block", "text", "Id of the block."),
-    Column("question", "text", "What is asked."),
-    Column("item", "text", "Id of the statement; n/a where the test is over several.", may_miss=True),
-    Column("comparison", "text", "Which settings, where not all.", may_miss=True),
-    Column("test", "text", "The test."),
-    Column("n", "integer", "Participants used.", minimum=0),
-    Column("dropped", "integer", "Participants not used, for missing answers.", minimum=0),
-    Column("statistic_name", "text", "What the statistic is."),
-    Column("statistic", "number", "The statistic.", may_miss=True),
-    Column("p", "number", "p, not corrected.", minimum=0, maximum=1, may_miss=True),
-    Column("p_adjusted", "number", "p, corrected within the family.", minimum=0, maximum=1, may_miss=True),
-    Column("smallest_p", "number", "The smallest p that could have come out.", minimum=0, maximum=1, may_miss=True),
-    Column("family", "text", "What is corrected together.", may_miss=True),
-    Column("members", "integer", "Tests in the family.", minimum=1, may_miss=True),
-    Column("correction", "text", "How p is corrected.", may_miss=True),
-    Column("primary", "flag", "true where it was decided on before the study.", may_miss=True),
-    Column("verdict", "text", "What may be said.", may_miss=True),
-    Column("effect_name", "text", "What the effect is."),
-    Column("effect", "number", "The effect.", may_miss=True),
-    Column("low", "number", "Lower end of the effect's interval.", may_miss=True),
-    Column("high", "number", "Upper end of the effect's interval.", may_miss=True),
-    Column("level", "number", "Confidence of the interval.", may_miss=True),
-    Column("interval", "text", "How the interval was made, or why there is none.", may_miss=True),
-    Column("method", "text", "How p was found."),
-    Column("note", "text", "What must be said with it.", may_miss=True),
-)
 MOTION: Final = (
     Column("block", "text", "Id of the block."),
     Column("code", "text", "Code of the setting."),
@@ -73,7 +45,8 @@ MOTION: Final = (
 
 def tests(results: Results) -> list[dict[str, Any]]:
     """Return a row for every test."""
-    return [row for found in results.blocks for row in _tests(found)]
+    in_order = sorted(all_findings(), key=lambda finding: finding.row_place)
+    return [row for found in results.blocks for finding in in_order for row in finding.rows(found)]
 
 
 def tests_csv(results: Results) -> bytes:
@@ -97,96 +70,6 @@ def motion_csv(results: Results) -> bytes:
             for one in moved
         ],
     )
-
-
-def _tests(found: BlockFound) -> Iterator[dict[str, Any]]:
-    if found.overall is not None:
-        yield _row(found, "settings differ, all statements", found.overall) | _alone(found, "all statements at once")
-    for question, tests in (
-        ("settings differ", found.omnibus),
-        ("answers follow the delay", found.trends),
-        ("sessions differ", found.by_session),
-        ("settings differ, mixed model", found.mixed),
-        ("settings differ, incomplete participants too", found.incomplete),
-    ):
-        for one in tests:
-            yield _judged(found, question, one)
-    for pair in found.pairs:
-        compared = f"{name(found, pair.first)} − {name(found, pair.second)}"
-        yield _judged(found, "two settings differ", pair.tested) | {"comparison": compared}
-    if found.named is not None:
-        row = _row(found, "liquids are recognised", found.named.found) | _alone(found, "recognition")
-        yield row | {"verdict": found.named.verdict}
-    for lowest in found.lowest:
-        for step in lowest.steps.steps:
-            row = _row(found, "answers follow the delay, stepping down", step.page)
-            row |= _alone(found, f"stepping down within {lowest.item}") | {"members": len(lowest.steps.steps)}
-            row |= {"correction": "none: fixed order, ends at the first that fails"}
-            yield row | {"item": lowest.item, "comparison": f"up to {step.longest_ms:g} ms"}
-    for against in found.against:
-        row = _row(found, "a delay is equivalent", against.found) | {"item": against.item}
-        compared = f"{against.delay_ms:g} ms − {against.control_ms:g} ms"
-        row |= _alone(found, f"{against.item} at {against.delay_ms:g} ms")
-        yield row | {"comparison": compared, "verdict": against.verdict}
-        yield _differs(found, against) | {"item": against.item, "comparison": compared, "verdict": against.verdict}
-    if found.threshold is not None:
-        yield _row(found, "a delay is noticed", found.threshold)
-
-
-def _differs(found: BlockFound, against: ContrastWithControl) -> dict[str, Any]:
-    """Return the row of the same comparison asked the other way: whether the delay differs at all."""
-    outcome = against.found
-    by = "the larger p of a t test and of exact signed ranks, two-sided"
-    return _row(found, "a delay differs", outcome) | {
-        "test": "difference, paired",
-        "statistic": outcome.t,
-        "p": outcome.p_difference,
-        "method": "t test, two-sided" if outcome.p_different_ranks is None else by,
-        "p_adjusted": against.p_adjusted,
-        "smallest_p": None if outcome.p_different_ranks is None else 0.5 ** (outcome.n - 1),
-        "family": f"{found.id}: each delay against the shortest",
-        "members": against.members,
-        "correction": HOLM,
-        "note": None if outcome.t is not None else outcome.note,
-    }
-
-
-def _alone(found: BlockFound, what: str) -> dict[str, Any]:
-    """Return the family of a test that is corrected for no other."""
-    return {"family": f"{found.id}: {what}", "members": 1, "correction": ALONE}
-
-
-def _judged(found: BlockFound, question: str, one: Tested) -> dict[str, Any]:
-    return _row(found, question, one.outcome) | {
-        "item": one.item,
-        "family": one.family,
-        "members": one.members,
-        "correction": one.correction,
-        "p_adjusted": one.p_adjusted,
-        "primary": one.primary,
-        "verdict": one.verdict,
-    }
-
-
-def _row(found: BlockFound, question: str, outcome: Outcome) -> dict[str, Any]:
-    interval = outcome.interval
-    blank = {column.name: None for column in TESTS}
-    return blank | {
-        "block": found.id,
-        "question": question,
-        **{
-            field: getattr(outcome, field)
-            for field in (
-                *("test", "n", "dropped", "statistic_name", "statistic", "p", "smallest_p", "method"),
-                *("effect_name", "effect"),
-            )
-        },
-        "low": None if interval is None else interval.low,
-        "high": None if interval is None else interval.high,
-        "level": None if interval is None else interval.level,
-        "interval": outcome.no_interval or None if interval is None else interval.method,
-        "note": outcome.note or None,
-    }
 
 
 def document(study: Study, results: Results, texts: Mapping[str, Any], failures: Failures) -> bytes:

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings import all_findings
 from study_app.analysis.report.number_files import tests
-from study_app.analysis.statistics.friedman import Friedman
+from study_app.analysis.report.r_syntax import r_vector
+from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.statistics.trend import EXACT_UP_TO
 from study_app.analysis.tables.study import Study
 
 START: Final = """\
 # Computes the main numbers of report.html again, in base R (4.0 or newer, no packages), from the table of responses
-# beside this file, and says where they differ:  Rscript report.R   (exit code 1 if any does, or if there is
+# next to this file, and says where they differ:  Rscript report.R   (exit code 1 if any does, or if there is
 # nothing to compare)
 # The exact p of trends and of pairs come from all rearrangements, up to {exact} participants; beyond that, and for
 # Friedman's test, the approximate p are compared.
@@ -131,69 +132,9 @@ def _numbers(results: Results) -> int:
 
 
 def _calls(found: BlockFound) -> Iterator[str]:
-    block = _text(found.id)
-    codes = _vector([setting.code for setting in found.settings])
+    codes = r_vector([setting.code for setting in found.settings])
     if found.replicated_ms:
-        by_delay = _by_delay(found)
-        codes += f", {_vector([by_delay[setting.delay_ms] for setting in found.settings])}"
-    yield from _pairs(found, block, codes)
-    for one in found.omnibus:
-        if not isinstance(one.outcome, Friedman) or one.outcome.n < 2:
-            continue  # R's friedman.test refuses a single participant
-        if one.outcome.statistic is not None and one.outcome.p_chi2 is not None:
-            numbers = f"{_number(one.outcome.statistic)}, {_number(one.outcome.p_chi2)}"
-            yield f"friedman({_text(one.item)}, wide({block}, {_text(one.item)}, {codes}), {numbers})"
-    for one in found.trends:
-        if one.outcome.statistic is not None and one.outcome.p is not None:
-            falling = "TRUE" if "decreasing" in one.outcome.method else "FALSE"
-            numbers = f"{falling}, {_number(one.outcome.statistic)}, {_number(one.outcome.p)}"
-            yield f"page({_text(one.item)}, wide({block}, {_text(one.item)}, {codes}), {numbers})"
-    yield from _against(found, block, codes)
-    if found.named is not None and found.named.found.statistic is not None:
-        right = ", ".join("NA_character_" if label is None else _text(label) for label in found.named.right)
-        labels = _vector(found.named.labels)
-        yield f"hits({block}, {block}, {labels}, {codes}, c({right}), {_number(found.named.found.statistic)})"
-
-
-def _pairs(found: BlockFound, block: str, codes: str) -> Iterator[str]:
-    """Yield the comparisons of two settings: those of liquids, and of a block that has two settings all of them."""
-    compared = [(pair.first, pair.second, pair.tested) for pair in found.pairs]
-    if len(found.settings) == 2:
-        first, second = (setting.code for setting in found.settings)
-        compared += [(first, second, one) for one in found.omnibus]
-    for first, second, one in compared:
-        if one.outcome.statistic is not None and one.outcome.p is not None:
-            what = _text(f"{one.item}, {first} and {second}")
-            numbers = f"{_text(first)}, {_text(second)}, {_number(one.outcome.statistic)}, {_number(one.outcome.p)}"
-            yield f"pair({what}, wide({block}, {_text(one.item)}, {codes}), {numbers})"
-
-
-def _by_delay(found: BlockFound) -> dict[float | None, str]:
-    """Return the code that stands for each delay."""
-    return {setting.delay_ms: setting.code for setting in found.settings}
-
-
-def _against(found: BlockFound, block: str, codes: str) -> Iterator[str]:
-    by_delay = _by_delay(found)
-    for one in found.against:
-        interval = one.found.interval
-        if one.found.p is None or one.found.p_different is None or interval is None:
-            continue
-        first, second = _text(by_delay[one.control_ms]), _text(by_delay[one.delay_ms])
-        what = _text(f"{one.item}, {one.delay_ms:g} ms")
-        numbers = (one.found.bound, one.found.p, interval.low, interval.high, interval.level, one.found.p_different)
-        told = ", ".join(_number(value) for value in numbers)
-        yield f"equivalent({what}, wide({block}, {_text(one.item)}, {codes}), {first}, {second}, {told})"
-
-
-def _number(value: float) -> str:
-    return repr(float(value))
-
-
-def _text(words: str) -> str:
-    escaped = words.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'
-
-
-def _vector(words: tuple[str, ...] | list[str]) -> str:
-    return f"c({', '.join(_text(word) for word in words)})"
+        by_delay = {setting.delay_ms: setting.code for setting in found.settings}
+        codes += f", {r_vector([by_delay[setting.delay_ms] for setting in found.settings])}"
+    for finding in all_findings():
+        yield from finding.calls(found, codes)

@@ -5,33 +5,27 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from html import escape, unescape
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from study_app import __version__
 from study_app.analysis.evaluate import Progress, evaluate
 from study_app.analysis.export.export import export_files
-from study_app.analysis.figures.report_figures import Picture, pictures
-from study_app.analysis.findings.block_results import Results
-from study_app.analysis.findings.section_failures import Failure, Failures
-from study_app.analysis.findings.words import counted
+from study_app.analysis.figures.level_figure import level_pictures
+from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.question_figures import question_pictures
+from study_app.analysis.figures.report_figures import pictures
 from study_app.analysis.report import block_section, conduct_section, number_files, summary
+from study_app.analysis.report.answers import question_section
 from study_app.analysis.report.first_page.page import first_page
-from study_app.analysis.report.html_page import (
-    box,
-    bullets,
-    contents,
-    folded,
-    heading,
-    not_there,
-    page,
-    paragraph,
-    table,
-)
+from study_app.analysis.report.html_page import box, bullets, heading, not_there, page, paragraph, render, table
 from study_app.analysis.report.methods_paragraph import methods, told_versions
 from study_app.analysis.report.r_script import r_script
 from study_app.analysis.report.typeface import font_faces
+from study_app.analysis.results.block_results import Results
+from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study import Study, load_study
 from study_app.errors import AnalysisError
 from study_app.store.blinded import blinding
@@ -76,7 +70,7 @@ def report(
     going = partial(_going, progress, cancelled)
     going("reading", 0.0)
     study = load_study(folder)
-    if not study.blocks:
+    if not study.blocks and not study.others.questions:
         raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to report")
     results = evaluate(study, progress=lambda what, share: going(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
@@ -101,14 +95,22 @@ def _going(
 
 
 def _drawn(study: Study, results: Results, going: Progress, failures: Failures) -> Iterator[Picture]:
-    for number, picture in enumerate(pictures(study, results, failures=failures), start=1):
+    drawn = chain(pictures(study, results, failures=failures), _of_questions(study, results, failures))
+    for number, picture in enumerate(drawn, start=1):
         going(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, number / 4))
         yield picture
 
 
+def _of_questions(study: Study, results: Results, failures: Failures) -> Iterator[Picture]:
+    if results.questions:
+        yield from question_pictures(study, results.questions, failures=failures)
+    if results.levels:
+        yield from level_pictures(study, results.levels, failures=failures)
+
+
 def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: Failures) -> dict[str, bytes]:
     """Return every file that can be made; report.json comes last, since it holds the failures of the others."""
-    told = {
+    texts = {
         what: _or_why(failures, f"texts: {what}", make, one_line=what == "methods")
         for what, make in (
             ("findings", lambda: summary.findings(results)),
@@ -119,7 +121,7 @@ def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: F
     files: dict[str, bytes] = {}
     for name, make in (
         ("report.R", lambda: r_script(study, results).encode()),
-        ("methods.txt", f"{told['methods']}\n".encode),
+        ("methods.txt", f"{texts['methods']}\n".encode),
         ("tests.csv", lambda: number_files.tests_csv(results)),
         ("motion.csv", lambda: number_files.motion_csv(results)),
     ):
@@ -130,8 +132,8 @@ def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: F
         files[f"{one.name}.txt"] = f"{one.caption}\n".encode()
     exported = failures.attempt("exported tables", lambda: export_files(study))
     files |= {} if isinstance(exported, Failure) else exported
-    page_ = _page(study, results, drawn, told, failures).encode()
-    return {"report.html": page_, "report.json": number_files.document(study, results, told, failures), **files}
+    page_ = _page(study, results, drawn, texts, failures).encode()
+    return {"report.html": page_, "report.json": number_files.document(study, results, texts, failures), **files}
 
 
 def _or_why(failures: Failures, what: str, make: Callable[[], Any], *, one_line: bool) -> Any:
@@ -142,59 +144,57 @@ def _or_why(failures: Failures, what: str, make: Callable[[], Any], *, one_line:
     return f"Not there: {found.why}." if one_line else (f"Not there: {found.why}.",)
 
 
-def _page(study: Study, results: Results, drawn: Sequence[Picture], told: Mapping[str, Any], failures: Failures) -> str:
+def _page(
+    study: Study, results: Results, drawn: Sequence[Picture], texts: Mapping[str, Any], failures: Failures
+) -> str:
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
-        ("In short", lambda: _short(told)),
+        ("In short", lambda: _short(texts, results)),
         *((found.title, partial(block_section.block, found, results, drawn, failures)) for found in results.blocks),
+        *(
+            (title, partial(question_section.section, where, study, results, drawn))
+            for where, title in question_section.places(results).items()
+        ),
         ("What the words mean", lambda: block_section.verdicts_mean(results)),
+        ("Groups", lambda: conduct_section.groups(study, results)),
         ("Motion and force", lambda: conduct_section.motion(results)),
         ("How it was run", lambda: conduct_section.conduct(study, results)),
-        ("Methods, to paste", lambda: (heading(2, "Methods, to paste"), box([paragraph(str(told["methods"]))]))),
+        ("Methods, to paste", lambda: (heading(2, "Methods, to paste"), box([paragraph(str(texts["methods"]))]))),
         ("Reproducing this report", lambda: _again(study, results)),
         ("Answers, counted", lambda: block_section.answers(results)),
     ]
-    first = failures.attempt("first page", lambda: first_page(results, told["limits"], failures))
-    parts: list[tuple[str, list[str]]] = []
+    first = failures.attempt("first page", lambda: first_page(results, texts["limits"], failures))
+    parts: list[dict[str, Any]] = []
     for title, make in sections_:
         found = failures.attempt(f"section “{title}”", partial(_made, make))
-        part = [heading(2, title), not_there(found.why)] if isinstance(found, Failure) else found
-        parts += [(title, part)] if part else []
-    body = [not_there(first.why) if isinstance(first, Failure) else first]
-    for number, (_, part) in enumerate(parts, start=1):
-        body += folded(part, number)
-    html = "\n".join([*_head(study), contents(title for title, _ in parts), *_failed(failures), *body])
-    faces = failures.attempt("typeface", lambda: font_faces("".join(sorted(set(unescape(html))))))
-    return page(f"{study.title}: report", html, "" if isinstance(faces, Failure) else faces)
+        html = [heading(2, title), not_there(found.why)] if isinstance(found, Failure) else found
+        parts += [{"title": title, "html": html}] if html else []
+    body = render(
+        "body.html",
+        title=study.title,
+        facts=_facts(study),
+        marks=_marks(study),
+        parts=parts,
+        failures=[str(one) for one in failures.found],
+        first=not_there(first.why) if isinstance(first, Failure) else first,
+    )
+    faces = failures.attempt("typeface", lambda: font_faces("".join(sorted(set(body.unescape())))))
+    return page(f"{study.title}: report", body, "" if isinstance(faces, Failure) else faces)
 
 
 def _made(make: Callable[[], Iterable[str]]) -> list[str]:
     return list(make())
 
 
-def _failed(failures: Failures) -> Iterator[str]:
-    """Say above everything else what is missing."""
-    if failures.found:
-        yield box(
-            [
-                paragraph("Parts of this report could not be computed; everything else is there:"),
-                bullets(map(str, failures.found)),
-            ],
-            "care",
-        )
-
-
-def _head(study: Study) -> Iterator[str]:
-    yield heading(1, study.title)
+def _facts(study: Study) -> str:
     people = counted(study.n, "participant")
-    marks = []
-    if study.simulated:
-        marks.append('<span class="mark">SIMULATED participants, no people</span>')
-    if study.pilot:
-        marks.append('<span class="mark">PILOT</span>')
-    if not study.revealed:
-        marks.append('<span class="sealed">Blinded: by code</span>')
-    facts = f"Study {study.name}, {told_versions(study)}. {people[:1].upper()}{people[1:]}. {_days(study)}"
-    yield f'<p class="soft facts">{escape(facts)} {" ".join(marks)}</p>'
+    return f"Study {study.name}, {told_versions(study)}. {people[:1].upper()}{people[1:]}. {_days(study)}"
+
+
+def _marks(study: Study) -> list[tuple[str, str]]:
+    """Return what must be seen at the head of the page: a class of the style, and words."""
+    marks = [("mark", "SIMULATED participants, no people")] if study.simulated else []
+    marks += [("mark", "PILOT")] if study.pilot else []
+    return marks if study.revealed else [*marks, ("sealed", "Blinded: by code")]
 
 
 def _days(study: Study) -> str:
@@ -206,11 +206,11 @@ def _days(study: Study) -> str:
     return f"Sessions on {days[0]}." if len(days) == 1 else f"Sessions from {days[0]} to {days[-1]}."
 
 
-def _short(told: Mapping[str, Any]) -> Iterator[str]:
+def _short(texts: Mapping[str, Any], results: Results) -> Iterator[str]:
     """Yield every finding in a sentence, with its p."""
     yield heading(2, "In short: every finding in a sentence")
-    found = told["findings"]
-    yield bullets(found) if found else paragraph("No answers count yet: there are no findings.")
+    found = texts["findings"]
+    yield bullets(found) if found else paragraph(summary.none_found(results))
 
 
 def _again(study: Study, results: Results) -> Iterator[str]:

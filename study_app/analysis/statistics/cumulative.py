@@ -94,7 +94,9 @@ def log_likelihood(values: Array, answers: Answers, nodes: int = NODES) -> tuple
     Parameters
     ----------
     values : (parameters,) array
-        θ ascending, β, and, with participants, σ > 0.
+        Thresholds θ ascending, β, and, with participants, σ > 0.
+    answers : Answers
+        What was answered.
     nodes : int
         Quadrature nodes a participant; 1 is Laplace's approximation (its gradient is then that of the true integral
         only roughly).

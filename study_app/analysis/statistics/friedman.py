@@ -45,10 +45,13 @@ class Friedman(Outcome):
     ``mean_ranks`` has one entry a setting.
     """
 
+    test: str = "Friedman"
+    statistic_name: str = "chi2"
+    effect_name: str = "Kendall's W"
     df: int
-    p_chi2: float | None
-    f: float | None
-    p_f: float | None
+    p_chi2: float | None = None
+    f: float | None = None
+    p_f: float | None = None
     mean_ranks: tuple[float, ...]
 
 
@@ -73,7 +76,9 @@ def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedma
     spread = tied_spread(ranks)
     sums = ranks.sum(axis=0)
     if spread == 0:
-        return _without(n, dropped, k, "no participant answered under all settings" if n == 0 else NO_VARIATION)
+        note, middle = NO_VARIATION if n else "no participant answered under all settings", (k + 1) / 2
+        ranks_of_all = (middle,) * k if n else ()
+        return Friedman(n=n, dropped=dropped, no_interval=note, note=note, df=k - 1, mean_ranks=ranks_of_all)
     squares = _squares(sums[None, :], n)[0]
     statistic = (k - 1) * squares / spread
     w = statistic / (n * (k - 1))
@@ -81,15 +86,12 @@ def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedma
     approximate = float(chdtrc(k - 1, statistic))
     f, p_f = _f(w, n, k)
     return Friedman(
-        test="Friedman",
         n=n,
         dropped=dropped,
-        statistic_name="chi2",
         statistic=float(statistic),
         p=approximate if p is None else p,
         smallest_p=smallest,
         method=method,
-        effect_name="Kendall's W",
         effect=float(w),
         no_interval=NO_INTERVAL,
         df=k - 1,
@@ -118,28 +120,6 @@ def _f(w: float, n: int, k: int) -> tuple[float | None, float | None]:
     f = (n - 1) * w / (1 - w)
     df = k - 1 - 2 / n
     return float(f), float(fdtrc(df, (n - 1) * df, f))
-
-
-def _without(n: int, dropped: int, k: int, note: str) -> Friedman:
-    return Friedman(
-        test="Friedman",
-        n=n,
-        dropped=dropped,
-        statistic_name="chi2",
-        statistic=None,
-        p=None,
-        smallest_p=None,
-        method="none",
-        effect_name="Kendall's W",
-        effect=None,
-        no_interval=note,
-        note=note,
-        df=k - 1,
-        p_chi2=None,
-        f=None,
-        p_f=None,
-        mean_ranks=((k + 1) / 2,) * k if n else (),
-    )
 
 
 def _p(ranks: Whole, squares: int, draws: int, seed: int) -> tuple[float | None, float | None, str]:

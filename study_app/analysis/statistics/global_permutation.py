@@ -45,6 +45,10 @@ def global_permutation(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) 
     ----------
     values : (items, participants, settings) array
         NaN where an answer is missing: that participant's row of that statement is left out.
+    draws : int
+        Rearrangements drawn where not all can be listed.
+    seed : int
+        Of the rearrangements.
 
     Raises
     ------

@@ -73,15 +73,17 @@ def ordinal(
     ----------
     values : (participants, settings) or (participants, settings, presentations) array
         NaN where an answer is missing; the others of that participant are used.
-    sessions : array of the shape of ``values``, optional
-        In which session each answer was given: a factor beside the settings, which is not tested. It is left out where
-        all answers are of one, or where the effects of sessions and settings cannot be separated.
     columns : (settings, columns) array, optional
         What is tested: 0 and 1 for factors, numbers for amounts (a delay in units of 100 ms). Without, every setting is
         compared with the first.
+    sessions : array of the shape of ``values``, optional
+        In which session each answer was given: a factor besides the settings, which is not tested. It is left out where
+        all answers are of one, or where the effects of sessions and settings cannot be separated.
     intercepts : bool
         Whether each participant has an intercept of his or her own. Without, answers are taken as independent, which
         shrinks the effects: for comparison only.
+    nodes : int
+        Quadrature nodes a participant.
 
     Raises
     ------
@@ -173,7 +175,6 @@ def _outcome(
         statistic_name="likelihood ratio",
         statistic=None if found is None else ratio,
         p=None if found is None else float(chi_square.sf(ratio, columns)),
-        smallest_p=None,
         method=f"random intercepts, adaptive Gauss-Hermite quadrature, {nodes} nodes"
         + ("; sessions as a factor" if sessions else "")
         if intercepts

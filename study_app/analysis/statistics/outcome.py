@@ -52,7 +52,7 @@ class Interval:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a report prints beside every test.
+    """What a report prints with every test.
 
     ``n`` participants were used, ``dropped`` were not, for missing answers. ``statistic``, ``p``, ``effect`` are None
     where they do not exist; ``note`` then says why, and otherwise what must be said with the numbers. ``smallest_p`` is
@@ -64,12 +64,12 @@ class Outcome:
     n: int
     dropped: int
     statistic_name: str
-    statistic: float | None
-    p: float | None
-    smallest_p: float | None
-    method: str
+    statistic: float | None = None
+    p: float | None = None
+    smallest_p: float | None = None
+    method: str = "none"
     effect_name: str
-    effect: float | None
+    effect: float | None = None
     interval: Interval | None = None
     no_interval: str = ""
     note: str = ""
@@ -85,7 +85,9 @@ def checked(values: ArrayLike, axes: str) -> Array:
     Parameters
     ----------
     values : array
-        One axis for each word in ``axes`` ("participants, settings").
+        One axis for each word in ``axes``.
+    axes : str
+        Names of the axes ("participants, settings").
 
     Raises
     ------
@@ -121,7 +123,7 @@ def draws_for(alpha: float, usual: int, members: int = 1) -> int:
     return min(MOST_DRAWS, max(usual, math.ceil(members / (FLOOR * alpha))))
 
 
-def told(count: int, noun: str = "participant") -> str:
+def counted(count: int, noun: str = "participant") -> str:
     """Return "1 participant", "5 participants"."""
     return f"{count} {noun}" + ("" if count == 1 else "s")
 

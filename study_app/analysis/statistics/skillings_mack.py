@@ -39,6 +39,10 @@ def skillings_mack(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> S
     ----------
     values : (participants, settings) array
         NaN where an answer is missing.
+    draws : int
+        Rearrangements drawn where not all can be listed.
+    seed : int
+        Of the rearrangements.
 
     Raises
     ------

@@ -28,9 +28,9 @@ from study_app.analysis.statistics.outcome import (
     Whole,
     checked,
     complete,
+    counted,
     percentiles,
     resamples,
-    told,
 )
 from study_app.errors import AnalysisError
 
@@ -153,8 +153,12 @@ def step_down(
     ----------
     values : (participants, delays) array
         In the order of ``delays_ms``.
-    delays_ms : sequence
+    delays_ms : sequence of float
         Ascending; the first is the control.
+    direction : "increasing" | "decreasing"
+        Where answers go as the delay grows.
+    alpha : float
+        Level of every step.
 
     Raises
     ------
@@ -181,12 +185,12 @@ def step_down(
 def _note(first: Step, lowest: float | None) -> str:
     if lowest is None:
         return (
-            f"no trend was shown up to {first.longest_ms:g} ms with {told(first.page.n)}; "
+            f"no trend was shown up to {first.longest_ms:g} ms with {counted(first.page.n)}; "
             "that is not evidence that there is none"
         )
     return (
-        f"{lowest:g} ms is an upper bound: the lowest delay at which the answers of {told(first.page.n)} show a trend; "
-        "shorter delays may be noticed too"
+        f"{lowest:g} ms is an upper bound: the lowest delay at which the answers of {counted(first.page.n)} show a "
+        "trend; shorter delays may be noticed too"
     )
 
 

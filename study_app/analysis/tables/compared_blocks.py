@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 from study_app.protocol.blocks import Compared
+from study_app.protocol.orders.block_orders import every_step_of
 from study_app.store.blinded.blinding import Key
 
 Kind: TypeAlias = Compared
@@ -32,7 +33,7 @@ class Item:
 class Setting:
     """What was presented under a code; all but the code is None until the key is opened.
 
-    ``label`` is the item that names what was felt, where one does.
+    ``label`` is the item that names what was felt, where one does. A track ("8/1") has neither liquid nor delay.
     """
 
     code: str
@@ -40,6 +41,12 @@ class Setting:
     liquid: str | None = None
     delay_ms: float | None = None
     label: str | None = None
+
+    @property
+    def standard(self) -> str | None:
+        """What a track's comparisons are compared with; None of a condition, and of a track without a standard."""
+        standard, is_track, _ = (self.condition or "").partition("/")
+        return standard or None if is_track else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,28 +93,26 @@ class Block:
         return all(setting.condition is not None for setting in self.settings)
 
     def name(self, setting: Setting) -> str:
-        """Return what a figure calls a setting: its code, or its liquid and, where delays differ, its delay."""
-        if setting.liquid is None or setting.delay_ms is None:
-            return setting.code
-        liquid = setting.liquid.replace("_", " ")
-        named = liquid[:1].upper() + liquid[1:]
-        delays = {other.delay_ms for other in self.settings}
-        return f"{named}, {setting.delay_ms:g} ms" if len(delays) > 1 else named
+        """Return what a figure calls a setting."""
+        return setting_name(setting, self.settings)
 
 
 def settings_of(key: Key) -> dict[tuple[str, str], Setting]:
     """Return what the opened key says of every code: (block id, code) → setting."""
     return {
-        (block, code): Setting(
-            code,
-            condition,
-            " + ".join(key.liquids(block, code)),
-            key.delay_ms(block, code),
-            key.tables["conditions"][condition].get("label"),
-        )
+        (block, code): _setting(key, block, code, presented)
         for block, codes in key.codes.items()
-        for code, condition in codes.items()
+        for code, presented in codes.items()
     }
+
+
+def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
+    """Return what a code stands for: a condition, or a track of a design such as "8/1", with its standard."""
+    condition = key.tables["conditions"].get(presented)
+    if condition is None:
+        return Setting(code, presented)
+    liquids = " + ".join(key.liquids(block, code))
+    return Setting(code, presented, liquids, key.delay_ms(block, code), condition.get("label"))
 
 
 def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
@@ -120,12 +125,17 @@ def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ..
     key : Key, optional
         The key, once it was opened.
     """
-    asked = [protocol["blocks"][step] for step in protocol["sequence"] if step in protocol["blocks"]]
+    asked = [protocol["blocks"][step] for step in every_step_of(protocol) if step in protocol["blocks"]]
     return tuple(
         _block(protocol, block, spoken(protocol), key)
         for block in asked
-        if block["phase"] == "main" and block["questionnaire"] is not None
+        if block["phase"] == "main" and block["questionnaire"] is not None and _statements(protocol, block)
     )
+
+
+def _statements(protocol: Mapping[str, Any], block: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the statements of a block's questionnaire, which have no kind."""
+    return [item for item in protocol["questionnaires"][block["questionnaire"]]["items"] if "kind" not in item]
 
 
 def spoken(protocol: Mapping[str, Any]) -> str:
@@ -143,10 +153,10 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str,
     questionnaire = protocol["questionnaires"][block["questionnaire"]]
     scale = protocol["scales"][questionnaire["scale"]]
     off_scale = scale["cannot_judge"]
-    settings = tuple(Setting(code) for code in block["codes"])
+    settings = settings_in(protocol, block["id"], key)
     kind: Kind = block.get("compares") or ("delays" if block["code_prefix"] == DELAY_PREFIX else "liquids")
     if key is not None:
-        settings, kind = _opened(key, block["id"], block["codes"], block.get("compares"))
+        kind = _opened(key, block["id"], block["codes"], block.get("compares"))[1]
     return Block(
         id=block["id"],
         title=text_in(block["title"], language),
@@ -154,11 +164,28 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str,
         settings=settings,
         items=tuple(
             Item(item["id"], text_in(item["text"], language), text_in(item["short"], language))
-            for item in questionnaire["items"]
+            for item in _statements(protocol, block)
         ),
         labels=tuple(scale["labels"][language]),
         cannot_judge=None if off_scale is None else text_in(off_scale, language),
     )
+
+
+def settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tuple[Setting, ...]:
+    """Return the settings of a block: in code order, once known in the order of the conditions."""
+    table = protocol["blocks"][block]
+    if key is None:
+        return tuple(Setting(code) for code in table["codes"])
+    return _opened(key, block, table["codes"], table.get("compares"))[0]
+
+
+def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
+    """Return what a figure calls a setting: its code, or its liquid and, where delays differ, its delay."""
+    if setting.liquid is None or setting.delay_ms is None:
+        return setting.code if setting.standard is None else f"Standard {setting.standard}"
+    liquid = setting.liquid.replace("_", " ")
+    named = liquid[:1].upper() + liquid[1:]
+    return f"{named}, {setting.delay_ms:g} ms" if len({other.delay_ms for other in others}) > 1 else named
 
 
 def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tuple[tuple[Setting, ...], Kind]:
@@ -174,4 +201,6 @@ def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tu
     if kind == "delays":
         return tuple(sorted(settings, key=lambda setting: setting.delay_ms or 0.0)), "delays"
     order = list(key.tables["conditions"])
+    if any(setting.condition not in order for setting in settings):  # tracks, by their standards
+        return tuple(sorted(settings, key=lambda one: float((one.condition or "").partition("/")[0] or 0))), "liquids"
     return tuple(sorted(settings, key=lambda setting: order.index(setting.condition))), "liquids"

@@ -1,4 +1,4 @@
-"""What ``exclusions.csv`` leaves out, told beside the rows it is about: they are kept, and do not count."""
+"""What ``exclusions.csv`` leaves out, marked in the rows it is about: they are kept, and do not count."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFr
         return table.assign(excluded=False, exclusion_reason=pd.Series(pd.NA, index=table.index, dtype="string"))
     trials = table["trial"] if "trial" in table.columns else [None] * len(table)
     found = [
-        list(_about(listed, str(participant), int(session), trial))
+        list(_about(listed, str(participant), int(session), None if pd.isna(trial) else trial))
         for participant, session, trial in zip(table["participant"], table["session"], trials, strict=True)
     ]
     reasons = ["; ".join(one.reason for one in of_row if one.reason) or None for of_row in found]

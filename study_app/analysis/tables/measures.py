@@ -56,7 +56,7 @@ def aggregate(
         How often each setting was presented and its questionnaire due: what was neither answered nor judged
         impossible is ``missing``.
     excluded : mapping of str to int
-        How often each setting was presented beside that, in trials that are left out.
+        How often each setting was presented in addition, in trials that are left out.
 
     Returns
     -------
@@ -105,6 +105,12 @@ def quartiles(values: Array) -> tuple[float, float, float]:
         return (float("nan"),) * 3
     q1, median, q3 = np.quantile(valid, (0.25, 0.5, 0.75), method="linear")
     return float(q1), float(median), float(q3)
+
+
+def quartiles_or_none(values: Array) -> tuple[float | None, float | None, float | None]:
+    """Return what `quartiles` does, with None in the place of NaN."""
+    low, middle, high = quartiles(values)
+    return (None, None, None) if np.isnan(middle) else (low, middle, high)
 
 
 def presentations(

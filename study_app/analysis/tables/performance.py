@@ -30,7 +30,7 @@ DEFINITIONS: Final = {
     "path_m": "length of the hand's path in the trial",
     "force_mean_n": "mean force on the hand in the trial",
     "force_peak_n": "largest force on the hand in the trial",
-    "at_limit_percent": "share of the trial's turns of the servo in which the force was cut to the force limit",
+    "at_limit_percent": "share of the trial's ticks in which the force was cut to the force limit",
 }
 
 GLITCH: Final = 1 << LIMITER_NAMES.index("glitch")
@@ -100,7 +100,7 @@ class Performance:
 
 
 def performance(study: Study, each: Callable[[int, int], object] = lambda _done, _of: None) -> Performance:
-    """Measure the trials that count; ``each`` is told how many recordings of how many were read.
+    """Measure the trials that count; ``each`` receives how many recordings of how many were read.
 
     Raises
     ------

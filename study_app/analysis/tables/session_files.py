@@ -11,13 +11,15 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis.tables import typed_files
+from study_app.analysis.tables.asked_questions import NOTHING_ELSE, AskedQuestions, asked_questions
 from study_app.analysis.tables.compared_blocks import Block, main_blocks, spoken, text_in
+from study_app.analysis.tables.level_blocks import LevelBlock, level_blocks
 from study_app.analysis.tables.typed_files import Whole
 from study_app.errors import AnalysisError
 from study_app.store.blinded.blinding import Key
 from study_app.store.folders import SessionFolder
 from study_app.store.journals.parsing import check_study_name
-from study_app.store.tables.columns import TABLES
+from study_app.store.tables.columns import tables_of
 
 
 @dataclass(frozen=True)
@@ -31,11 +33,20 @@ class Session:
     protocol: Mapping[str, Any]
     blocks: tuple[Block, ...]
     facts: Mapping[str, Any]
+    others: AskedQuestions = NOTHING_ELSE
+    levels: tuple[LevelBlock, ...] = ()
 
     @property
     def asked(self) -> tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]:
-        """Block, codes and items: what must be alike in sessions that are pooled."""
-        return tuple((block.id, block.codes_as_dealt, tuple(item.id for item in block.items)) for block in self.blocks)
+        """Block, codes and items, and forms with their items: what must be alike in sessions that are pooled."""
+        blocks = ((block.id, block.codes_as_dealt, tuple(item.id for item in block.items)) for block in self.blocks)
+        others = ((one.where.id, (one.id,), (one.question.kind_id,)) for one in self.others.questions)
+        return (*blocks, *others)
+
+    @property
+    def protocol_format(self) -> int:
+        """The format of the study's protocol."""
+        return int(self.protocol.get("format", 1))
 
 
 def read_session(folder: SessionFolder, key: Key | None, like: Session | None = None) -> Session:
@@ -64,17 +75,29 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             "session": folder.number,
             **{name: receipt[name] for name in ("simulated", "pilot", "status", "language", "started_at", "ended_at")},
             "device": receipt["device"].get("name"),
+            "motors_masked": _masking(receipt.get("motors_masked")),
             "protocol_version": version,
             "key_hash": receipt["key_hash"],
             **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version")},
         }
-        blocks = like.blocks if like is not None and protocol is like.protocol else main_blocks(protocol, key)
+        alike = like is not None and protocol is like.protocol
+        blocks = like.blocks if like is not None and alike else main_blocks(protocol, key)
+        others = like.others if like is not None and alike else asked_questions(protocol, key)
+        levels = like.levels if like is not None and alike else level_blocks(protocol, key)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise AnalysisError(
             f"{folder.receipt} does not describe the session ({type(error).__name__}: {error}): it was changed, or "
             "written by another version of the program; restore it from a copy"
         ) from error
-    return Session(folder, study, title, version, protocol, blocks, facts)
+    return Session(folder, study, title, version, protocol, blocks, facts, others, levels)
+
+
+def _masking(answer: Mapping[str, Any] | None) -> str | None:
+    """Return how motors were masked in words, None where that was not asked."""
+    if answer is None:
+        return None
+    level = answer.get("noise_db")
+    return str(answer["means"]) if level is None else f"{answer['means']} of {level} dB"
 
 
 def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
@@ -83,10 +106,10 @@ def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
     Raises
     ------
     AnalysisError
-        A file is missing, damaged or of another session, or answers what nobody asked.
+        A file is missing, damaged or of another session, or answers what was not asked.
     """
     paths = [session.folder.table(session.study, name) for session in sessions]
-    table, lengths = typed_files.tables(paths, TABLES[name])
+    table, lengths = typed_files.tables(paths, tables_of(sessions[0].protocol_format)[name])
     _check_own(sessions, paths, table, lengths)
     if name == "responses":
         _check_answers(sessions, paths, table, lengths)
@@ -113,10 +136,13 @@ def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.Dat
 
 
 def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: Whole) -> None:
-    """Refuse answers that nobody asked for, and answers given twice."""
+    """Refuse answers to what was not asked, and answers given twice."""
     blocks = sessions[0].blocks
     asked = {(block.id, code, item.id) for block in blocks for code in block.codes for item in block.items}
-    main = np.flatnonzero(table["phase"].to_numpy() == "main")
+    asked |= {
+        (one.where.id, setting.code, one.id) for one in sessions[0].others.questions for setting in one.where.settings
+    }
+    main = np.flatnonzero(table["phase"].eq("main").fillna(False).to_numpy(dtype=bool))
     answered = zip(*(table[name].to_numpy()[main] for name in ("block", "code", "item")), strict=True)
     for index, (block, code, item) in zip(main, answered, strict=True):
         if (block, code, item) not in asked:
@@ -126,7 +152,8 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
                 f"{block!r}: the file was changed or belongs to another study; make it again from the journal: "
                 f"liquid-study rebuild {sessions[which].folder.path}"
             )
-    twice = np.flatnonzero(table.duplicated(["participant", "session", "trial", "attempt", "item"]))
+    which_one = [name for name in ("participant", "session", "form", "trial", "attempt", "item") if name in table]
+    twice = np.flatnonzero(table.duplicated(which_one))
     if len(twice):
         which, row = _place(lengths, int(twice[0]))
         answer = table.iloc[int(twice[0])]

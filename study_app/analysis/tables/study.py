@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -17,18 +18,22 @@ import pandas as pd
 
 from study_app.analysis.tables import measures
 from study_app.analysis.tables import planned_analysis as decided
+from study_app.analysis.tables.asked_questions import NOTHING_ELSE, AskedQuestion, AskedQuestions
 from study_app.analysis.tables.compared_blocks import Block, Kind, Setting, settings_of
 from study_app.analysis.tables.excluded_rows import check_there, with_excluded
+from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.planned_analysis import Decided
 from study_app.analysis.tables.session_files import Session, read_session, read_tables
 from study_app.errors import AnalysisError, StoreError
+from study_app.protocol.forms.kinds import STATEMENT
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.sessions.open_session import Place
 from study_app.store.sessions.unstarted_sessions import never_begun
-from study_app.store.tables.columns import SEALED
+from study_app.store.tables.columns import INTERVALS, SEALED
+from study_app.store.tables.study_description import has_intervals
 from study_app.store.verification.integrity import Doubt, doubts
 
 COMPLETED: Final = "completed"
@@ -44,7 +49,9 @@ class Study:
     are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
     the key is sealed; ``exclusions`` is what was decided to leave out; ``doubts`` are files that are not as they were
     recorded, and are used as they are. ``decided`` is what the protocol decided about the analysis, ``protocol`` the
-    first session's, as its receipt holds it.
+    first session's, as its receipt holds it. ``levels`` are the blocks with a design, ``intervals`` the
+    intervals of their trials; ``others`` are the questions that no block of statements holds;
+    ``answered`` has the rows of all questions as they were recorded, of which ``responses`` are those of statements.
     """
 
     folder: Path
@@ -59,6 +66,10 @@ class Study:
     exclusions: tuple[Exclusion, ...]
     doubts: tuple[Doubt, ...] = ()
     decided: Decided = decided.NOTHING
+    others: AskedQuestions = NOTHING_ELSE
+    answered: pd.DataFrame = field(default_factory=pd.DataFrame)
+    levels: tuple[LevelBlock, ...] = ()
+    intervals: pd.DataFrame = field(default_factory=pd.DataFrame)
     protocol: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -117,6 +128,16 @@ class Study:
         """Return the rows of ``responses`` that count, of one block."""
         return self.responses[self.responses["counted"] & (self.responses["block"] == block.id)]
 
+    def answers_to(self, asked: AskedQuestion) -> pd.DataFrame:
+        """Return the rows of ``answered`` that count, of a question that no block of statements holds."""
+        place = self.answered["form" if asked.where.is_form else "block"] == asked.where.id
+        return self.answered[self.answered["counted"] & place.fillna(False) & (self.answered["item"] == asked.id)]
+
+    @property
+    def protocol_format(self) -> int:
+        """The format of the study's protocol."""
+        return int(self.protocol.get("format", 1))
+
     def presented(self, block: Block) -> dict[str, int]:
         """Return how often each setting of a block was presented in trials that count."""
         rows = self.trials[self.trials["counted"] & (self.trials["block"] == block.id)]
@@ -147,6 +168,16 @@ def load_study(folder: Path) -> Study:
         there: says which, where in it, and what to do.
     StoreError
         The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
+
+    Examples
+    --------
+    >>> study = load_study(Path("results/sample-rek2024"))
+    >>> study.n, len(study.trials)
+    (12, 144)
+    >>> study.responses.loc[:1, ["participant", "code", "item", "response"]]
+      participant code          item  response
+    0        P001   L2  feels_liquid         6
+    1        P001   L2     immersive         5
     """
     place = StudyFolder(Path(folder))
     sessions = [session for session in place.sessions() if not never_begun(session.path)]
@@ -160,9 +191,14 @@ def load_study(folder: Path) -> Study:
         _check_alike(records[0], session)
     responses, trials = read_tables(records, "responses"), read_tables(records, "trials")
     if key is None:  # tables of earlier versions have these columns
-        trials = trials.assign(**{name: trials[name].mask(trials[name].notna()) for name in SEALED})
+        trials = _without(trials, SEALED)
     check_there(place, trials, listed)
-    last = pd.concat([responses, trials])[[*_TRIAL, "attempt"]].groupby(_TRIAL)["attempt"].max().rename("last_attempt")
+    after_trials = responses[responses["trial"].notna()]
+    both = pd.concat([after_trials, trials])[[*_TRIAL, "attempt"]]
+    last = both.groupby(_TRIAL)["attempt"].max().rename("last_attempt")
+    counted = _with_counted(with_excluded(after_trials, listed), last)
+    of_forms = with_excluded(responses[responses["trial"].isna()], listed)
+    answered = pd.concat([counted, _of_completed(of_forms)]).sort_index() if len(of_forms) else counted
     return Study(
         folder=place.path,
         name=records[0].study,
@@ -170,14 +206,34 @@ def load_study(folder: Path) -> Study:
         version=records[0].version,
         blocks=records[0].blocks,
         settings={} if key is None else settings_of(key),
-        responses=_with_counted(with_excluded(responses, listed), last),
+        responses=_of_statements(counted),
+        answered=answered,
+        levels=records[0].levels,
+        intervals=_intervals(records, listed, last, opened=key is not None),
         trials=_with_counted(with_excluded(trials, listed), last),
         participants=_sessions(with_excluded(pd.DataFrame([session.facts for session in records]), listed)),
         exclusions=listed,
         doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
+        others=records[0].others,
         decided=decided.read([session.protocol.get("analysis") for session in records]),
         protocol=records[0].protocol,
     )
+
+
+def _intervals(
+    records: Sequence[Session], listed: Sequence[Exclusion], last: pd.Series[int], *, opened: bool
+) -> pd.DataFrame:
+    """Return the intervals of all sessions; an empty table in a study without designs."""
+    if not has_intervals(records[0].protocol):
+        return pd.DataFrame()
+    table = read_tables(records, "intervals")
+    table = table if opened else _without(table, {column.name for column in INTERVALS if column.sealed})
+    return _with_counted(with_excluded(table, listed), last)
+
+
+def _without(table: pd.DataFrame, columns: AbstractSet[str]) -> pd.DataFrame:
+    """Return a table in which these columns are empty."""
+    return table.assign(**{name: table[name].mask(table[name].notna()) for name in columns & {*table.columns}})
 
 
 def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
@@ -194,7 +250,10 @@ def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
 
 def _no_sessions(path: Path) -> str:
     if not path.is_dir():
-        return f"{path} is no folder: give a study's folder, such as results/rek2024"
+        return (
+            f"{path} is no folder: give a study's folder, such as results/rek2024, or a name that liquid-study studies "
+            "lists"
+        )
     inside = sorted(found.name for found in path.iterdir() if found.is_dir() and StudyFolder(found).sessions())
     if inside:
         return f"{path} holds no sessions itself, but studies that do ({', '.join(inside)}): give {path / inside[0]}"
@@ -237,6 +296,19 @@ def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
         & ~joined["excluded"]
     )
     return table.assign(counted=counted.astype(bool))
+
+
+def _of_completed(table: pd.DataFrame) -> pd.DataFrame:
+    """Add what counts of forms: those of completed sessions, unless these are excluded."""
+    return table.assign(counted=((table["session_status"] == COMPLETED) & ~table["excluded"]).astype(bool))
+
+
+def _of_statements(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the answers to statements as points of their scale."""
+    if "kind" not in table:
+        return table
+    statements = table[table["kind"] == STATEMENT]
+    return statements.assign(response=statements["value"].astype("Int64"))
 
 
 def _sessions(table: pd.DataFrame) -> pd.DataFrame:

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from study_app.errors import AnalysisError
 from study_app.store.atomic import read_regular
 from study_app.store.journals.parsing import parse_json
-from study_app.store.tables.columns import LATER, MISSING, SEALED, Column, Kind, columns_held, header
+from study_app.store.tables.column import MISSING, Column, Kind, header
+from study_app.store.tables.columns import LATER, columns_held
 from study_app.store.tables.formulas import unguarded
 
 _ARRAYS: Final[dict[str, tuple[Any, Callable[[Any, Any], Any]]]] = {
@@ -72,7 +73,8 @@ def rows(path: Path, columns: tuple[Column, ...]) -> list[list[str]]:
         raise AnalysisError(f"{path} cannot be read ({why}): {_again(path)}, or mend the permissions") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise AnalysisError(f"{path} is damaged ({error}): {_again(path)}") from error
-    held = columns_held(found[0] if found else (), columns, LATER | SEALED)
+    may_lack = LATER | {column.name for column in columns if column.sealed}
+    held = columns_held(found[0] if found else (), columns, may_lack)
     names = header(held)
     if not found or tuple(found[0]) != names:
         raise AnalysisError(

@@ -1,4 +1,4 @@
-"""The liquid lab: where its place, a device's servo, the edits and their price meet.
+"""The liquid lab: where its place, a device's servo, the edits and their cost meet.
 
 Nothing of it acts on the hand once the place is left: leaving it, closing the window, an exception in a slot or in
 painting, all end in zero force first, then the servo, then the device.
@@ -10,7 +10,7 @@ import logging
 import math
 import random
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -18,15 +18,18 @@ from PySide6.QtCore import QObject, Qt, QTimer
 
 from study_app.app.exception_hooks import UncaughtExceptions
 from study_app.app.guarded_slots import guarded
-from study_app.app.lab.costs import AsksPrice, Prices
+from study_app.app.lab.costs import Prices
 from study_app.app.lab.device_opening import LabOpening
 from study_app.app.lab.initial_settings import InitialSettings, prepare_initial_settings
 from study_app.app.lab.preset_saving import LabSaving
 from study_app.app.lab.view_values import lab_view
+from study_app.app.session.termination import Patience
+from study_app.devices.names import DEFAULT_DEVICE
 from study_app.errors import StudyError
-from study_app.evaluation.appraisal_worker import Appraiser
+from study_app.evaluation.appraisal_worker import AppraisalClient, start_appraisal_worker
+from study_app.gui.home.startup_window import LONG_AFTER_S
 from study_app.gui.lab.view import LabPlace
-from study_app.lab.ab_comparison import Chance, Setting, Side, Workbench
+from study_app.lab.ab_comparison import Setting, Side, Workbench
 from study_app.lab.presets import Choice, spoken
 from study_app.viewmodels.lab import LabView
 
@@ -35,17 +38,22 @@ if TYPE_CHECKING:
 
 FRAME_MS: Final = 33
 APPRAISE_AFTER_MS: Final = 300
+COMPILING: Final = "Compiling the force model, once after an installation or an update; this takes about a minute"
 log = logging.getLogger(__name__)
 
 
 def compose_lab(
-    place: LabPlace, *, device: str = "mouse", firmware: Path | None = None, first: InitialSettings | None = None
+    place: LabPlace,
+    *,
+    device: str = DEFAULT_DEVICE,
+    options: Mapping[str, Path] | None = None,
+    first: InitialSettings | None = None,
 ) -> LabController:
-    """Give a lab's place its device, servo and prices: they come as it is entered and go as it is left.
+    """Give a lab's place its device, servo and costs: they come as it is entered and go as it is left.
 
-    ``device`` is the one it begins with, ``firmware`` the file of a Falcon's program, ``first`` what was prepared.
+    ``device`` is the one it begins with, ``options`` the values of devices' options, ``first`` what was prepared.
     """
-    return LabController(place, device=device, firmware=firmware, first=first)
+    return LabController(place, device=device, options=options, first=first)
 
 
 class LabController(QObject):
@@ -54,7 +62,7 @@ class LabController(QObject):
     Parameters
     ----------
     place : the widgets; this ends with them
-    device, firmware : what it begins with, and the file of a Falcon's program
+    device, options : the device it begins with, and the values of devices' options, by name
     open_live, make_appraiser : what opens a device by its name, what begins the process that appraises
     chance : what a blinding is drawn from
     first : what it begins with, where that was prepared
@@ -64,11 +72,11 @@ class LabController(QObject):
         self,
         place: LabPlace,
         *,
-        device: str = "mouse",
-        firmware: Path | None = None,
+        device: str = DEFAULT_DEVICE,
+        options: Mapping[str, Path] | None = None,
         open_live: Callable[..., Live] | None = None,
-        make_appraiser: Callable[[], AsksPrice] = Appraiser,
-        chance: Chance | None = None,
+        make_appraiser: Callable[[], AppraisalClient] = start_appraisal_worker,
+        chance: random.Random | None = None,
         first: InitialSettings | None = None,
     ) -> None:
         super().__init__(place)
@@ -81,12 +89,12 @@ class LabController(QObject):
         self._refused: tuple[str, str] | None = None
         self._entered = False
         self._prices = Prices(make_appraiser)
-        self._opening = LabOpening(open_live, firmware)
+        self._opening = LabOpening(open_live, options)
         self._saving = LabSaving(first.liquids)
-        self._chance = chance if chance is not None else random.SystemRandom()
+        self.chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
-        self._frames = self._timer(FRAME_MS, self._frame)
+        self.frames = self._timer(FRAME_MS, self._frame)
         self._due = self._timer(0, self._frame, once=True)
         self._price_due = self._timer(APPRAISE_AFTER_MS, self._ask_price, once=True)
         self._connect()
@@ -138,23 +146,23 @@ class LabController(QObject):
         if not self._entered:
             return
         self._entered = False
-        for timer in (self._frames, self._due, self._price_due):
+        for timer in (self.frames, self._due, self._price_due):
             timer.stop()
         self._opening.cancel()
         try:
             self._let_go()
         except StudyError as error:
-            log.warning("the servo did not end as it should: %s", error)
-            self.place.told.emit("The device was not let go of as it should be", f"{error}.")
+            log.warning("the servo did not stop properly: %s", error)
+            self.place.message.emit("The device was not released properly", f"{error}.")
         finally:
             self._prices.close()
             self.uncaught.remove()
 
-    def end(self) -> None:
+    def end(self, patience: Patience) -> None:
         """Leave, and wait for a preset that is being written, and for a device, so that it is let go of, too."""
         self.leave()
-        self._opening.wait()
-        self._saving.wait()
+        self._saving.wait(patience.left_s)
+        self._opening.wait(patience.left_s)
 
     def fail(self, error: BaseException) -> None:
         """Zero force, then say what failed; the force can be faded in again, through a device opened anew.
@@ -165,7 +173,7 @@ class LabController(QObject):
         try:
             self._let_go()
         except StudyError as second:
-            log.warning("the servo did not end as it should: %s", second)
+            log.warning("the servo did not stop properly: %s", second)
         traceback.clear_frames(error.__traceback__)
         known = isinstance(error, StudyError)
         before, self.trouble = (
@@ -173,7 +181,7 @@ class LabController(QObject):
             f"{error}" if known else f"{type(error).__name__}: {error}; the force is off",
         )
         if not known and self.trouble != before:  # once, though it may come with every frame
-            log.error("the lab broke: %s", error, exc_info=error)
+            log.error("the lab failed: %s", error, exc_info=error)
 
     def view(self) -> LabView:
         """Return what is to be seen now."""
@@ -184,7 +192,7 @@ class LabController(QObject):
             liquids=self.liquids,
             device=self.device,
             opening=self._opening.busy_with,
-            progress=self._said,
+            progress=self._said or (COMPILING if self._opening.lasts_s > LONG_AFTER_S else ""),
             price_due=self._price_due.isActive(),
             trouble=self.trouble,
             refused=self._refused,
@@ -197,7 +205,7 @@ class LabController(QObject):
             return
         self._entered = True
         self.uncaught.install()
-        self._frames.start()
+        self.frames.start()
         self._open(self.device)
 
     @guarded
@@ -254,7 +262,7 @@ class LabController(QObject):
         self._try(self.bench.copy_felt_to_other, "")
 
     def _try(self, edit: Callable[[], Workbench], name: str) -> None:
-        """Make an edit, or keep why it was refused beside its parameter."""
+        """Make an edit, or keep why it was refused, for its parameter."""
         try:
             bench = edit()
         except StudyError as error:
@@ -263,30 +271,30 @@ class LabController(QObject):
             else:
                 self.trouble = str(error)
             return
-        self._feel(bench)
+        self.feel(bench)
 
     @guarded
     def _switch(self) -> None:
         """Feel the other setting; a knob that is held is let go of at once, for it was the other one's."""
-        self._feel(self.bench.switch())
+        self.feel(self.bench.switch())
         self._show()
 
     @guarded
     def _blind(self, asked: bool) -> None:
         if asked:
-            self._feel(self.bench.blinded(self._chance), anew=True)
+            self.feel(self.bench.blinded(self.chance), anew=True)
         else:
-            self._feel(self.bench.revealed())
+            self.feel(self.bench.revealed())
 
     @guarded
     def _undo(self) -> None:
-        self._feel(self.bench.undo())
+        self.feel(self.bench.undo())
 
     @guarded
     def _redo(self) -> None:
-        self._feel(self.bench.redo())
+        self.feel(self.bench.redo())
 
-    def _feel(self, bench: Workbench, *, anew: bool = False) -> None:
+    def feel(self, bench: Workbench, *, anew: bool = False) -> None:
         """Let a workbench be felt at once, and be appraised once it has rested for a while."""
         before, self.bench, self._refused = self.bench, bench, None
         if self.live is not None:  # else it says why there is none
@@ -339,7 +347,7 @@ class LabController(QObject):
     def _save(self, path: Path, setting: Setting) -> None:
         """Write a setting as a preset."""
         if self.bench.blind:
-            self.trouble = "while the comparison is blind no preset can be saved: end the blinding first"
+            self.trouble = "no preset can be saved during a blind comparison: end it first"
             return
         self._saving.save(path, setting)
 

@@ -4,31 +4,20 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Protocol
 
 from study_app.evaluation.appraisal import Costs, Errors
-from study_app.evaluation.appraisal_worker import Told
+from study_app.evaluation.appraisal_worker import AppraisalClient, Question
 from study_app.haptics.model.scene import Scene
 
 log = logging.getLogger(__name__)
 
 
-class AsksPrice(Protocol):
-    """What appraises scenes (`Appraiser`)."""
-
-    @property
-    def works(self) -> bool: ...  # noqa: D102
-    def ask(self, scene: Scene) -> int: ...  # noqa: D102
-    def answers(self) -> list[Told]: ...  # noqa: D102
-    def close(self) -> None: ...  # noqa: D102
-
-
 class Prices:
     """What the felt setting costs and how true it is, as far as it was answered."""
 
-    def __init__(self, make_appraiser: Callable[[], AsksPrice]) -> None:
+    def __init__(self, make_appraiser: Callable[[], AppraisalClient]) -> None:
         self._make = make_appraiser
-        self._appraiser: AsksPrice | None = None
+        self._appraiser: AppraisalClient | None = None
         self._asked = 0
         self.costs: Costs | None = None
         self.errors: Errors | None = None
@@ -46,10 +35,10 @@ class Prices:
         if self._appraiser is None:
             try:
                 self._appraiser = self._make()
-            except OSError as error:  # no process to be had: the lab goes on without prices
-                log.info("nothing is appraised: %s", error)
+            except OSError as error:  # no process to be had: the lab continues without costs
+                log.info("the appraisal failed: %s", error)
                 return
-        self._asked, self.waits = self._appraiser.ask(scene), True
+        self._asked, self.waits = self._appraiser.order(Question(scene)), True
 
     def take(self) -> None:
         """Take what was answered since."""
@@ -62,8 +51,6 @@ class Prices:
                 self.errors, self.waits = answer, False
             else:
                 self.waits = False
-        if self._appraiser is not None and not self._appraiser.works:
-            self.waits = False
 
     def close(self) -> None:
         """End the process."""

@@ -1,19 +1,21 @@
-"""A device for the lab, opened beside the windows: one at a time, cancelled when another is wanted."""
+"""A device for the lab, opened in the background: one at a time, cancelled when another is wanted."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QCoreApplication, QObject, Qt, Signal
+from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
 
 if TYPE_CHECKING:
     from study_app.lab.live import Live
 
 PATIENCE_S = 20.0
+STARTS_AFTER_MS = 150  # the lab is laid out and painted first: opening a device takes Python's lock for long
 
 
 class LabOpening(QObject):
@@ -25,7 +27,7 @@ class LabOpening(QObject):
     Parameters
     ----------
     open_live : opens a device by its name, as ``lab.live.open_live`` does
-    firmware : file of a Falcon's program, where it needs one
+    options : values of devices' options, by name
     """
 
     opened = Signal(object)
@@ -33,14 +35,19 @@ class LabOpening(QObject):
     said = Signal(str)
     _done = Signal(object)
 
-    def __init__(self, open_live: Callable[..., Live] | None = None, firmware: Path | None = None) -> None:
+    def __init__(self, open_live: Callable[..., Live] | None = None, options: Mapping[str, Path] | None = None) -> None:
         super().__init__()
         self._open_live = open_live
-        self._firmware = firmware
+        self._options = options
         self._wanted: str | None = None
         self._opening: str | None = None
         self._cancelled = threading.Event()
         self._thread: threading.Thread | None = None
+        self._began_s = 0.0
+        self._start = QTimer(self)
+        self._start.setSingleShot(True)
+        self._start.setInterval(STARTS_AFTER_MS)
+        self._start.timeout.connect(self._begin)
         self._done.connect(self._end, Qt.ConnectionType.QueuedConnection)
 
     @property
@@ -48,27 +55,33 @@ class LabOpening(QObject):
         """The device that is being opened and still wanted; None where none is."""
         return self._wanted
 
+    @property
+    def lasts_s(self) -> float:
+        """How long a device has been opened so far [s]; 0 where none is."""
+        return 0.0 if self._thread is None or self._wanted is None else time.monotonic() - self._began_s
+
     def want(self, name: str) -> None:
         """Open a device; one that is being opened is given up first."""
         self.cancel()
         self._wanted = name
         if self._thread is None:
-            self._begin()
+            self._start.start()
 
     def cancel(self) -> None:
         """Want nothing any more: what is being opened is closed as soon as it is open."""
         self._wanted = None
+        self._start.stop()
         self._cancelled.set()
 
-    def wait(self) -> None:
+    def wait(self, patience_s: float = PATIENCE_S) -> None:
         """Wait for what is being opened: it must be let go of in the windows' thread, not in its own."""
         if self._thread is not None:
-            self._thread.join(PATIENCE_S)
+            self._thread.join(patience_s)
             QCoreApplication.sendPostedEvents(self)
 
     def _begin(self) -> None:
         assert self._wanted is not None  # noqa: S101 - begun only where something is wanted
-        self._opening, self._cancelled = self._wanted, threading.Event()
+        self._opening, self._cancelled, self._began_s = self._wanted, threading.Event(), time.monotonic()
         self._thread = threading.Thread(
             target=self._open, args=(self._wanted, self._cancelled), name="lab opening", daemon=True
         )
@@ -80,9 +93,9 @@ class LabOpening(QObject):
             if self._open_live is None:
                 from study_app.lab.live import open_live  # noqa: PLC0415 - the compiler: only once it is needed
 
-                self._open_live = partial(open_live, firmware=self._firmware)
-            made: object = self._open_live(name, tell=self.said.emit, cancelled=cancelled.is_set)
-        except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
+                self._open_live = partial(open_live, options=self._options)
+            made: object = self._open_live(name, progress=self.said.emit, cancelled=cancelled.is_set)
+        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
         self._done.emit((made, cancelled))
 
@@ -97,7 +110,7 @@ class LabOpening(QObject):
         if not isinstance(made, Exception):
             try:
                 made.close()  # type: ignore[attr-defined]
-            except Exception as error:  # noqa: BLE001 - told: it may push, and the next one waits for nobody
+            except Exception as error:  # noqa: BLE001 - reported: it may push, and the next one does not wait
                 self.failed.emit(error)
         if self._wanted is not None:
             self._begin()

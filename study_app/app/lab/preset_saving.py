@@ -1,4 +1,4 @@
-"""Presets written beside the windows: a disk may take its time, and a program that ends waits for it."""
+"""Presets written in the background: a disk may take its time, and a program that ends waits for it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class LabSaving(QObject):
         self._begin(partial(self._save, path, setting), (str(path),))
 
     def use(self, study: Path, setting: Setting) -> None:
-        """Name a setting's file in a study, after it was saved beside the study where it has no file yet."""
+        """Name a setting's file in a study, after it was saved in the study's folder where it has no file yet."""
         self._begin(partial(self._use, study, setting), ())
 
     def open(self, path: Path) -> Choice:
@@ -59,10 +59,10 @@ class LabSaving(QObject):
         self.said = f"Opened {path.name}: {', '.join(spoken(it.liquid) for it in found)}"
         return found[0]
 
-    def wait(self) -> None:
+    def wait(self, patience_s: float = PATIENCE_S) -> None:
         """Wait until everything is on the disk, and tell of it."""
         if self._before is not None:
-            self._before.join(PATIENCE_S)
+            self._before.join(patience_s)
             QCoreApplication.sendPostedEvents(self)
 
     def _begin(self, write: Callable[[], str], more: tuple[str, ...]) -> None:
@@ -78,7 +78,7 @@ class LabSaving(QObject):
             before.join()
         try:
             found: object = write(), liquids_at_hand(saved=at_hand)
-        except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
+        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             found = error
         self._done.emit(found)
 

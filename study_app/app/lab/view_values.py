@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from study_app.app.lab_rows import cost_rows, device_choices, error_rows, title_of
+from study_app.app.lab_rows import cost_rows, device_choices, error_rows
+from study_app.devices.registry import descriptor_of, title_of
 from study_app.lab.programmed_paths import TITLES
 from study_app.viewmodels.lab import DeviceShown, LabView, Now
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 def lab_view(
     bench: Workbench,
     live: Live | None,
-    price: Prices,
+    appraisal: Prices,
     *,
     liquids: tuple[Choice, ...],
     device: str,
@@ -33,7 +34,7 @@ def lab_view(
 
     Parameters
     ----------
-    bench, live, price : both settings, the open device with its servo (None without one), and the appraisal's answers
+    bench, live, appraisal : both settings, the open device with its servo (None without one), and costs and errors
     liquids : the liquids that a side can be set to
     device : name of the selected device
     opening, progress : name of the device that is being opened (None without one), and its last message
@@ -58,7 +59,9 @@ def lab_view(
     return LabView(
         workbench=bench,
         liquids=liquids,
-        device=DeviceShown(device_choices(), device, state, live is not None and not fault),
+        device=DeviceShown(
+            device_choices(), device, state, live is not None and not fault, descriptor_of(device).pointer
+        ),
         paths=tuple(TITLES.items()),
         path=None if live is None else live.path,
         trace=None if live is None else live.trace(),
@@ -66,10 +69,10 @@ def lab_view(
         tail_b=None if live is None else live.tail("B"),
         now=None if reading is None else Now(reading.position_m, reading.force_n, reading.wake_mps),
         limiters=() if live is None else live.limiters(),
-        cost=() if price.costs is None else cost_rows(price.costs),
-        tick_ns=None if price.costs is None else price.costs.tick_ns,
-        errors=() if price.errors is None else error_rows(price.errors),
-        measuring=price.waits or price_due,
+        cost=() if appraisal.costs is None else cost_rows(appraisal.costs),
+        tick_ns=None if appraisal.costs is None else appraisal.costs.tick_ns,
+        errors=() if appraisal.errors is None else error_rows(appraisal.errors),
+        measuring=appraisal.waits or price_due,
         force_on=reading is not None and reading.force_on,
         busy="" if opening is None else progress or f"Opening {title_of(opening)}",
         trouble=trouble or fault,

@@ -46,7 +46,7 @@ class Camera:
         deadline = time.monotonic() + PATIENCE_S
         while not (it := found()):
             if time.monotonic() > deadline:
-                raise StudyError(f"no picture could be taken: waited {PATIENCE_S:g} s in vain for {what}")
+                raise StudyError(f"no picture could be taken: {what} did not appear within {PATIENCE_S:g} s")
             self._turn()
         return it
 

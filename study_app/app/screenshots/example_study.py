@@ -9,7 +9,7 @@ from typing import Final
 from study_app.protocol.load import load, source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded import blinding
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 
 STUDY: Final = "rek2024"
 PARTICIPANTS: Final = 12
@@ -26,14 +26,16 @@ def rehearsed(folder: Path) -> Path:
         results / f"{STUDY}-pilot",
         load(STUDY),
         source_bytes(STUDY),
-        "pilot1",
-        seed=SEED,
-        operator="AK",
-        language="en",
-        device={"name": "mouse"},
-        screens={},
-        simulated=False,
-        pilot=True,
+        SessionStart(
+            "pilot1",
+            seed=SEED,
+            operator="AK",
+            language="en",
+            device={"name": "mouse"},
+            screens={},
+            simulated=False,
+            pilot=True,
+        ),
     ) as store:
         store.append("page_shown", page="consent")
         store.close()

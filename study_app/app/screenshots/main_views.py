@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QDialog
 from study_app.app.main_controller import MainController
 from study_app.app.screenshots.capture import Camera, shown
 from study_app.app.screenshots.example_study import STUDY
+from study_app.devices.registry import discover
 from study_app.gui.settings.display_test import DisplayTest
 from study_app.gui.theme.theme import Theme
 from study_app.viewmodels.home import StudyFacts, study_facts
@@ -68,11 +69,10 @@ def _take_results(camera: Camera, visit: MainController, theme: Theme) -> None:
 def _take_lab(camera: Camera, visit: MainController, theme: Theme) -> None:
     visit.window.resize(*WIDE)
     visit.window.go("lab")
-    assert visit.lab is not None  # noqa: S101 - one has gone there
-    lab = visit.lab
+    lab: Any = camera.until(lambda: visit.lab, "the lab")
     camera.until(lambda: lab.live, "the lab's device")
     lab.place.path_chosen.emit(PATH)
-    camera.until(lambda: lab.place.view is not None and not lab.place.view.measuring, "the lab's prices")
+    camera.until(lambda: not lab.view().measuring, "the lab's costs")
     camera.wait(FELT_MS)
     camera.take(visit.window, f"lab-{theme.name}", WIDE)
 
@@ -81,7 +81,7 @@ def _take_devices(camera: Camera, visit: MainController, theme: Theme) -> None:
     visit.window.go("devices")
     camera.take(visit.window, f"devices-{theme.name}", HOME)
     over: list[bool] = []
-    visit.devices.diagnose("falcon-emulated")
+    visit.devices.diagnose(next(it.name for it in discover().devices if it.doctor is not None and it.moves_by_itself))
     dialog = visit.devices.dialog
     assert dialog is not None  # noqa: S101 - it was just opened
     dialog.over.connect(over.append)

@@ -17,7 +17,7 @@ from study_app.app.session.live_session import LiveSession
 from study_app.gui.preflight import PreflightWindow
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import wear
-from study_app.protocol.model import Explore
+from study_app.protocol.model import Reach
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.request import NewSession
 
@@ -30,13 +30,13 @@ ANSWERS: Final = (6, 5, 6, None, 3, 7, 2, None, 1)
 
 def take_session(camera: Camera, protocol: Path, results: Path) -> None:
     """Take the pre-flight, every kind of page, and the cockpit of a double-blind study."""
-    with _Session(camera, protocol, results) as held:
+    with PicturedSession(camera, protocol, results) as held:
         held.hold()
 
 
 def take_single_blind(camera: Camera, protocol: Path, results: Path) -> None:
     """Take the cockpit of a study whose operator sees the force."""
-    with _Session(camera, protocol, results) as held:
+    with PicturedSession(camera, protocol, results) as held:
         held.begin(pictures=False)
         held.to_the_liquids()
         camera.wait(TRACED_MS)
@@ -44,7 +44,7 @@ def take_single_blind(camera: Camera, protocol: Path, results: Path) -> None:
         held.end()
 
 
-class _Session:
+class PicturedSession:
     """One session, gone through page by page; whatever ends it, device and servo are let go of."""
 
     def __init__(self, camera: Camera, protocol: Path, results: Path) -> None:
@@ -186,4 +186,4 @@ def _part(page: Page) -> int | None:
     """Return the part a task belongs to; practice and baseline belong to none."""
     if not isinstance(page, TaskPage) or page.progress is None:
         return None
-    return page.progress.part if isinstance(page.task, Explore) or page.task.count is not None else None
+    return None if isinstance(page.task, Reach) and page.task.count is None else page.progress.part

@@ -21,7 +21,7 @@ from study_app.app.session.frame_budget import FrameBudget
 from study_app.app.session.garbage_collection import freeze_garbage, unfreeze_garbage
 from study_app.app.session.operator_monitor import OperatorMonitor
 from study_app.app.session.operator_requests import OperatorRequests
-from study_app.app.session.parts import Hand, Parts
+from study_app.app.session.parts import Parts
 from study_app.app.session.reconnection import Reconnection
 from study_app.app.session.thread_priority import ThreadPriority
 from study_app.errors import DeviceError, ServoFault, StudyError
@@ -32,15 +32,8 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
-from study_app.session.transitions.events import (
-    Begin,
-    Continue,
-    Event,
-    ForceStopped,
-    PauseAsked,
-    Reconnected,
-    broken,
-)
+from study_app.session.simulated.observers import Hand
+from study_app.session.transitions.events import Begin, Continue, Event, ForceStopped, PauseAsked, Reconnected, broken
 from study_app.store.program_log import DEVICE_FAILED
 from study_app.viewmodels.operator import OperatorView
 
@@ -93,7 +86,9 @@ class SessionBridge(QObject):
         if parts.recorder is not None:
             ports = replace(ports, settled=parts.recorder.settled)
         self._leaves = False
-        self.runner = Runner(parts.session.protocol, parts.schedule, parts.key, ports, parts.language, parts.start)
+        self.runner = Runner(
+            parts.session.protocol, parts.session.schedule, parts.key, ports, parts.language, parts.start, parts.secret
+        )
         self.requests = OperatorRequests(
             parts, self.runner, participant, operator, strip=strip, fail=self.fail, parent=self
         )
@@ -105,10 +100,12 @@ class SessionBridge(QObject):
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
         self._thread_exceptions = ThreadExceptions(self)
         self._thread_exceptions.ended.connect(self._tell_of_thread)
-        self._frames = Frames(refresh_hz, parent=self)
-        self._frames.due.connect(self._frame)
+        self.frames = Frames(refresh_hz, parent=self)
+        self.frames.due.connect(self.draw_frame)
         self._urgency = ThreadPriority()
-        self._slack = FrameBudget(((self._tiles, TILES_S), (self._traces, TRACES_S), (self._forces, TRACES_S)))
+        self.budget = FrameBudget(
+            ((self.show_tiles, TILES_S), (self.show_traces, TRACES_S), (self.show_forces, TRACES_S))
+        )
         self.runner.on_change(lambda _state: self._changed())
         self._connect()
 
@@ -129,7 +126,7 @@ class SessionBridge(QObject):
             operator.header.page.show()
             operator.page_asked.connect(participant.come_forward)
         participant.painted.connect(self._painted)
-        participant.swapped.connect(self._frames.swapped)
+        participant.swapped.connect(self.frames.swapped)
         if self.parts.point_to is not None:
             participant.pointer.connect(self._point)
             participant.buttons.connect(self._press)
@@ -137,7 +134,7 @@ class SessionBridge(QObject):
     @property
     def paced(self) -> str:
         """What the participant's frames follow now, in words."""
-        return self._frames.paced
+        return self.frames.paced
 
     def present(self, page: Page) -> None:
         """Put a page before the participant; the runner's port."""
@@ -152,13 +149,13 @@ class SessionBridge(QObject):
         self._thread_exceptions.install()
         freeze_garbage()
         self._urgency.hurry()
-        self._frames.start()
+        self.frames.start()
         self._begin()
 
     @guarded_session_slot
     def _begin(self) -> None:
         self._post(Begin(self._now()))
-        self._tiles()
+        self.show_tiles()
 
     def leave_now(self) -> None:
         """Zero force and no windows, without a question: the session stays unfinished and can be resumed."""
@@ -185,14 +182,14 @@ class SessionBridge(QObject):
         if not first:
             return
         self.trouble, self.failure = what, error
-        log.error("the session broke: %s", error if isinstance(error, StudyError) else what, exc_info=_trace_of(error))
+        log.error("the session failed: %s", error if isinstance(error, StudyError) else what, exc_info=_trace_of(error))
         traceback.clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
         try:
             if not self.runner.finished:
                 self.runner.post(broken(self._now(), error))
             self._show()
         except Exception as second:  # noqa: BLE001 - the force is off; the first failure is the one that counts
-            log.error("and could not be written down: %s", second)  # noqa: TRY400 - one line, the first has the trace
+            log.error("and could not be recorded: %s", second)  # noqa: TRY400 - one line, the first has the trace
 
     def _handle_uncaught(self, error: BaseException) -> bool:
         """Handle an exception that no slot caught; return whether it was only a panel's, which is switched off."""
@@ -204,13 +201,13 @@ class SessionBridge(QObject):
     @guarded_session_slot
     def _panel_failed(self, name: str, error: Exception) -> None:
         """Log it and note it; the panel itself says so to the operator."""
-        log.error("the panel %r failed and is switched off: %s", name, error, exc_info=error)
+        log.error("the panel %r failed and was disabled: %s", name, error, exc_info=error)
         self.requests.record_note(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
 
     @guarded_session_slot
     def _tell_of_thread(self, what: str) -> None:
         """Tell the operator, and note it: what that thread did is missing from here on."""
-        self.operator.tell("A part of the program ended", f"{what}. What was answered is kept.")
+        self.operator.tell("A part of the program ended", f"{what}. All answers are kept.")
         self.requests.record_note(f"a thread of the program ended: {what}")
 
     def _now(self) -> float:
@@ -219,10 +216,10 @@ class SessionBridge(QObject):
     def _post(self, event: Event) -> None:
         self.runner.post(event)
 
-    def _frame(self) -> None:
+    def draw_frame(self) -> None:
         """Draw the tank, and with what time is left until the next frame the rest."""
         self._draw()
-        self._slack.use(self._frames.next_ns)
+        self.budget.use(self.frames.next_ns)
 
     @guarded_session_slot
     def _draw(self) -> None:
@@ -244,15 +241,18 @@ class SessionBridge(QObject):
         self.lookout.health.frame(painted_ns)
 
     @guarded_session_slot
-    def _traces(self) -> None:
+    def show_traces(self) -> None:
+        """Draw the newest traces of the hand."""
         self.lookout.show_traces(self.operator)
 
     @guarded_session_slot
-    def _forces(self) -> None:
+    def show_forces(self) -> None:
+        """Draw the newest forces, where the operator may see them."""
         self.lookout.show_forces(self.operator)
 
     @guarded_session_slot
-    def _tiles(self) -> None:
+    def show_tiles(self) -> None:
+        """Show the servo's lateness and the state of the session."""
         self.lookout.show_lateness(self.operator)
         self._show()
 
@@ -260,7 +260,7 @@ class SessionBridge(QObject):
         """Show the news; at the end bring the operator's window back, should the participant's cover it."""
         if (stalled := self.runner.stalled) != self._stalled:
             self._stalled = stalled
-            log.warning("the disk takes data again" if stalled is None else f"the session waits: {stalled}")
+            log.warning("the disk accepts data again" if stalled is None else f"the session waits: {stalled}")
         lost, before = self.runner.state.lost_device, self._lost
         self._lost = lost
         if lost and not before:
@@ -305,7 +305,7 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def _reconnect(self) -> None:
-        """Connect the device again, beside the windows; the force stays off until the operator resumes."""
+        """Connect the device again, in the background; the force stays off until the operator resumes."""
         if self.reconnection is not None and self.runner.state.lost_device:
             self.reconnection.begin()
             self._show()
@@ -320,12 +320,12 @@ class SessionBridge(QObject):
     def _reconnected(self, described: dict[str, Any]) -> None:
         if isinstance(self.failure, DeviceError | ServoFault):
             self.trouble, self.failure = "", None
-        log.info("the device was connected again")
+        log.info("the device was reconnected")
         self._post(Reconnected(self._now(), described))
 
     @guarded_session_slot
     def _not_reconnected(self, error: Exception) -> None:
-        log.warning("the device was not connected again: %s", error, exc_info=_trace_of(error))
+        log.warning("the device was not reconnected: %s", error, exc_info=_trace_of(error))
         self._show()
 
     @guarded_session_slot
@@ -360,7 +360,7 @@ class SessionBridge(QObject):
         if self._gone:
             return
         self._gone = True
-        self._frames.stop()
+        self.frames.stop()
         self._urgency.rest()
         unfreeze_garbage()
         self.uncaught.remove()
@@ -377,5 +377,5 @@ class SessionBridge(QObject):
 
 
 def _trace_of(error: BaseException) -> BaseException | None:
-    """Return what the log says of an error beside its sentence: nothing of one that the user can understand."""
+    """Return what the log says of an error besides its sentence: nothing of one that the user can understand."""
     return None if isinstance(error, StudyError) else error

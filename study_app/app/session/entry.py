@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from study_app.app.session.live_session import run_session
+from study_app.devices.names import DEFAULT_DEVICE
 from study_app.errors import StoreError
 from study_app.protocol.load import load
 from study_app.session.request import NewSession, draw_seed, resumed, study_results
@@ -25,8 +26,8 @@ def run(
     participant: str,
     session: int = 1,
     seed: int | None = None,
-    device: str = "mouse",
-    firmware: Path | None = None,
+    device: str = DEFAULT_DEVICE,
+    device_options: Mapping[str, str | Path] | None = None,
     language: str | None = None,
     operator: str = "",
     windowed: bool = False,
@@ -44,11 +45,11 @@ def run(
     participant, session, operator : who, for the how-manieth time, and who runs it
     seed : default: drawn, shown and recorded
     device, language : default: the mouse, the protocol's first language
-    firmware : file of a Falcon's program, where it needs one
+    device_options : values of the device's options, by name
     windowed, screen : where the participant's window opens; screens count from 1
     results : the study's folder; default ``results/<study>`` of the workspace, of a pilot ``results/<study>-pilot``
     pilot : to try it out: in a window with a frame, apart from the data and marked
-    recordings : whether every turn of the servo and every frame of a trial is kept
+    recordings : whether every tick of the servo and every frame of a trial is kept
     tell : is given the lines of the pre-flight, before the first page
 
     Raises
@@ -74,7 +75,7 @@ def run(
         ),
         pilot=pilot,
         recordings=recordings,
-        firmware=firmware,
+        device_options=device_options or {},
     )
     check(chosen, study)
     if Path(protocol).is_file():
@@ -88,7 +89,7 @@ def resume(
     *,
     protocol: str | None = None,
     device: str | None = None,
-    firmware: Path | None = None,
+    device_options: Mapping[str, str | Path] | None = None,
     operator: str = "",
     windowed: bool = False,
     screen: int | None = None,
@@ -102,7 +103,7 @@ def resume(
     ----------
     protocol : file or name of its protocol; default: looked for among those at hand
     device : default: the one it began with
-    firmware, operator, windowed, screen, tell : as for ``run``
+    device_options, operator, windowed, screen, tell : as for ``run``
 
     Raises
     ------
@@ -124,7 +125,7 @@ def resume(
         device=device,
         windowed=windowed,
         screen=screen,
-        firmware=firmware,
+        device_options=device_options,
     )
     check(chosen, chosen.read_protocol())
     return run_session(chosen, tell)

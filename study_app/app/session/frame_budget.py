@@ -44,13 +44,13 @@ class FrameBudget:
     def __init__(
         self, works: Sequence[tuple[Callable[[], object], float]], now_ns: Callable[[], int] = time.perf_counter_ns
     ) -> None:
-        self._works = [DeferredTask(do, round(period_s * 1e9)) for do, period_s in works]
+        self.tasks = [DeferredTask(do, round(period_s * 1e9)) for do, period_s in works]
         self._now_ns = now_ns
 
     def use(self, until_ns: int) -> None:
         """Do what is due and will be done by ``until_ns``; of what has waited too long for that, one thing."""
         hurried = False
-        for work in self._works:
+        for work in self.tasks:
             now_ns = self._now_ns()
             waited_ns = work.waits_ns(now_ns)
             if waited_ns < 0:

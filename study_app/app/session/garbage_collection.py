@@ -54,4 +54,5 @@ def collecting_here() -> Iterator[None]:
     finally:
         timer.stop()
         if before:
+            gc.collect()
             gc.enable()

@@ -21,10 +21,10 @@ from PySide6.QtWidgets import QApplication
 from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices import diagnosis
 from study_app.app.session.garbage_collection import collecting_here
-from study_app.app.session.termination import ended_from_outside
+from study_app.app.session.termination import BY_SIGNAL_S, ended_from_outside
 from study_app.app.workstation import described, screen_number, settings_here, text_scale_on
-from study_app.devices.registry import is_falcon, kind_of
-from study_app.devices.rig import Rig, open_rig
+from study_app.devices.registry import descriptor_of
+from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import choose_screens, place
@@ -33,10 +33,13 @@ from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.wording.without_force import without_force
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.request import NewSession
 from study_app.session.resume import FIRST, resume_at
-from study_app.session.start import Ready, measured, open_store
+from study_app.session.start import Ready, check, measured, open_store
+from study_app.store.blinded.allocation import session_protocol
+from study_app.store.folders import StudyFolder
 
 if TYPE_CHECKING:
     from study_app.app.session.bridge import SessionBridge
@@ -47,8 +50,8 @@ CANCELLED = 130
 BUG = 1
 OPENING_PATIENCE_S = 20.0
 NOT_EXAMINED = (
-    "There is nothing to examine",
-    "Only a Falcon has a driver, firmware and motors to look over.",
+    "There is nothing to diagnose",
+    "This device has no diagnosis.",
 )
 
 
@@ -61,14 +64,16 @@ def run_session(chosen: NewSession, tell: Callable[[str], object] | None) -> int
     with collecting_here(), ended_from_outside(live.end_by_signal):
         QTimer.singleShot(0, live.open)
         loop.exec()
-        live.wait()
+        live.wait(live.patience_s)
     if live.error is not None:
         raise live.error
     return live.code
 
 
 def load_windows() -> None:
-    """Load what a session's windows are made of, beside the note: it takes a third of a second, and makes no object."""
+    """Load the modules of a session's windows while the note is shown: a third of a second; no object is made."""
+    import study_app.app.session.preflight_controller  # noqa: PLC0415
+    import study_app.app.session.windows  # noqa: F401, PLC0415
 
 
 class LiveSession(QObject):
@@ -96,25 +101,26 @@ class LiveSession(QObject):
         self.error: StudyError | None = None
         self.bridge: SessionBridge | None = None
         self.note: OpeningWindow | None = None
-        self._machine: Rig | None = None
+        self.machine: Rig | None = None
         self._store: SessionStore | None = None
         self._crash_trace: CrashTrace | None = None
         self._closed = False
         self._ending = threading.Event()
         self._working = False
+        self.patience_s = OPENING_PATIENCE_S
         self._opening: threading.Thread | None = None
         self._ready.connect(self._begin, Qt.ConnectionType.QueuedConnection)
         self._said.connect(self._say, Qt.ConnectionType.QueuedConnection)
 
     def open(self) -> None:
-        """Show the note, and make device and servo ready beside it; a mistake ends in order, with ``over``."""
+        """Show the note, and make device and servo ready; a mistake ends in order, with ``over``."""
         self._go_on(self._open)
 
     def _open(self) -> None:
         if self._unread and self._tell is not None:
             self._tell(self._unread)
         self.note = OpeningWindow(f"Preparing {Path(self.chosen.source).stem}", self.chosen.who, theme=self.theme)
-        self.note.cancelled.connect(self._cancel)
+        self.note.cancelled.connect(self.cancel)
         place(self.note, self.note.screen(), corner=False)
         self.note.show()
         self._working = True
@@ -131,15 +137,15 @@ class LiveSession(QObject):
         """Whether device and servo are being made ready, even for a session that was called off meanwhile."""
         return self._opening is not None and self._opening.is_alive()
 
-    def wait(self) -> None:
+    def wait(self, patience_s: float = OPENING_PATIENCE_S) -> None:
         """Wait for what is being made ready: it must be let go of here, not in the thread that makes it."""
         if self._opening is not None:
-            self._opening.join(OPENING_PATIENCE_S)
+            self._opening.join(patience_s)
             QApplication.processEvents()
 
     def end_by_signal(self, number: int) -> None:
         """Leave the session, which stays unfinished, because the program is being ended from outside."""
-        self.code = 128 + number
+        self.code, self.patience_s = 128 + number, BY_SIGNAL_S
         if self._closed:
             return
         if self.bridge is not None:
@@ -153,16 +159,11 @@ class LiveSession(QObject):
         try:
             load_windows()
             study = self.chosen.read_protocol()
-            machine = open_rig(
-                self.chosen.device,
-                study,
-                random=self.chosen.tremor(),
-                firmware=self.chosen.firmware,
-                tell=self._said.emit,
-                cancelled=lambda: self._closed,
-            )
+            check(self.chosen, study)
+            settings = study_settings(study, self.chosen.tremor(), self.chosen.device_options)
+            machine = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
             made: object = Ready(machine, measured(machine, self.chosen, sleep=self._ending.wait))
-        except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
+        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
             if machine is not None:
                 with suppress(StudyError):  # what came first says why
@@ -173,7 +174,7 @@ class LiveSession(QObject):
         """Ask the operator, or claim the session on the disk and open the two windows at once."""
         self._working = False
         if isinstance(made, Ready):
-            self._machine = made.machine
+            self.machine = made.machine
         if self._closed:
             self._let_go()
             self.deleteLater()
@@ -182,7 +183,7 @@ class LiveSession(QObject):
             ready = made
             self._go_on(lambda: self._ask(ready))
         else:
-            self._go_on(lambda: self._open_windows(made))
+            self._go_on(lambda: self.open_windows(made))
 
     def _go_on(self, step: Callable[[], None]) -> None:
         """Take a step toward the first page; whatever it meets ends in order."""
@@ -191,27 +192,25 @@ class LiveSession(QObject):
         except StudyError as error:
             self.error = error
             self._close()
-        except Exception:  # noqa: BLE001 - told to the terminal; what is open must be closed in order
+        except Exception:  # noqa: BLE001 - printed; what is open must be closed in order
             traceback.print_exc()
             self.code = BUG
             self._close()
 
     def _ask(self, made: Ready) -> None:
         """Show the operator what was found; the session begins when that is accepted."""
-        from study_app.app.session.preflight_controller import (  # noqa: PLC0415 - pyqtgraph: only once it is needed
-            Preflight,
-        )
+        from study_app.app.session.preflight_controller import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
-        shown_on, _ = self._screens()
+        shown_on, _ = self.screens()
         asked = Preflight(self.chosen, self.chosen.read_protocol(), made, shown_on, self.chosen.who, self.theme)
-        asked.started.connect(lambda ready: self._go_on(lambda: self._open_windows(ready)))
-        asked.failed.connect(lambda error: self._go_on(lambda: self._open_windows(error)))
-        asked.cancelled.connect(self._cancel)
+        asked.started.connect(lambda ready: self._go_on(lambda: self.open_windows(ready)))
+        asked.failed.connect(lambda error: self._go_on(lambda: self.open_windows(error)))
+        asked.cancelled.connect(self.cancel)
         self.preflight = asked
         self._close_note()
         asked.open()
 
-    def _open_windows(self, made: object) -> None:
+    def open_windows(self, made: object) -> None:
         """Go on with what the thread made ready, or raise what it met."""
         if not isinstance(made, Ready):
             raise made if isinstance(made, Exception) else TypeError(made)
@@ -220,15 +219,18 @@ class LiveSession(QObject):
         chosen, machine = self.chosen, made.machine
         source = chosen.read_source()
         protocol = parse(source, chosen.source)
-        schedule = build_schedule(protocol, chosen.participant, chosen.seed)
-        shown_on, operated_on = self._screens()
+        shown_on, operated_on = self.screens()
         found = checks(made.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()), protocol)
         self._pass_checks(found)
         screens = described(self.settings, shown_on, operated_on)
-        self._store = open_store(chosen, protocol, source, machine, screens)
+        self._store = open_store(chosen, protocol, source, machine, screens, made.masking)
         self._crash_trace = CrashTrace(self._store.folder.crash)
-        self._store.append("preflight", checks=[check.entry for check in found])
-        start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines)
+        self._store.append("preflight", checks=[one.entry for one in found])
+        protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
+        schedule = build_schedule(protocol, chosen.participant, chosen.seed)
+        start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines, self._store.key)
+        if descriptor_of(chosen.device).kind == "seen":
+            protocol = without_force(protocol)
         text_scale = text_scale_on(self.settings, shown_on)
         self.bridge = open_windows(
             chosen,
@@ -242,26 +244,27 @@ class LiveSession(QObject):
             photodiode=self.settings.photodiode,
         )
         self.bridge.done.connect(self._finished)
-        self.bridge.diagnose_asked.connect(self._diagnose)
+        self.bridge.diagnose_asked.connect(self.diagnose)
         self._close_note()
         self._close_preflight()
         self.bridge.start()
 
-    def _screens(self) -> tuple[QScreen, QScreen]:
+    def screens(self) -> tuple[QScreen, QScreen]:
         """Return the participant's and the operator's screen: as chosen, or as set for this machine."""
         chosen = self.chosen.screen
         return choose_screens(chosen if chosen is not None else screen_number(self.settings))
 
-    def _diagnose(self) -> None:
+    def diagnose(self) -> None:
         """Open the diagnosis of what is felt with over the operator's window; the bridge has stopped the force."""
         assert self.bridge is not None  # noqa: S101 - it has just asked
         name = self.chosen.device
-        if not is_falcon(name):
+        device = descriptor_of(name)
+        if device.doctor is None:
             notice = Notice(self.bridge.operator, self.bridge.operator.theme, *NOT_EXAMINED)
             notice.finished.connect(notice.deleteLater)
             notice.show()
             return
-        held = kind_of(name) == "falcon"
+        held = not device.simulated
         diagnosis(self.bridge.operator, self.bridge.operator.theme, name, self.settings, held=held).show()
 
     def _say(self, line: str) -> None:
@@ -277,29 +280,30 @@ class LiveSession(QObject):
 
     def _pass_checks(self, found: tuple[Check, ...]) -> None:
         """Tell what the pre-flight found; refuse the session if it must not begin."""
-        for check in found:
+        for one in found:
             if self._tell is not None:
-                self._tell(str(check))
+                self._tell(str(one))
         if reason := refused(found):
-            raise SessionError(f"the session was not begun: {reason}")
+            raise SessionError(f"the session did not start: {reason}")
 
     def _finished(self) -> None:
         """Hear that the windows are gone; keep what broke, for whoever asked for the session."""
         assert self.bridge is not None  # noqa: S101 - it has just spoken
         self.theme = self.bridge.operator.theme
         if self._tell is not None and (proof := self.bridge.parts.journal.fingerprint):
-            self._tell(f"fingerprint of the session, also in fingerprints.txt of the study: {proof}")
+            self._tell(f"fingerprint of the session, also in the study's fingerprints.txt: {proof}")
         if self._tell is not None and self._store is not None:
             status, folder = self.bridge.parts.journal.progress.ended, self._store.folder.path
             self._tell(f"session {status}: {folder}" if status else f"session not finished: {folder}")
         trouble = self.bridge.trouble or self.bridge.runner.stalled or self.bridge.parts.journal.progress.broke
         if trouble and isinstance(self.bridge.failure, StudyError | None):
-            self.error = StudyError(f"the session was stopped: {trouble}; what was answered before is on the disk")
+            self.error = StudyError(f"the session was stopped: {trouble}; all answers so far are on disk")
         elif trouble:
             self.code = BUG
         self._close()
 
-    def _cancel(self) -> None:
+    def cancel(self) -> None:
+        """Go back before the session has begun."""
         self.code = CANCELLED
         self._close()
 
@@ -315,7 +319,7 @@ class LiveSession(QObject):
             self._let_go()
         except StudyError as error:
             self.error = self.error or error  # what came first says why
-        except Exception:  # noqa: BLE001 - told to the terminal; whoever waits for the end must hear of it
+        except Exception:  # noqa: BLE001 - printed; whoever waits for the end must be notified
             traceback.print_exc()
             self.code = BUG
         self.over.emit()
@@ -334,9 +338,10 @@ class LiveSession(QObject):
             asked.close()
 
     def _let_go(self) -> None:
-        if self.bridge is not None and self.bridge.reconnection is not None:
-            self.bridge.reconnection.wait()  # it gives up now that this is closed
-        machine, self._machine = self._machine, None
+        machine, self.machine = self.machine, None
+        reconnection = self.bridge.reconnection if self.bridge is not None else None
+        if reconnection is not None and not reconnection.wait(self.patience_s):  # it gives up now that this is closed
+            machine = None  # its thread has it, at zero force, until the program ends
         store, self._store = self._store, None
         crash_trace, self._crash_trace = self._crash_trace, None
         try:

@@ -97,16 +97,16 @@ class OperatorRequests(QObject):
 
     @guarded_session_slot
     def _exclude(self, trial: object, reason: str) -> None:
-        """Exclude a trial or the session; if that fails, the session goes on and the operator is told."""
+        """Exclude a trial or the session; if that fails, the session continues, and a message appears."""
         if self._parts.exclude is None:
             return
         try:
             self._parts.exclude(trial if isinstance(trial, int) else None, reason)
         except StudyError as error:
-            self._operator.tell("It was not left out", f"{error}.")
+            self._operator.tell("It was not excluded", f"{error}.")
         else:
             what = f"trial {trial}" if isinstance(trial, int) else "the session"
-            self.record_note(f"left out of the analysis: {what}: {reason}")
+            self.record_note(f"excluded from the analysis: {what}: {reason}")
 
     @guarded_session_slot
     def _end(self, status: str, reason: str) -> None:

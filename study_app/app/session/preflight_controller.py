@@ -11,9 +11,10 @@ from typing import NamedTuple
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QScreen
 
+from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
 from study_app.evaluation.appraisal import Costs, Errors
-from study_app.evaluation.appraisal_worker import Appraiser
+from study_app.evaluation.appraisal_worker import Question, start_appraisal_worker
 from study_app.gui.display.screens import place
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.theme.theme import Theme
@@ -21,11 +22,12 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.trials.task import Stroke, fastest_stroke
+from study_app.protocol.trials.tasks.stroke import Stroke
 from study_app.session.preflight import Facts, checks
 from study_app.session.request import NewSession
 from study_app.session.start import Ready, measured
-from study_app.store.folders import locate
+from study_app.store.blinded.allocation import session_protocol
+from study_app.store.folders import StudyFolder, locate
 from study_app.store.journals import journal
 from study_app.viewmodels.preflight import preflight_view, resumed_rows
 
@@ -42,7 +44,7 @@ class Asked(NamedTuple):
 
 
 class Appraisal:
-    """What the dearest scene of a study costs, and how far the least true is off; asked one scene after another.
+    """Cost of the most expensive scene of a study, and error of the least accurate; asked one scene after another.
 
     ``withheld`` is the share of each liquid's force that is withheld in the fastest stroke on a device of these
     ``dynamics``, once all are known.
@@ -52,7 +54,7 @@ class Appraisal:
         self._waiting = list(scenes)
         self.dynamics = dynamics
         self._asked = 0
-        self._appraiser = Appraiser()
+        self.appraiser = start_appraisal_worker()
         self.tick_s: float | None = None
         self.error_n: float | None = None
         self.withheld: dict[str, float] | None = None
@@ -63,22 +65,22 @@ class Appraisal:
     @property
     def over(self) -> bool:
         """Whether there is nothing to wait for any more."""
-        return not self._waiting or not self._appraiser.works
+        return not self._waiting or not self.appraiser.works
 
     def look(self) -> bool:
         """Take the answers there are; return whether there is news."""
         news = False
-        for number, told in self._appraiser.answers():
+        for number, answer in self.appraiser.answers():
             if number != self._asked or not self._waiting:
                 continue
-            if isinstance(told, Costs):
-                self.tick_s = max(self.tick_s or 0.0, told.tick_ns * 1e-9)
+            if isinstance(answer, Costs):
+                self.tick_s = max(self.tick_s or 0.0, answer.tick_ns * 1e-9)
                 news = True
                 continue
-            self._errors_n.append(told.force_n if isinstance(told, Errors) else None)
+            self._errors_n.append(answer.force_n if isinstance(answer, Errors) else None)
             liquid = self._waiting.pop(0).liquid
-            if isinstance(told, Errors) and told.withheld is not None:
-                self._shares[liquid] = max(told.withheld, self._shares.get(liquid, 0.0))
+            if isinstance(answer, Errors) and answer.withheld is not None:
+                self._shares[liquid] = max(answer.withheld, self._shares.get(liquid, 0.0))
             self._ask()
             if not self._waiting:
                 self.error_n, self.withheld, news = _largest(self._errors_n), self._shares, True
@@ -87,17 +89,17 @@ class Appraisal:
     def _ask(self) -> None:
         if self._waiting:
             _, scene, stroke = self._waiting[0]
-            self._asked = self._appraiser.ask(scene, stroke, self.dynamics)
+            self._asked = self.appraiser.order(Question(scene, stroke, self.dynamics))
 
     def close(self) -> None:
         """Let go of who was asked."""
-        self._appraiser.close()
+        self.appraiser.close()
 
 
 class Preflight(QObject):
     """Shows the window before a session, has things measured again, and tells what was decided, once.
 
-    The machine stays somebody else's; the servo turns at rest meanwhile, and ``failed`` comes when it stops itself.
+    The machine stays somebody else's; the servo ticks at rest meanwhile, and ``failed`` comes when it stops itself.
     """
 
     started = Signal(object)
@@ -112,13 +114,15 @@ class Preflight(QObject):
         self._chosen, self._protocol, self._ready, self._screen = chosen, protocol, ready, screen
         self._who = who
         self._goes_on = _goes_on(chosen, protocol)
-        self._measuring: threading.Thread | None = None
+        self.measuring: threading.Thread | None = None
         self._ending = threading.Event()
-        self._appraisal = Appraisal(_scenes(protocol), _dynamics(ready.facts, protocol))
-        self.window = PreflightWindow(protocol.limits.lateness_ms * 1e3, theme=theme)
+        self.appraisal = Appraisal(study_scenes(protocol), _dynamics(ready.facts, protocol))
+        self.window = PreflightWindow(
+            protocol.limits.lateness_ms * 1e3, asks_masking=descriptor_of(chosen.device).kind == "felt", theme=theme
+        )
         self.window.start_asked.connect(self._start)
         self.window.again_asked.connect(self._again)
-        self.window.cancelled.connect(self._cancel)
+        self.window.cancelled.connect(self.cancelled)
         self._measured.connect(self._take)
         self._appraised = False
         self._timer = QTimer(self)
@@ -135,16 +139,16 @@ class Preflight(QObject):
         """Let go of window and processes; what is being measured uses the servo, and is seen off at once."""
         self._timer.stop()
         self._ending.set()
-        self._appraisal.close()
-        if self._measuring is not None:
-            self._measuring.join(PATIENCE_S)
+        self.appraisal.close()
+        if self.measuring is not None:
+            self.measuring.join(PATIENCE_S)
         self.window.finish()
         self.window.deleteLater()
         self.deleteLater()
 
     @property
     def _facts(self) -> Facts:
-        found = self._appraisal
+        found = self.appraisal
         return replace(
             self._ready.facts_with(self._screen.refreshRate(), self._screen.devicePixelRatio()),
             tick_s=found.tick_s,
@@ -159,10 +163,10 @@ class Preflight(QObject):
                 facts,
                 checks(facts, self._protocol),
                 self._who,
-                error_n=self._appraisal.error_n,
-                asked_error=self._appraisal.error_n is not None or not self._appraisal.over,
+                error_n=self.appraisal.error_n,
+                asked_error=self.appraisal.error_n is not None or not self.appraisal.over,
                 now=datetime.now().astimezone(),
-                busy=self._measuring is not None,
+                busy=self.measuring is not None,
                 goes_on=self._goes_on,
             )
         )
@@ -177,50 +181,50 @@ class Preflight(QObject):
             return
         if self._appraised:
             return
-        self._appraised = self._appraisal.over
-        if self._appraisal.look() or self._appraised:
+        self._appraised = self.appraisal.over
+        if self.appraisal.look() or self._appraised:
             self._show()
 
     def _again(self) -> None:
         """Measure anew, in a thread of its own: it looks at the servo for two seconds."""
-        if self._measuring is not None:
+        if self.measuring is not None:
             return
-        self._measuring = threading.Thread(target=self._measure, name="preflight", daemon=True)
+        self.measuring = threading.Thread(target=self._measure, name="preflight", daemon=True)
         self._show()
-        self._measuring.start()
+        self.measuring.start()
 
     def _measure(self) -> None:
         try:
             found: object = measured(self._ready.machine, self._chosen, sleep=self._ending.wait)
-        except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
+        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             found = error
         self._measured.emit(found)
 
     def _take(self, found: object) -> None:
-        self._measuring = None
+        self.measuring = None
         if isinstance(found, Facts):
             self._ready = replace(self._ready, facts=found)
             dynamics = _dynamics(found, self._protocol)
-            if dynamics != self._appraisal.dynamics:  # the delay has changed since, and with it what is withheld
-                self._appraisal.close()
-                self._appraisal, self._appraised = Appraisal(_scenes(self._protocol), dynamics), False
+            if dynamics != self.appraisal.dynamics:  # the delay has changed since, and with it what is withheld
+                self.appraisal.close()
+                self.appraisal, self._appraised = Appraisal(study_scenes(self._protocol), dynamics), False
             self._show()
         else:
             self.failed.emit(found)
 
     def _start(self) -> None:
-        self.started.emit(replace(self._ready, facts=replace(self._ready.facts, tick_s=self._appraisal.tick_s)))
-
-    def _cancel(self) -> None:
-        self.cancelled.emit()
+        facts = replace(self._ready.facts, tick_s=self.appraisal.tick_s)
+        masking = None if self.window.masking is None else self.window.masking.answer()
+        self.started.emit(replace(self._ready, facts=facts, masking=masking))
 
 
 def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], ...]:
     """Return where a session goes on and what is kept, nothing of a new one."""
     if chosen.resumes is None:
         return ()
-    schedule = build_schedule(protocol, chosen.participant, chosen.seed)
-    return resumed_rows(protocol, schedule, journal.read(locate(chosen.resumes)[1].journal))
+    own = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
+    schedule = build_schedule(own, chosen.participant, chosen.seed)
+    return resumed_rows(own, schedule, journal.read(locate(chosen.resumes)[1].journal))
 
 
 def _largest(errors_n: list[float | None]) -> float | None:
@@ -236,12 +240,12 @@ def _dynamics(facts: Facts, protocol: Protocol) -> Dynamics:
     return facts.dynamics._replace(delay_s=facts.delay_ticks / protocol.device.rate_hz)
 
 
-def _scenes(protocol: Protocol) -> tuple[Asked, ...]:
+def study_scenes(protocol: Protocol) -> tuple[Asked, ...]:
     """Return the study's scenes of one liquid, each once, with the fastest stroke of the tasks that it is felt in."""
     found: dict[Scene, Asked] = {}
     for block in protocol.blocks.values():
-        stroke = fastest_stroke(protocol.tasks[block.task], protocol.device.workspace_m)
-        for condition in block.conditions:
+        stroke = protocol.tasks[block.task].fastest_stroke(protocol.device.workspace_m)
+        for condition in protocol.conditions_in(block.id):
             scene = protocol.scene_for(condition)
             if len(scene.liquids) != 1:
                 continue

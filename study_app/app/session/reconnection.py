@@ -1,4 +1,4 @@
-"""Connecting a device again beside the windows: opening and homing it takes as long as a person does."""
+"""Connecting a device again in the background: opening and homing it takes as long as a person does."""
 
 from __future__ import annotations
 
@@ -48,15 +48,17 @@ class Reconnection(QObject):
             self._thread = threading.Thread(target=self._run, name="reconnecting", daemon=True)
             self._thread.start()
 
-    def wait(self) -> None:
-        """Wait until the device is left alone: whoever closes it must be the only one to use it."""
-        if self._thread is not None:
-            self._thread.join(PATIENCE_S)
+    def wait(self, patience_s: float = PATIENCE_S) -> bool:
+        """Wait until the device is left alone, for whoever closes it must be its only user; return whether it is."""
+        if self._thread is None:
+            return True
+        self._thread.join(patience_s)
+        return not self._thread.is_alive()
 
     def _run(self) -> None:
         try:
             made: object = self._reconnect()
-        except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
+        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
         self._over.emit(made)
 

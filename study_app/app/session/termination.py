@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -13,7 +14,20 @@ from PySide6.QtGui import QGuiApplication, QSessionManager
 from study_app.haptics.runtime.suspension import allow_suspension, refuse_suspension
 
 HEARTBEAT_MS = 100  # how long a signal may wait to be heard
+BY_SIGNAL_S = 2.0  # how long a program that is ended from outside waits for threads; the force is zero before
 HANG_UP = 1  # the number of SIGHUP, which a log-off counts as everywhere
+
+
+class Patience:
+    """How long several waits may take together [s]."""
+
+    def __init__(self, seconds: float) -> None:
+        self._until_s = time.monotonic() + seconds
+
+    @property
+    def left_s(self) -> float:
+        """What is left of it [s]; never negative."""
+        return max(self._until_s - time.monotonic(), 0.0)
 
 
 def log_off_signal() -> SignalInstance:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.parts import Parts
-from study_app.devices.mouse import MouseDevice
-from study_app.devices.registry import is_simulated, kind_of, moves_by_itself
+from study_app.devices.registry import descriptor_of
 from study_app.devices.simulated.hand_commands import HandOrders, hand_of
 from study_app.gui.display.opengl import has_card
 from study_app.gui.display.screens import choose_screens, place
@@ -17,17 +16,18 @@ from study_app.gui.operator.strip import Strip
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.describe import expected_duration_s
-from study_app.protocol.model import Protocol, Reach
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import Schedule, stream
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import Page, TaskPage
 from study_app.session.resume import FIRST, Start
-from study_app.session.simulated.observers import Explorer, Reacher
+from study_app.session.simulated.observers import Hand, hand_for, rest
 from study_app.store.blinded.sealing import opened
 from study_app.store.exclusions import exclude
-from study_app.viewmodels.device_list import TITLES
+from study_app.store.progress import progress_of
 from study_app.viewmodels.operator import Session
-from study_app.viewmodels.session_stages import SessionProgress, progress_after, stages
+from study_app.viewmodels.session.stages import stages
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
@@ -58,15 +58,13 @@ def open_windows(
     frames a second by the clock, whatever the screen's rate is.
     """
     clock, device, servo = store.clock.seconds, machine.device, machine.servo
-    journal = WatchedJournal(
-        store, progress_after(SessionProgress(protocol, schedule), opened(store.lines, store.key)), clock
-    )
-    by_mouse = device.name == "mouse"
+    journal = WatchedJournal(store, progress_of(opened(store.lines, store.key)), clock)
+    described = descriptor_of(chosen.device)
     operator = OperatorWindow(
         protocol.study.name,
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
         reach_m=max(device.workspace_m),
-        pointer=by_mouse,
+        pointer=described.pointer,
         force_limit_n=protocol.device.force_limit_n if protocol.study.blinding == "single" else None,
         theme=theme,
     )
@@ -76,7 +74,7 @@ def open_windows(
         words(chosen.language),
         clock=clock,
         windowed=chosen.windowed,
-        captures_pointer=by_mouse,
+        captures_pointer=described.pointer,
         pilot=chosen.pilot,
         on_card=refresh_hz is None and has_card(),
         text_scale=text_scale,
@@ -86,8 +84,8 @@ def open_windows(
     hand = hand_of(device)
     parts = Parts(
         session=_facts(chosen, protocol, schedule, machine),
-        schedule=schedule,
         key=store.key.codes,
+        secret=store.key.nonce,
         language=chosen.language,
         servo=servo,
         journal=journal,
@@ -97,9 +95,9 @@ def open_windows(
         exclude=_excluder(chosen),
         reconnect=machine.reconnect,
         aim_m=_aim(hand, servo),
-        point_to=device.point_to if isinstance(device, MouseDevice) else None,
-        press=device.press if isinstance(device, MouseDevice) else None,
-        hand_for=_hands(hand, chosen, clock) if hand is not None and moves_by_itself(device.name) else None,
+        point_to=getattr(device, "point_to", None) if described.pointer else None,
+        press=getattr(device, "press", None) if described.pointer else None,
+        hand_for=_hands(hand, chosen, clock) if hand is not None and described.moves_by_itself else None,
     )
     rate_hz = refresh_hz or shown_on.refreshRate() or 60.0
     bridge = SessionBridge(parts, participant, operator, refresh_hz=rate_hz, strip=strip)
@@ -121,16 +119,17 @@ def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
 
 def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: Rig) -> Session:
     """Return what the operator's window says throughout."""
-    seen_alone, nobody = chosen.device in {"mouse", "spacemouse"}, is_simulated(chosen.device)
+    described = descriptor_of(chosen.device)
     return Session(
         protocol=protocol,
+        schedule=schedule,
         stages=stages(protocol, schedule),
         who=chosen.who,
         expected_s=expected_duration_s(protocol),
-        answers_of=protocol.responses_per_participant(),
+        answers_of=orders_of(protocol).answers,
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
-        device_name=TITLES[kind_of(chosen.device)],
-        device_kind="mouse" if seen_alone else "simulated" if nobody else "falcon",
+        device_name=described.title,
+        device_icon=described.icon,
         device_rows=(
             ("Priority", str(machine.servo.describe()["priority"]).partition(" (")[0]),
             *_calibration(machine.device),
@@ -158,18 +157,17 @@ def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], tuple[float, flo
     return position_m
 
 
-def _hands(
-    hand: HandOrders, chosen: NewSession, clock: Callable[[], float]
-) -> Callable[[Page], Explorer | Reacher | None]:
+def _hands(hand: HandOrders, chosen: NewSession, clock: Callable[[], float]) -> Callable[[Page], Hand | None]:
     """Return what makes the simulated hand for a page; on a page without a task the hand rests."""
     draw = stream(chosen.seed, f"run/{chosen.participant}/hand").random
 
-    def hand_for(page: Page) -> Explorer | Reacher | None:
+    def hand_on(page: Page) -> Hand | None:
         if not isinstance(page, TaskPage):
             hand.rest()
-            return None
-        if isinstance(page.task, Reach):
-            return Reacher(page.task, hand, draw)
-        return Explorer(page.task, hand, draw, clock())
+        elif page.interval is None or not page.interval.resting:
+            return hand_for(page.task, hand, draw, clock())
+        else:
+            rest(page.task, hand)
+        return None
 
-    return hand_for
+    return hand_on

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from study_app.cli.options import Target
+from study_app.cli.progress import progress
 
 if TYPE_CHECKING:
     from study_app.haptics.model.motion import Motion
@@ -26,12 +27,12 @@ DEFAULT_PATH = "stir"
     metavar="PATH",
     help="Motion CSV, or a programmed path: stir, circle, reverse, reach …",
 )
-@click.option("--to", type=Target(), metavar="DIR", help="Folder for table and figure; else printed.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for table and figure; default: print.")
 def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) -> None:
-    """Show what accuracy costs in time: how wrong each model of a liquid is, and how long it takes.
+    """Compare accuracy and computation time of the models of a liquid.
 
     FILE is a protocol or scene file; default: rek2024 and physical_liquids.
-    Wakes are measured against their definition, models of a real liquid against experiments and exact solutions.
+    Wakes are compared with their definition, models of a real liquid with experiments and exact solutions.
     """
     from study_app.store.output_files import make_folder
     from study_app.validation.accuracy.accuracy_report import markdown
@@ -40,15 +41,14 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) 
 
     numerical, physical, notes = _subjects(scene, liquid)
     one = numerical or physical
-    motion = _motion(path, one) if one is not None else None
+    motion = motion_along(path, one) if one is not None else None
     if motion is None:
-        raise click.UsageError(f"there is nothing to measure: {'; '.join(notes)}")
+        raise click.UsageError(f"nothing can be measured: {'; '.join(notes)}")
     if to is not None:
         make_folder(to)
-    named = "a hand that stirs" if path == DEFAULT_PATH else path
-    found = measure(
-        numerical, physical, motion, named=named, notes=notes, tell=lambda text: click.echo(f"{text} …", err=True)
-    )
+    named = "stirring" if path == DEFAULT_PATH else path
+    with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
+        found = measure(numerical, physical, motion, named=named, notes=notes, tell=show)
     if to is None:
         click.echo(markdown(found), nl=False)
         return
@@ -75,11 +75,14 @@ def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scen
         liquid = next(iter(there))
     chosen = load_scene(scene, liquid)
     if chosen.liquids[0].viscosity_pa_s is None:
-        return chosen, None, (f"{liquid} gives no viscosity: nothing physical is known to compare it with",)
+        return chosen, None, (f"{liquid} has no viscosity, so there is no physical reference to compare with",)
+    if chosen.liquids[0].drag.law == "linear":
+        return chosen, None, (f"{liquid} is a linear damper, so there is no physical reference to compare with",)
     return chosen, chosen, ()
 
 
-def _motion(path: str, scene: Scene) -> Motion:
+def motion_along(path: str, scene: Scene) -> Motion:
+    """Return the motion of a path's name or a motion file, at the scene's rate."""
     from study_app.evaluation.hand_motions import stir
     from study_app.evaluation.identify.measured_force import at_rate
     from study_app.haptics.model import motion, paths

@@ -1,4 +1,4 @@
-"""The command that sets models of a liquid beside a fluid solver."""
+"""The command that compares models of a liquid with a fluid solver."""
 
 from __future__ import annotations
 
@@ -7,20 +7,22 @@ from pathlib import Path
 import click
 
 from study_app.cli.options import Target
+from study_app.cli.progress import progress
 
 
 @click.command()
 @click.option(
     "--solve",
     is_flag=True,
-    help="Solve the flow again instead of using the stored tables: some 5 minutes of one core, 15 on busy ones; needs "
-    "the extra cfd (pip install ngsolve, 350 MB).",
+    help="Solve the flow again instead of using the stored tables: about 5 minutes on one core, 15 on a busy one; "
+    "needs the extra cfd (pip install ngsolve, 350 MB).",
 )
-@click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; else printed.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; default: print.")
 def cfd(to: Path | None, *, solve: bool) -> None:
-    """Fit models of honey and glycerin to the force that a fluid solver finds; say what stays wrong.
+    """Fit models of honey and glycerin to the force of a fluid solver; report the remaining error.
 
-    A ball of 68 mm starts, moves evenly and stops at once, at 0.2 and 0.6 m/s. Fitting takes about a minute.
+    A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
+    minute.
     """
     from study_app.store.output_files import make_folder
     from study_app.validation.cfd.fits import fit_all
@@ -32,10 +34,12 @@ def cfd(to: Path | None, *, solve: bool) -> None:
         raise click.UsageError("--solve needs --to: the folder for the solver's tables")
     if to is not None:
         make_folder(to)
-    for written in solve_all(to, lambda text: click.echo(text, err=True)) if solve and to is not None else ():
+    with progress(lambda text: click.echo(text, err=True)) as show:
+        solved = solve_all(to, show) if solve and to is not None else ()
+        tables, drag = stored(to if solve else None), steady(to if solve else None)
+        fits = fit_all(tables, show)
+    for written in solved:
         click.echo(written)
-    tables, drag = stored(to if solve else None), steady(to if solve else None)
-    fits = fit_all(tables, lambda text: click.echo(text, err=True))
     if to is None:
         click.echo(f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}")
         return

@@ -20,22 +20,24 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("protocol", metavar="[FILE]", default="rek2024")
 @click.option("--hours", type=float, required=True, metavar="H", help="How long; 0.01 is 36 seconds.")
-@click.option("--virtual", is_flag=True, help="In virtual time: a day in minutes.")
+@click.option("--virtual", is_flag=True, help="In virtual time: a day takes minutes.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
-@click.option("--load", type=LOAD, default="none", help="Paint both windows of a session meanwhile; keep cores busy.")
-@click.option("--to", type=Target(), metavar="DIR", help="Folder to write the report into, too.")
+@click.option(
+    "--load", type=LOAD, default="none", help="Also paint both windows of a session; also keep all cores busy."
+)
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for the report.")
 @click.pass_context
 def soak(
     context: click.Context, hours: float, protocol: str, seed: int, load: LoadName, to: Path | None, *, virtual: bool
 ) -> None:
-    """Run the servo with a restless hand and every fault there is; say what drifted, leaked or broke.
+    """Run the servo for hours with a moving hand and every fault; report drift, leaks and failures.
 
-    FILE holds the liquids; default: rek2024. Ctrl+C ends it with the report so far.
+    FILE defines the liquids; default: rek2024. Ctrl+C ends it with the report so far.
     """
     from study_app.protocol.load import load_scenes
     from study_app.store.output_files import make_folder
     from study_app.validation.soak.soak import soak as soak_servo
-    from study_app.validation.timing.machine_load import beside
+    from study_app.validation.timing.machine_load import under_load
 
     scenes = load_scenes(protocol)
     if to is not None:
@@ -49,7 +51,7 @@ def soak(
 
     before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        found = beside(
+        found = under_load(
             load,
             windows_thread(load) if load != "none" else None,
             lambda: soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, tell=click.echo),

@@ -1,4 +1,4 @@
-"""The command that shows how late the servo's turns begin, beside what others do, and how well delays are kept."""
+"""The command that shows how late the servo's ticks begin, compared with other loops, and how well delays are kept."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING
 import click
 
 from study_app.cli.options import Target
+from study_app.cli.progress import progress
 from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:
@@ -31,27 +33,27 @@ LOAD = click.Choice(("none", "gui", "gui+cpu"))
     default=10.0,
     show_default=True,
     metavar="S",
-    help="How long each loop, or delay, is timed.",
+    help="Time for each loop, or for each delay.",
 )
 @click.option(
-    "--load", type=LOAD, default="none", show_default=True, help="Paint both windows meanwhile; keep cores busy."
+    "--load", type=LOAD, default="none", show_default=True, help="Also paint both windows; also keep all cores busy."
 )
 @click.option(
-    "--spin", "spin_us", type=float, metavar="US", help="Look at the clock for so long before a deadline [µs]."
+    "--spin", "spin_us", type=float, metavar="US", help="Poll the clock for this time before a deadline [µs]."
 )
-@click.option("--delays", "of_delays", is_flag=True, help="Time the participant's picture instead, delay by delay.")
+@click.option("--delays", "of_delays", is_flag=True, help="Measure the delay of the participant's picture instead.")
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure.")
 def timing(seconds: float, load: LoadName, spin_us: float | None, of_delays: bool, to: Path | None) -> None:
-    """Time the servo's turns with every effect on, beside a bare compiled loop, a Python thread and a Qt timer.
+    """Measure the lateness of the servo, a bare compiled loop, a Python thread and a Qt timer.
 
-    All take turns of a quarter second, round about, in each priority class that the system grants. Ctrl+C ends it.
+    They run alternately for a quarter second each, in each priority class that the system grants. Ctrl+C ends it.
 
-    With --delays a session shows the delays of the thesis' study on screens of 60 and 144 Hz, without load and with it,
-    and its recordings tell how much later than asked for every frame was. No display is needed.
+    With --delays a session shows the delays of the thesis' study on screens of 60 and 144 Hz, with and without
+    load, and the error of every frame's delay is computed from its recordings. No display is needed.
     """
     if of_delays:
         if spin_us is not None:
-            raise StudyError("--spin is about the servo's loops: leave it out with --delays")
+            raise StudyError("--spin applies to the servo's loops: omit it with --delays")
         time_delays(seconds, load, to)
         return
     from study_app.store.output_files import make_folder
@@ -60,15 +62,8 @@ def timing(seconds: float, load: LoadName, spin_us: float | None, of_delays: boo
 
     if to is not None:
         make_folder(to)
-    with ending_by_signal() as ending:
-        found = time_loops(
-            seconds,
-            load,
-            windows_thread(load),
-            spin_us=spin_us,
-            ending=ending,
-            tell=lambda line: click.echo(line, err=True),
-        )
+    with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
+        found = time_loops(seconds, load, windows_thread(load), spin_us=spin_us, ending=ending, tell=show)
     click.echo(text(found), nl=False)
     for written in write(found, to) if to is not None else ():
         click.echo(written)
@@ -85,7 +80,8 @@ def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
         make_folder(to)
     from study_app.app.delay_session import delays
 
-    found = delays(seconds, load, tell=lambda line: click.echo(line, err=True))
+    with progress(partial(click.echo, err=True)) as show:
+        found = delays(seconds, load, tell=show)
     click.echo(text(found), nl=False)
     for written in write(found, to) if to is not None else ():
         click.echo(written)

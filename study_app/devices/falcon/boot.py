@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from study_app.devices.falcon.diagnosis import BY_ID
-from study_app.devices.falcon.failure_modes import OPEN, Facts
+from study_app.devices.falcon.facts import OPEN, Facts
+from study_app.devices.falcon.failure_modes import BY_ID
 from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.firmware import Firmware, check
 from study_app.devices.falcon.transport.transport import Transport
@@ -28,7 +28,7 @@ ROUND_TRIPS: Final = 50
 
 _PING_S: Final = 0.25
 _STEP_S: Final = 1.0
-_PROBE_S: Final = 0.05
+PROBE_S: Final = 0.05
 _BETWEEN_ATTEMPTS_S: Final = 0.2
 
 
@@ -116,7 +116,7 @@ def set_event_character(transport: Transport, on: bool) -> None:
 def is_running(transport: Transport) -> bool:
     """Return whether the Falcon has its firmware: whether it answers a quiet packet. The bridge must be configured."""
     for _ in range(PROBES):
-        if _Line(transport).answers(_PROBE_S):
+        if _Line(transport).answers(PROBE_S):
             return True
         _purge(transport)
     return False
@@ -129,10 +129,10 @@ def measure_round_trip(transport: Transport) -> float:
 
 def _round_trip_s(transport: Transport) -> float:
     began_s = transport.now_s()
-    if _Line(transport).answers(_PROBE_S):
+    if _Line(transport).answers(PROBE_S):
         return transport.now_s() - began_s
     _purge(transport)  # its reply must not count as the next one's
-    return _PROBE_S
+    return PROBE_S
 
 
 def boot(
@@ -207,7 +207,7 @@ def _time(transport: Transport) -> None:
     came = _Line(transport).until(lambda data: data.endswith(constants.AUTOBAUD), _STEP_S)
     if not came.endswith(constants.AUTOBAUD):
         heard = f"answers with {came[:8].hex(' ')}" if came else "does not answer"
-        raise _Ended("autobaud", f"its boot loader {heard} to the byte that tells it the speed")
+        raise _Ended("autobaud", f"its boot loader {heard} to the byte that sets the speed")
 
 
 def _upload(transport: Transport, firmware: bytes) -> None:

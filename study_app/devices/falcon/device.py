@@ -12,9 +12,9 @@ import numpy as np
 
 from study_app.devices.base import Device
 from study_app.devices.falcon import boot
-from study_app.devices.falcon.diagnosis import sentence
 from study_app.devices.falcon.exchange import COUNTERS, LEAST_MASS_KG, exchange_functions, new_exchange
-from study_app.devices.falcon.failure_modes import OPEN, Facts
+from study_app.devices.falcon.facts import OPEN, Facts
+from study_app.devices.falcon.failure_modes import sentence
 from study_app.devices.falcon.failures import ProgramMissing, usb_failure
 from study_app.devices.falcon.firmware import check
 from study_app.devices.falcon.guard import Guard, quiet
@@ -76,20 +76,20 @@ class FalconDevice(Device):
         self._tell = tell if tell is not None else _say_nothing
         self._cancelled = cancelled
         self._patience_s = patience_s
-        self._transport: Transport | None = None
-        self._guard: Guard | None = None
+        self.transport: Transport | None = None
+        self.guard: Guard | None = None
         self._calibration: calibration.Calibration | None = None
         self._guard_died = False
         self._found: dict[str, Any] = {}
-        self._reading, self._command = new_reading(), new_command()
+        self.reading, self._command = new_reading(), new_command()
         self._round_trip_s: float | None = None
         mechanism = new_mechanism(self._geometry, calibration.UNCALIBRATED_UNITS_PER_NM)
         self._count_m = count_at(mechanism, self._geometry.centre_m)
         self._check_reach(mechanism)
-        self._memory = new_exchange(_CLOSED, mechanism, self._geometry)
-        self._falcon = self._memory[0]
-        self._falcon.lost = 1  # while it is not open
-        self.context = int(self._memory.ctypes.data)
+        self.memory = new_exchange(_CLOSED, mechanism, self._geometry)
+        self.falcon = self.memory[0]
+        self.falcon.lost = 1  # while it is not open
+        self.context = int(self.memory.ctypes.data)
         self.read, self.write = exchange_functions()
 
     def open(self) -> None:
@@ -100,7 +100,7 @@ class FalconDevice(Device):
         DeviceError
             It is not there, cannot be opened, needs its program, or was not homed.
         """
-        if self._transport is not None:
+        if self.transport is not None:
             return
         transport = self._open_bridge()
         self._guard_died = False
@@ -108,13 +108,13 @@ class FalconDevice(Device):
             self._found = {"serial": transport.serial, "firmware": self._run_program(transport)}
             self._found |= self._hasten(transport)
             self._calibrate(transport.serial)
-            self._transport = transport
+            self.transport = transport
             if self.guarded:
-                self._guard = Guard(transport.name, self._lose_guard)
-                self._guard.start()
+                self.guard = Guard(transport.name, self._lose_guard)
+                self.guard.start()
             self._home(transport)
         except BaseException:
-            self._transport = transport
+            self.transport = transport
             self.close()
             raise
 
@@ -124,21 +124,21 @@ class FalconDevice(Device):
         While a servo's loop hangs in its bridge it stays open and guarded, so that the loop ends the force when it
         returns, and calls nothing that is gone; a call after that closes it.
         """
-        used, gone = bool(self._falcon.handle), bool(self._falcon.lost)
-        self._falcon.lost = 1
+        used, gone = bool(self.falcon.handle), bool(self.falcon.lost)
+        self.falcon.lost = 1
         if not self._is_left():
-            self._falcon.lost = int(gone)
+            self.falcon.lost = int(gone)
             return
-        transport, self._transport = self._transport, None
-        guard, self._guard = self._guard, None
-        pushing = gone and bool(self._falcon.units.any())
-        self._falcon.handle, self._falcon.transfer = _CLOSED
+        transport, self.transport = self.transport, None
+        guard, self.guard = self.guard, None
+        pushing = gone and bool(self.falcon.units.any())
+        self.falcon.handle, self.falcon.transfer = _CLOSED
         if transport is None:
             return
         quieted = not used
         try:
             quieted = quieted or quiet(transport) > 0
-            self._falcon.sent_n = 0.0 if quieted else self._falcon.sent_n
+            self.falcon.sent_n = 0.0 if quieted else self.falcon.sent_n
         finally:  # an interrupt ends neither its being let go of nor its guard's duty
             try:
                 transport.close()
@@ -153,13 +153,13 @@ class FalconDevice(Device):
 
     @property
     def counters(self) -> dict[str, int]:
-        """How many turns, packets and errors there were since it was homed: see ``exchange.FALCON``."""
-        return {name: int(self._falcon[name]) for name in COUNTERS}
+        """How many ticks, packets and errors there were since it was homed: see ``exchange.FALCON``."""
+        return {name: int(self.falcon[name]) for name in COUNTERS}
 
     @property
     def held(self) -> tuple[Any, Any]:
-        """The encoder counts of its last reply and the motor units it was last told, each (3,)."""
-        return self._falcon.status.encoders.copy(), self._falcon.units.copy()
+        """The encoder counts of its last reply and its last torque command in motor units, each (3,)."""
+        return self.falcon.status.encoders.copy(), self.falcon.units.copy()
 
     def check(self) -> None:
         """Raise ``DeviceLost`` if its guard has died: no force is sent any more, and its reads say that it is lost."""
@@ -177,18 +177,18 @@ class FalconDevice(Device):
             "force_limit_n": self.force_limit_n,
             "geometry": self._geometry.name,
             "calibration": "none" if used is None else used.describe(),
-            "units_per_nm": float(self._falcon.mechanism.units_per_nm),
+            "units_per_nm": float(self.falcon.mechanism.units_per_nm),
             "dynamics": self.dynamics.describe(),
-            "delay_ticks": int(self._falcon.delay),
+            "delay_ticks": int(self.falcon.delay),
             **self._found,
         }
 
     def _is_left(self) -> bool:
-        """Wait a moment for whoever reads or writes in another thread; return whether nobody does any more."""
+        """Wait a moment for whoever reads or writes in another thread; return whether none is left."""
         patience = time.monotonic() + _LEAVE_S
-        while self._falcon.inside and time.monotonic() < patience:
+        while self.falcon.inside and time.monotonic() < patience:
             time.sleep(_BETWEEN_S)
-        return not self._falcon.inside
+        return not self.falcon.inside
 
     def _open_bridge(self) -> Transport:
         return open_transport(self.bridge)
@@ -246,37 +246,37 @@ class FalconDevice(Device):
         self._calibration = used = calibration.load(serial) if serial else None
         self._geometry = self._published if used is None else geometry_named(used.geometry)
         gain = calibration.UNCALIBRATED_UNITS_PER_NM if used is None else used.units_per_nm
-        self._falcon.mechanism = new_mechanism(self._geometry, gain, 0.0 if used is None else used.arm_offset_rad)
-        self._count_m = count_at(self._falcon.mechanism, self._geometry.centre_m)
+        self.falcon.mechanism = new_mechanism(self._geometry, gain, 0.0 if used is None else used.arm_offset_rad)
+        self._count_m = count_at(self.falcon.mechanism, self._geometry.centre_m)
 
     def _home(self, transport: Transport) -> None:
-        mechanism = self._falcon.mechanism.copy()
-        self._memory[:] = new_exchange(transport.calls(), mechanism, self._geometry)
-        self._falcon.unguarded = int(self._guard_died)
-        home(self._falcon, self._turn, transport.now_s, self._tell, patience_s=self._patience_s)
+        mechanism = self.falcon.mechanism.copy()
+        self.memory[:] = new_exchange(transport.calls(), mechanism, self._geometry)
+        self.falcon.unguarded = int(self._guard_died)
+        home(self.falcon, self._tick, transport.now_s, self._tell, patience_s=self._patience_s)
         self._begin_anew()
 
     def _lose_guard(self) -> None:
         """Let nothing pass any more; called by the guard's thread."""
         self._guard_died = True
-        self._falcon.unguarded = 1
+        self.falcon.unguarded = 1
 
     def _begin_anew(self) -> None:
-        """Let the force come in over half a second from the next turn on, and count from there."""
-        self._falcon.share = 0.0
-        self._falcon.started = 0
+        """Let the force come in over half a second from the next tick on, and count from there."""
+        self.falcon.share = 0.0
+        self.falcon.started = 0
         for name in COUNTERS:
-            self._falcon[name] = 0
+            self.falcon[name] = 0
 
-    def _turn(self) -> None:
-        """Take a turn without force."""
-        transport = self._transport
+    def _tick(self) -> None:
+        """Take a tick without force."""
+        transport = self.transport
         assert transport is not None  # noqa: S101 - it is being opened
         now_ns = round(1e9 * transport.now_s())
-        self.read.ctypes(self.context, now_ns, int(self._reading.ctypes.data))
+        self.read.ctypes(self.context, now_ns, int(self.reading.ctypes.data))
         self.write.ctypes(self.context, int(self._command.ctypes.data))
         self.check()
-        if self._falcon.lost:
+        if self.falcon.lost:
             raise usb_failure(ERROR_NO_DEVICE, "homing it")
         if self._cancelled is not None and self._cancelled():
             raise DeviceError("homing the Falcon was given up")
@@ -293,4 +293,4 @@ class FalconDevice(Device):
 
 
 def _say_nothing(_line: str) -> None:
-    """Tell nobody."""
+    """Report nothing."""

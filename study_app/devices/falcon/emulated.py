@@ -1,7 +1,7 @@
 """The Falcon's driver in front of an emulated Falcon, whose grip a simulated hand holds.
 
 All of the driver is the real one, down to pyusb and the C function; the emulator is behind it as the bus is. Once it
-is open, the emulator's time is that of the servo's turns, so that it runs as fast as a rehearsal does.
+is open, the emulator's time is that of the servo's ticks, so that it runs as fast as a rehearsal does.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from study_app.devices.falcon.mechanics.geometry import WORKSPACE_M
 from study_app.devices.falcon.transport.transport import Transport
 from study_app.devices.falcon.transport.usb import PyUsbTransport
 
-_STILL_TURNS = 10  # between two strokes of homing it moves again sooner
+_STILL_TICKS = 10  # between two strokes of homing it moves again sooner
 
 
 class EmulatedFalcon(FalconDevice):
@@ -63,11 +63,11 @@ class EmulatedFalcon(FalconDevice):
         """Open it, and wait until the hand that homed it has brought the grip to the middle."""
         super().open()
         still = 0
-        while still < _STILL_TURNS:
-            self._turn()
+        while still < _STILL_TICKS:
+            self._tick()
             still = 0 if self.hand.moving else still + 1
         self._begin_anew()
-        self._backend.follow_clock(self.context)  # FALCON begins with the time of the turn
+        self._backend.follow_clock(self.context)  # FALCON begins with the time of the tick
 
     def close(self) -> None:
         """Send zero torque several times and let go of it; a second call does nothing."""

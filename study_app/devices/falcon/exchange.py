@@ -1,7 +1,7 @@
-"""The Falcon's turn, compiled: take the reply to the packet before, say where the grip is, send the next torques.
+"""The Falcon's tick, compiled: take the reply to the packet before, say where the grip is, send the next torques.
 
-The device answers each packet with one, so `_read` collects what the packet of the turn before asked for, and `_write`
-sends the force as soon as it is known; a position is one turn old. Several replies at once: the newest counts. None:
+The device answers each packet with one, so `_read` collects what the packet of the tick before asked for, and `_write`
+sends the force as soon as it is known; a position is one tick old. Several replies at once: the newest counts. None:
 nothing new, and what came last is never given twice. Force passes a gate: all arms homed, the grip pulled out once, and
 then half a second from none to all. Which replies are believed: see ``replies``.
 """
@@ -56,22 +56,22 @@ LEAST_MASS_KG: Final = 0.1
 Nobody published a measured value; the limits of the loop are held for 30 to 250 g."""
 RAMP_S: Final = 0.5
 SMOOTHING_S: Final = 2e-3
-"""Time constant of the grip's velocity, which tells a braking force from one that drives."""
+"""Time constant of the grip's velocity, which separates a braking force from a driving one."""
 LONGEST_GAP_NS: Final = 20_000_000
 """A reply that waited longer for the loop to look is too old to be given."""
 _BEYOND = 2  # so many positions in a row show an out-stroke: one may be of a packet whose homed bits were garbled
-_READS = 2  # a turn asks the bridge at most so often: one answer may be nothing but status bytes
+_READS = 2  # a tick asks the bridge at most so often: one answer may be nothing but status bytes
 _TIMEOUT_MS = 1
 _DATA = 4 * USB_PACKET
 
 FALCON = np.dtype(
     [
-        ("now_ns", np.int64),  # time of the turn; stays first: an emulator reads it here
+        ("now_ns", np.int64),  # time of the tick; stays first: an emulator reads it here
         ("handle", np.intp),  # of the bridge, and
         ("transfer", np.intp),  # address of its function (``bulk.BULK``)
         ("mechanism", MECHANISM),
         ("centre_m", np.float64),  # z of the hand's origin in the Falcon's frame
-        ("started", np.int64),  # 1 after the first turn
+        ("started", np.int64),  # 1 after the first tick
         ("lost", np.int64),  # 1: the bridge is gone, or not open
         ("inside", np.int64),  # 1 while a read or write runs, which may call the bridge
         # the stream
@@ -91,17 +91,17 @@ FALCON = np.dtype(
         ("tick_s", np.float64),  # how long the last one was
         ("slew_n_per_s", np.float64),  # how fast a force grows that does not brake the grip
         ("force_n", np.float64, (3,)),  # as it passed the gate
-        ("held_n", np.float64, (3,)),  # what the motors push with, as told before
-        ("sent_n", np.float64, (3,)),  # and as told last, where the grip was then
+        ("held_n", np.float64, (3,)),  # force of the motors by the command before
+        ("sent_n", np.float64, (3,)),  # and by the last command, where the grip was then
         ("torque_nm", np.float64, (3,)),
-        ("units", np.int64, (3,)),  # what the motors were last told
+        ("units", np.int64, (3,)),  # the last torque command
         # the motion of the arms, to tell garbled encoders
         ("tracked", np.int64),  # 1 once encoders were believed
-        ("apart", np.int64),  # turns since then
+        ("apart", np.int64),  # ticks since then
         ("counts", np.int64, (3,)),  # as last believed
-        ("pace", np.float64, (3,)),  # counts a turn
+        ("pace", np.float64, (3,)),  # counts a tick
         ("doubted", np.int64, (3,)),  # as last not believed,
-        ("doubted_at", np.int64),  # so many turns after the last believed
+        ("doubted_at", np.int64),  # so many ticks after the last believed
         ("doubts", np.int64),  # in a row
         # the gate
         ("homed", np.int64),  # 1 while all arms are
@@ -120,17 +120,17 @@ FALCON = np.dtype(
         ("testing", np.int64),  # packets left out so far to measure it; 0: no measurement
         ("astray", np.int64),  # reads in a row after which more or less was owed than the delay explains
         ("unsure", np.int64),  # 1: the delay has to be measured
-        ("retest", np.int64),  # turns until it may be
+        ("retest", np.int64),  # ticks until it may be
         # counters
-        ("turns", np.int64),
-        ("fresh", np.int64),  # turns that gave a position
-        ("missing", np.int64),  # turns without a reply
-        ("late", np.int64),  # turns whose reply was too old, or may have been
-        ("refused", np.int64),  # turns whose reply was no pose of a homed Falcon, or is doubted
+        ("ticks", np.int64),
+        ("fresh", np.int64),  # ticks that gave a position
+        ("missing", np.int64),  # ticks without a reply
+        ("late", np.int64),  # ticks whose reply was too old, or may have been
+        ("refused", np.int64),  # ticks whose reply was no pose of a homed Falcon, or is doubted
         ("requests", np.int64),  # packets sent
         ("replies", np.int64),  # packets received
         ("written_off", np.int64),  # replies that were given up
-        ("surplus", np.int64),  # replies that nobody waited for any more
+        ("surplus", np.int64),  # replies that were no longer expected
         ("cut_short", np.int64),  # reads that ended within a packet
         ("read_errors", np.int64),
         ("write_errors", np.int64),
@@ -140,7 +140,7 @@ FALCON = np.dtype(
 )
 
 COUNTERS: Final = (
-    "turns",
+    "ticks",
     "fresh",
     "missing",
     "late",
@@ -245,7 +245,7 @@ def _take_reply(falcon: Any, context: int, now_ns: int, reading: int) -> int:
     elapsed_ns = now_ns - falcon.now_ns
     falcon.now_ns = now_ns
     falcon.tick_s = elapsed_ns * 1e-9
-    falcon.turns += 1
+    falcon.ticks += 1
     falcon.apart += 1
     packets = _receive(falcon, context)
     if falcon.lost != 0 or falcon.unguarded != 0:

@@ -1,82 +1,339 @@
-"""What was observed of a Falcon, and what is said of one way in which it fails.
+"""The failure modes of a Falcon, as data: symptom, cause, cure on each system, and which observed facts show it.
 
-`Facts` are what a transport, the boot, homing or a test run saw; errors carry theirs. `diagnosis` lists the modes.
+`diagnose` names the modes that the facts show. Errors take their words from here; ``doctor`` walks all modes. Collected
+from what owners of Falcons reported of other drivers, and from the documentation of FTDI, libusb and systemd; none was
+seen by us on a Falcon. Loads neither the compiler nor a driver.
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from typing import Final
 
-OPEN: Final = "open"
-ALL_HOMED: Final = 0b111
+from study_app.devices.falcon.facts import ALL_HOMED, OPEN, OTHER, Facts, Mode, Shows
+from study_app.devices.falcon.wire.constants import PRODUCT_ID, VENDOR_ID
 
-OTHER: Final = ""
-"""Key of the cure on every platform that has none of its own."""
+RULES_FILE: Final = "/etc/udev/rules.d/60-falcon.rules"
+UDEV_RULE: Final = (
+    f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{VENDOR_ID:04x}", ATTR{{idProduct}}=="{PRODUCT_ID:04x}", TAG+="uaccess"'
+)
+MOST_BROKEN: Final = 0.005
+LEAST_HZ: Final = 800.0
+LONGEST_ROUND_TRIP_S: Final = 0.002
+LARGEST_STEP_N: Final = 0.5
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Facts:
-    """What was observed; None is "not looked at".
-
-    Attributes
-    ----------
-    platform : as ``sys.platform`` says it
-    usb : the kind of ``failures.UsbFailure``, or ``OPEN``: the bridge could be opened and claimed
-    listed : the list of USB devices shows it
-    ftdi_sees : FTDI's driver (D2XX) shows it
-    program : "running", "loaded", "needed" (no file was given), "refused" (the file is none)
-    boot_step : where loading it ended: "ping", "autobaud", "echo", "start"
-    replies : it answers packets
-    homed : bits of the arms that are
-    moved : its encoders changed while the grip was to be moved
-    pulled_out : the grip was pulled out after homing
-    round_trip_s : median time from a packet to its reply [s]
-    broken_share : share of packets without a whole reply
-    rate_hz : turns of the servo a second
-    step_n : largest step of the force between two turns [N]
-    """
-
-    platform: str = field(default_factory=lambda: sys.platform)
-    usb: str | None = None
-    listed: bool | None = None
-    ftdi_sees: bool | None = None
-    program: str | None = None
-    boot_step: str | None = None
-    replies: bool | None = None
-    homed: int | None = None
-    moved: bool | None = None
-    pulled_out: bool | None = None
-    round_trip_s: float | None = None
-    broken_share: float | None = None
-    rate_hz: float | None = None
-    step_n: float | None = None
+_PORT: Final = {
+    OTHER: "unplug cable and mains adapter for ten seconds, and use another port of the machine itself, no hub",
+    "darwin": "unplug cable and mains adapter for ten seconds, and connect it through a hub with its own power",
+}
 
 
-Shows = Callable[[Facts], bool | None]
-"""True: the facts show this mode; False: they rule it out; None: they do not tell."""
+def _usb(*kinds: str, platform: str | None = None, but: str | None = None) -> Shows:
+    """Return the signs that opening failed in one of these ways, on this system or on any other ``but`` those."""
+
+    def shown(facts: Facts) -> bool | None:
+        if facts.usb is None:
+            return None
+        here = platform in {None, facts.platform} and facts.platform not in (but or "").split()
+        if facts.usb in kinds:
+            return here
+        return False if facts.usb == OPEN or not here else None
+
+    return shown
 
 
-@dataclass(frozen=True, slots=True)
-class Mode:
-    """One way to fail.
+def _upload(facts: Facts) -> bool | None:
+    if facts.boot_step is not None:
+        return True
+    return False if facts.program in {"running", "loaded"} else None
 
-    ``tested`` is what holds where it is not there, ``symptom`` what a user sees where it is, ``cause`` a clause that
-    fits after "because", ``cures`` what to do by platform ("" for all others), ``detected`` by what it is known,
-    ``paste`` what a terminal on Linux takes.
-    """
 
-    id: str
-    tested: str
-    symptom: str
-    cause: str
-    cures: Mapping[str, str]
-    detected: str
-    shown_by: Shows
-    paste: str = ""
+def _file(facts: Facts) -> bool | None:
+    return None if facts.program is None else facts.program in {"needed", "refused"}
 
-    def cure(self, platform: str) -> str:
-        """Return what to do on this system."""
-        return self.cures.get(platform, self.cures.get(OTHER, ""))
+
+def _not_supported(facts: Facts) -> bool | None:
+    if facts.usb == "not-supported":
+        return facts.ftdi_sees is not False
+    return _usb("not-supported")(facts)
+
+
+def _two_drivers(facts: Facts) -> bool | None:
+    if facts.platform != "win32" or facts.usb == OPEN:
+        return False
+    if facts.usb not in {"not-supported", "not-found"} or facts.listed is None or facts.ftdi_sees is None:
+        return None
+    return facts.listed and not facts.ftdi_sees
+
+
+def _busy(facts: Facts) -> bool | None:
+    if facts.usb == "access" and facts.platform == "win32":
+        return True
+    return _usb("busy")(facts)
+
+
+def _stroke_in(facts: Facts) -> bool | None:
+    if facts.homed == ALL_HOMED:
+        return False
+    return None if facts.homed is None or facts.moved is None else facts.moved
+
+
+def _stroke_out(facts: Facts) -> bool | None:
+    return None if facts.pulled_out is None else facts.homed == ALL_HOMED and not facts.pulled_out
+
+
+def _power(facts: Facts) -> bool | None:
+    return None if facts.replies is None else not facts.replies
+
+
+def _frozen(facts: Facts) -> bool | None:
+    return None if facts.moved is None or not facts.replies else not facts.moved
+
+
+def _broken(facts: Facts) -> bool | None:
+    return None if facts.broken_share is None else facts.broken_share > MOST_BROKEN
+
+
+def _shaking(facts: Facts) -> bool | None:
+    if facts.rate_hz is None and facts.step_n is None:
+        return None
+    slow = facts.rate_hz is not None and facts.rate_hz < LEAST_HZ
+    return slow or (facts.step_n is not None and facts.step_n > LARGEST_STEP_N)
+
+
+def _late(facts: Facts) -> bool | None:
+    return None if facts.round_trip_s is None else facts.round_trip_s >= LONGEST_ROUND_TRIP_S
+
+
+MODES: Final = (
+    Mode(
+        "upload",
+        "its firmware loads (several attempts are normal)",
+        "its firmware could not be loaded (several attempts are normal)",
+        "handshake or echo of its boot loader was disturbed",
+        {
+            OTHER: f"check that its mains adapter is plugged in, then {_PORT[OTHER]}",
+            "darwin": f"check that its mains adapter is plugged in, then {_PORT['darwin']}",
+        },
+        "the step at which loading ended, in ten attempts that each open it anew",
+        _upload,
+    ),
+    Mode(
+        "permission",
+        "it is accessible without administrator rights",
+        "only the administrator can open it",
+        "this account may not open it",
+        {
+            "linux": f"put the line '{UDEV_RULE}' into {RULES_FILE}, run 'sudo udevadm control --reload', then plug "
+            "the Falcon in again",
+            OTHER: "give this account the permission to use USB devices, then plug the Falcon in again",
+        },
+        "libusb's error -3",
+        _usb("access", but="darwin win32"),
+        paste=f"echo '{UDEV_RULE}' | sudo tee {RULES_FILE} && sudo udevadm control --reload",
+    ),
+    Mode(
+        "windows-driver",
+        "its driver lets programs open it",
+        "Windows lists it, but it cannot be opened",
+        "its present driver does not let programs open it, and FTDI's library (ftd2xx) is not there",
+        {
+            "win32": "install FTDI's D2XX driver; or put WinUSB in its place with Zadig, which shuts out Novint's and "
+            "Force Dimension's own programs until the old driver is chosen again in the Device Manager",
+            OTHER: "let libusb have it: remove the driver that was made for it",
+        },
+        "libusb's error -12",
+        _not_supported,
+    ),
+    Mode(
+        "two-drivers",
+        "only one driver is bound to it",
+        "Windows lists it, FTDI's driver shows none",
+        "Force Dimension's driver is bound to it, which FTDI's D2XX cannot share",
+        {
+            "win32": "in the Device Manager choose Update driver, Let me pick, and there FTDI's (or Novint's) driver, "
+            "or put WinUSB in its place with Zadig",
+            OTHER: "",
+        },
+        "it is in the list of USB devices and not in that of D2XX",
+        _two_drivers,
+    ),
+    Mode(
+        "firmware-file",
+        "its firmware is available",
+        "there is no firmware for it",
+        "it has no program since it was switched on, and none may be given away with this software",
+        {
+            OTHER: "give --firmware PATH, the file nvent_firmware.bin (8492 bytes, SHA-256 1119e39c39fab1f3…) that "
+            "came with your Falcon's software; if another program loaded it just now, check its mains adapter"
+        },
+        "it answers no packet, and no file was given, or one that is no firmware",
+        _file,
+    ),
+    Mode(
+        "stroke-in",
+        "it homes: every arm has passed its index",
+        "it does not home: no lock is felt",
+        "not every arm has passed its index",
+        {OTHER: "push the grip fully in, as far as it goes, then pull it out"},
+        "its encoders move, and an arm's homed bit stays 0",
+        _stroke_in,
+    ),
+    Mode(
+        "stroke-out",
+        "its grip was pulled out after homing",
+        "it is homed, and gives no force",
+        "it is homed, but its grip was not pulled out since",
+        {OTHER: "pull it fully out, toward you"},
+        "all arms homed, and the grip never beyond 170 mm",
+        _stroke_out,
+    ),
+    Mode(
+        "power",
+        "it responds",
+        "its bridge is there, its arms are limp",
+        "it does not answer",
+        {OTHER: "check its mains adapter, then unplug it, plug it in and start again"},
+        "no packet comes back, though the bridge takes them",
+        _power,
+    ),
+    Mode(
+        "frozen",
+        "its encoders move",
+        "its positions stand still",
+        "its encoders do not move",
+        {OTHER: "check its mains adapter; if the grip was moved, switch it off and on, then load its firmware again"},
+        "replies with the same encoders while the grip was to be moved",
+        _frozen,
+    ),
+    Mode(
+        "broken-packets",
+        "every packet gets a complete reply",
+        "it trembles, or buttons seem pressed that are not",
+        f"more than {MOST_BROKEN:.1%} of its packets get no whole reply",
+        {OTHER: f"try another cable, then {_PORT[OTHER]}", "darwin": f"try another cable, then {_PORT['darwin']}"},
+        "packets sent and whole replies received, counted",
+        _broken,
+    ),
+    Mode(
+        "shaking",
+        "the servo keeps its rate, and the force does not jump",
+        "it shakes or twitches",
+        f"the servo runs slower than {LEAST_HZ:.0f} times a second, or the force jumps by more than {LARGEST_STEP_N} N",
+        {
+            OTHER: "close other programs, plug the machine in, switch power saving off, and see what `liquid-study "
+            "soak` says of this machine"
+        },
+        "ticks counted against the clock; the step of the force between two of them",
+        _shaking,
+    ),
+    Mode(
+        "slow",
+        "its replies come in time",
+        "it feels coarse, as at 60 or 300 Hz",
+        f"a reply takes {1000 * LONGEST_ROUND_TRIP_S:.0f} ms or longer: the bridge's timer holds it back",
+        {
+            OTHER: f"close programs that use other serial adapters of FTDI, then {_PORT[OTHER]}",
+            "win32": "set the latency timer of its port to 1 ms in the Device Manager, under Advanced",
+        },
+        "the median of fifty round trips, with the bridge's event character and without",
+        _late,
+    ),
+    Mode(
+        "mac-driver",
+        "no driver of macOS keeps it",
+        "macOS denies access to it",
+        "a driver of FTDI's has taken it",
+        {
+            "darwin": "remove FTDIUSBSerialDriver.kext from /Library/Extensions, or D2xxHelper, then start the Mac "
+            "again",
+            OTHER: "",
+        },
+        "libusb's error -3 on macOS",
+        _usb("access", platform="darwin"),
+    ),
+    Mode(
+        "kernel-driver",
+        "no driver of Linux keeps it",
+        "Linux has made a serial port of it",
+        "a driver of the system holds it and does not let go",
+        {"linux": "run 'sudo modprobe -r ftdi_sio', and take '0403 cb48' out of what writes to its new_id", OTHER: ""},
+        "the kernel's driver is active on its interface and cannot be detached",
+        _usb("kernel-driver"),
+        paste="sudo modprobe -r ftdi_sio",
+    ),
+    Mode(
+        "busy",
+        "no other program holds it",
+        "it cannot be claimed",
+        "another program holds it",
+        {
+            OTHER: "close that program: another liquid-study, findfalcons, a viewer of H3D, a game, or Force "
+            "Dimension's tools"
+        },
+        "libusb's error -6, or -3 on Windows",
+        _busy,
+    ),
+    Mode(
+        "unplugged",
+        "it stayed connected",
+        "it was lost in use",
+        "it is no longer there",
+        {
+            OTHER: "switch it off if it pushes; check the cable, plug it in again, home it and resume: the trial is "
+            "marked and what was recorded is kept"
+        },
+        "libusb's error -4",
+        _usb("no-device"),
+    ),
+    Mode(
+        "not-connected",
+        "it is connected",
+        "it is not found",
+        "none is connected",
+        {
+            OTHER: "connect the USB cable and the power adapter",
+            "win32": "connect the USB cable directly to the machine, and the power adapter",
+            "darwin": "connect the USB cable through a powered hub, and the power adapter",
+        },
+        "no USB device 0403:cb48",
+        _usb("not-found"),
+    ),
+    Mode(
+        "no-libusb",
+        "libusb is loaded",
+        "no USB device is found at all",
+        "libusb cannot be loaded",
+        {OTHER: "install libusb-package again: pip install --force-reinstall libusb-package"},
+        "libusb does not load",
+        _usb("no-backend"),
+    ),
+    Mode(
+        "no-ftd2xx",
+        "FTDI's driver library is loaded where it is needed",
+        "FTDI's driver is of no use",
+        "FTDI's driver library (ftd2xx) cannot be loaded",
+        {OTHER: "install FTDI's D2XX driver"},
+        "neither ftd2xx64.dll nor ftd2xx.dll loads",
+        _usb("no-ftd2xx"),
+    ),
+    Mode(
+        "transfer",
+        "its transfers succeed",
+        "a transfer failed",
+        "the bridge did not carry out a transfer, or not in time",
+        {OTHER: f"check cable and mains adapter, then {_PORT[OTHER]}"},
+        "another error of libusb, which the message names",
+        _usb("io", "timeout", "overflow", "pipe"),
+    ),
+)
+BY_ID: Final = {mode.id: mode for mode in MODES}
+
+
+def diagnose(facts: Facts) -> list[Mode]:
+    """Return the modes that the facts show, in their order."""
+    return [mode for mode in MODES if mode.shown_by(facts)]
+
+
+def sentence(facts: Facts) -> str:
+    """Return cause and cure of what the facts show, in a line; "" where they show nothing wrong."""
+    return "; ".join(f"{mode.cause}: {mode.cure(facts.platform)}" for mode in diagnose(facts)[:1])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from study_app.devices.falcon.diagnosis import sentence
-from study_app.devices.falcon.failure_modes import Facts
+from study_app.devices.falcon.facts import Facts
+from study_app.devices.falcon.failure_modes import sentence
 from study_app.devices.falcon.wire import constants
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound
 
@@ -39,7 +39,7 @@ class ProgramMissing(FalconFailure):
 class UsbFailure(FalconFailure):
     """A transfer, or the way to it, failed.
 
-    ``kind`` is the word by which diagnosis knows it (of ``KINDS`` or ``FURTHER_KINDS``), ``where`` what was being
+    ``kind`` is the word by which `failure_modes` knows it (of ``KINDS`` or ``FURTHER_KINDS``), ``where`` what was being
     done, ``code`` libusb's error, None where no transfer was tried.
     """
 

@@ -13,7 +13,7 @@ import struct
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.devices.falcon.failure_modes import Facts
+from study_app.devices.falcon.facts import Facts
 from study_app.devices.falcon.failures import ProgramMissing
 from study_app.devices.falcon.wire.constants import BOOT_KEY
 
@@ -22,7 +22,7 @@ _HEADER_BYTES: Final = 2 * (1 + _RESERVED_WORDS + 2)
 _BLOCK_HEAD: Final = struct.Struct("<HHH")
 _ADVICE: Final = "the usual one is nvent_firmware.bin, 8492 bytes, from the software of your Falcon"
 
-_KNOWN: Final = {
+KNOWN: Final = {
     ("1119e39c39fab1f3", "09b896a1"): "nvent_firmware.bin",
     ("b2700d5cd5ca217e", "84856c6a"): "test_firmware.bin",
     ("ae838730af34b582", "27ea64a4"): "novint_T0.bin",
@@ -67,7 +67,7 @@ def check(data: bytes) -> Firmware:
     _refuse_wrong_header(data)
     high, low = struct.unpack_from("<HH", data, _HEADER_BYTES - 4)
     digest = hashlib.sha256(data).hexdigest()
-    name = _KNOWN.get((digest[:16], digest[-8:]))
+    name = KNOWN.get((digest[:16], digest[-8:]))
     return Firmware(len(data), digest, high << 16 | low, _blocks(data), name)
 
 

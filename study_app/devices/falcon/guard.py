@@ -51,8 +51,8 @@ class Guard:
     def __init__(self, name: str, died: Callable[[], object] | None = None) -> None:
         self._name = name
         self._died = died
-        self._child: subprocess.Popen[bytes] | None = None
-        self._listener: threading.Thread | None = None
+        self.child: subprocess.Popen[bytes] | None = None
+        self.listener: threading.Thread | None = None
 
     def start(self) -> None:
         """Start it, and wait until it watches.
@@ -62,7 +62,7 @@ class Guard:
         DeviceError
             It does not start: then no force may be sent.
         """
-        if self._child is not None:
+        if self.child is not None:
             return
         command = [sys.executable, "-P", "-m", __spec__.name, self._name]  # -P: no modules of the present folder
         # In a session, or console, of its own: what ends the program with its terminal does not end its guard.
@@ -79,19 +79,19 @@ class Guard:
             child.wait()
             _close(child)
             raise DeviceError("the Falcon's guard process does not start, so no force may be sent: install again")
-        self._child = child
+        self.child = child
         refuse_suspension(self)
-        self._listener = threading.Thread(target=self._listen, args=(child, child.stdout), name="guard", daemon=True)
-        self._listener.start()
+        self.listener = threading.Thread(target=self._listen, args=(child, child.stdout), name="guard", daemon=True)
+        self.listener.start()
 
     @property
     def watching(self) -> bool:
         """Whether it was started, and is alive."""
-        return self._child is not None and self._child.poll() is None
+        return self.child is not None and self.child.poll() is None
 
     def _listen(self, child: subprocess.Popen[bytes], said: IO[bytes]) -> None:
         said.read()  # it says no more; so this ends when the guard does
-        if self._child is child and self._died is not None:
+        if self.child is child and self._died is not None:
             self._died()
 
     def stand_down(self) -> None:
@@ -107,15 +107,15 @@ class Guard:
 
         For a link that was lost: the Falcon may push on, and be back before anybody opens it.
         """
-        child, self._child = self._child, None
+        child, self.child = self.child, None
         allow_suspension(self)
         if child is None or child.stdin is None:
             return
         child.stdin.close()
-        threading.Thread(target=_see_off, args=(child, self._listener), name="guard", daemon=True).start()
+        threading.Thread(target=_see_off, args=(child, self.listener), name="guard", daemon=True).start()
 
     def _end(self, word: bytes) -> None:
-        child, self._child = self._child, None
+        child, self.child = self.child, None
         allow_suspension(self)
         if child is None or child.stdin is None:
             return
@@ -128,8 +128,8 @@ class Guard:
         except subprocess.TimeoutExpired:
             child.kill()
             child.wait()
-        if self._listener is not None:
-            self._listener.join()
+        if self.listener is not None:
+            self.listener.join()
         _close(child)
 
     def __enter__(self) -> Self:
@@ -169,7 +169,8 @@ def quiet(transport: Transport) -> int:
     return sent
 
 
-def _open_patiently(name: str) -> Transport:
+def open_patiently(name: str) -> Transport:
+    """Return the opened Falcon, tried again for ``PATIENCE_S``; then what prevents it is raised."""
     ends_s = time.monotonic() + PATIENCE_S
     while True:
         try:
@@ -190,7 +191,7 @@ def watch(name: str) -> int:
     if sys.stdin.buffer.read().endswith(WORD):
         return 0
     try:
-        transport = _open_patiently(name)
+        transport = open_patiently(name)
     except DeviceError as error:
         sys.stderr.write(f"the Falcon may still push: {error}; switch it off\n")
         return 2

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from study_app.devices.falcon.diagnosis import sentence
-from study_app.devices.falcon.failure_modes import OPEN, Facts
+from study_app.devices.falcon.facts import OPEN, Facts
+from study_app.devices.falcon.failure_modes import sentence
 from study_app.devices.falcon.failures import FalconFailure
 from study_app.devices.falcon.wire.replies import ALL_HOMED
 
@@ -40,18 +40,18 @@ class NotHomed(FalconFailure):
 
 def home(
     falcon: Any,
-    turn: Callable[[], None],
+    tick: Callable[[], None],
     now_s: Callable[[], float],
     tell: Callable[[str], object],
     *,
     patience_s: float = PATIENCE_S,
 ) -> None:
-    """Turn the exchange, without force, until all arms are homed and the grip was pulled out.
+    """Run the exchange, without force, until all arms are homed and the grip was pulled out.
 
     Parameters
     ----------
     falcon : record of ``exchange.FALCON``
-    turn : takes one turn of it, and lets a millisecond pass
+    tick : takes one tick of it, and lets a millisecond pass
     now_s : the time [s]
     tell : is given what to do, a line at a time
 
@@ -66,7 +66,7 @@ def home(
     announced = False
     tell(STROKES)
     while not falcon.pulled_out:
-        turn()
+        tick()
         _follow(falcon, lowest, highest)
         if falcon.homed and not announced:
             announced = True
@@ -90,7 +90,7 @@ def _follow(falcon: Any, lowest: list[int], highest: list[int]) -> None:
 
 
 def _trouble(falcon: Any, lowest: list[int], highest: list[int]) -> str:
-    """Return the reason why it is not homed, as far as it can be told."""
+    """Return the reason why it is not homed, as far as it is known."""
     if falcon.status.count == 0:
         return "silent"
     if falcon.homed:

@@ -28,8 +28,8 @@ LONGEST_TICK_S: Final = 4e-3
 def push(falcon: Any) -> None:
     """Turn ``force_n``, as much of it as passes the gate, into ``units`` for the motors.
 
-    ``held_n`` is then what the motors push with until they are told so, where the grip is now, and ``sent_n`` what they
-    push with after it [N].
+    ``held_n`` is then the force of the motors until the next command, where the grip is now, and ``sent_n`` the force
+    after it [N].
     """
     jacobian(falcon.mechanism, falcon.theta, falcon.position_m, falcon.rates)
     _motor_force(falcon, falcon.held_n)
@@ -64,13 +64,13 @@ def _choose_units(falcon: Any) -> None:
         for i in range(3):
             falcon.units[i] = 0
         return
-    _limit_growth(falcon)
+    limit_growth(falcon)
     torques(falcon.rates, falcon.force_n, falcon.torque_nm)
     falcon.shortened += motor_units(falcon.mechanism, falcon.torque_nm, falcon.units)
 
 
 @kernel
-def _limit_growth(falcon: Any) -> None:
+def limit_growth(falcon: Any) -> None:
     """Shorten what of the force is new and does not brake the grip to the servo's slew limit.
 
     New is the way from the nearest force that is a share (0 to 1) of the one held, so that a force that turns round

@@ -1,4 +1,4 @@
-"""Orders to a simulated hand, from any thread but one at a time: what every device with such a hand can be told."""
+"""Commands to a simulated hand, from any thread but one at a time."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ class HandOrders:
 
     def __init__(self, state: Any, workspace_m: tuple[float, float, float]) -> None:
         self.workspace_m = workspace_m
-        self._state = state
+        self.state = state
         self._order = records(ORDER, 1)
         self._motions: list[Any] = []
 
     def press(self, buttons: int) -> None:
         """Hold down exactly these buttons: button 1 is bit 0."""
-        self._state.buttons = buttons
+        self.state.buttons = buttons
 
     def release(self) -> None:
         """Let go of every button."""
-        self._state.buttons = 0
+        self.state.buttons = 0
 
     def hold(self, x_m: float, y_m: float, z_m: float) -> None:
         """Hold the handle at a place at once [m, hand frame]."""
@@ -91,19 +91,19 @@ class HandOrders:
     @property
     def aim_m(self) -> tuple[float, float, float]:
         """Where the hand (or the pointer) means to be now [m, hand frame]."""
-        x, y, z = self._state.hand.aim_m
+        x, y, z = self.state.hand.aim_m
         return float(x), float(y), float(z)
 
     @property
     def moving(self) -> bool:
         """Whether the last order is still being carried out."""
-        hand = self._state.hand
+        hand = self.state.hand
         return bool(hand.moving) or bool(hand.serial != hand.taken)
 
     def _tremble(self, random: Random | None, tremor_m: float) -> None:
         """Draw frequencies and phases of a tremor whose waves have this amplitude; None: always the same ones."""
         draw = (random or Random(0)).random  # noqa: S311 - a hand trembles, it keeps no secrets
-        hand = self._state.hand
+        hand = self.state.hand
         hand.tremor_m = tremor_m
         lowest, highest = TREMOR_HZ
         hand.tremor_hz = [[lowest + (highest - lowest) * draw() for _ in range(WAVES)] for _ in range(3)]
@@ -119,7 +119,7 @@ class HandOrders:
         order.kind = kind
         for name, value in fields.items():
             setattr(order, name, value)
-        post(self._state.hand, order)
+        post(self.state.hand, order)
 
 
 def hand_of(device: object) -> HandOrders | None:

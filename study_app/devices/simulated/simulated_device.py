@@ -62,8 +62,8 @@ class SimulatedDevice(HandOrders, Device):
         self._memory = records(SIMULATED, 1)
         super().__init__(self._memory[0], workspace_m)
         self.force_limit_n = force_limit_n
-        self._state.handle = handle
-        self._state.handle.stop_m = workspace_m
+        self.state.handle = handle
+        self.state.handle.stop_m = workspace_m
         self.context = int(self._memory.ctypes.data)
         self.read, self.write = _functions()
         self.hold(0.0, 0.0, 0.0)
@@ -71,24 +71,24 @@ class SimulatedDevice(HandOrders, Device):
     @property
     def dynamics(self) -> Dynamics:
         """The handle's own numbers; its delay as it is at 1 kHz."""
-        handle = self._state.handle
+        handle = self.state.handle
         return Dynamics(1e-3 * float(handle.delay), float(handle.quantum_m), float(handle.mass_kg))
 
     def unplug(self) -> None:
         """Answer no more, as a device whose cable was pulled."""
-        self._state.unplugged = 1
+        self.state.unplugged = 1
 
     def open(self) -> None:
         """Plug it in."""
-        self._state.unplugged = 0
+        self.state.unplugged = 0
 
     def close(self) -> None:
         """Take the force off the handle."""
-        let_go(self._state.handle)
+        let_go(self.state.handle)
 
     def describe(self) -> dict[str, Any]:
         """Return name and numbers for the receipt."""
-        handle = self._state.handle
+        handle = self.state.handle
         return {
             "name": self.name,
             "workspace_m": list(self.workspace_m),

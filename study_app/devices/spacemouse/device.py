@@ -59,7 +59,7 @@ class SpaceMouseDevice(PointedDevice):
         self._now_s = now_s
         self._model: Model | None = None
         self._open_hid: Any = None
-        self._thread: threading.Thread | None = None
+        self.thread: threading.Thread | None = None
         self._ending = threading.Event()
 
     def open(self) -> None:
@@ -72,7 +72,7 @@ class SpaceMouseDevice(PointedDevice):
         DeviceError
             There is one, and it cannot be opened or reports no motion.
         """
-        if self._thread is not None and self._thread.is_alive():
+        if self.thread is not None and self.thread.is_alive():
             return
         self.close()
         hid = self._hid if self._hid is not None else load_hid()
@@ -83,13 +83,13 @@ class SpaceMouseDevice(PointedDevice):
         self.release()
         super().open()
         self._ending.clear()
-        self._thread = threading.Thread(target=self._read_on, name="SpaceMouse", daemon=True)
-        self._thread.start()
+        self.thread = threading.Thread(target=self._read_on, name="SpaceMouse", daemon=True)
+        self.thread.start()
 
     def close(self) -> None:
         """Take the force off the handle and let go of the device; a second call does nothing."""
         super().close()
-        thread, self._thread = self._thread, None
+        thread, self.thread = self.thread, None
         if thread is not None:
             self._ending.set()
             thread.join()
@@ -108,7 +108,7 @@ class SpaceMouseDevice(PointedDevice):
         return super().describe() | own
 
     def _read_on(self) -> None:
-        """Read until it is closed, or gone: then the servo hears of it at its next turn."""
+        """Read until it is closed, or gone: then the servo hears of it at its next tick."""
         assert self._model is not None  # noqa: S101 - it is open
         moving = Displacement(0, 0, 0)
         place_m = self.aim_m

@@ -26,7 +26,7 @@ CANNOT_OPEN: Final = {
     "win32": "another program holds it: close it, and 3DxWare",
 }
 _NO_MOTION_INTERFACE: Final = (
-    "is connected, but shows no interface that reports motion (usage page 1, usage 8): switch the mouse itself on and "
+    "is connected, but has no interface that reports motion (usage page 1, usage 8): switch the mouse itself on and "
     "pair it, or use its cable"
 )
 
@@ -68,7 +68,8 @@ def choose(found: list[tuple[Model, dict[str, Any]]]) -> tuple[Model, bytes]:
     """
     if not found:
         raise DeviceNotFound(
-            "no SpaceMouse is connected: plug it in, or switch it on; known are " + ", ".join(m.name for m in MODELS)
+            "no SpaceMouse is connected: connect it, or turn it on; known models are "
+            + ", ".join(m.name for m in MODELS)
         )
     usages = [(one.get("usage_page") or 0, one.get("usage") or 0) for _, one in found]
     for wanted in (USAGE, (0, 0)):

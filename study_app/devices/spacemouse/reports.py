@@ -13,10 +13,10 @@ from typing import Final
 
 from study_app.haptics.model.layout import BUTTON_STOP
 
-DISPLACEMENT, ROTATION, BUTTONS, LED = 1, 2, 3, 4
+DISPLACEMENT, BUTTONS, LED = 1, 3, 4
 FULL_DEFLECTION: Final = 350
 DEAD_DEFLECTION: Final = 20
-"""A cap that nobody touches does not come to rest at exactly 0."""
+"""A released cap does not come to rest at exactly 0."""
 FULL_SPEED_MPS: Final = 0.25
 USAGE: Final = (1, 8)
 """Page and usage of the collection that reports motion: generic desktop, multi-axis controller."""

@@ -75,7 +75,7 @@ class Fit:
         """``rms_n`` over the same of the measured force."""
         return self.rms_n / _rms(self.measured_n)
 
-    def told(self, it: Parameter) -> tuple[str, str]:
+    def row(self, it: Parameter) -> tuple[str, str]:
         """Return a parameter's value and interval in words, to five digits; whole numbers as they are."""
         value, (lower, upper) = self.values[it.name], self.intervals[it.name]
         anything = lower <= max(it.least, 1e-12) * (1 + 1e-9) and upper >= it.most
@@ -127,7 +127,7 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
         correlation=correlation,
         told_apart=bool(acts.all()) and not pairs,
         warnings=(
-            *(["the search was given up before it came to an end: begin nearer, with --set"] if not ended else []),
+            *(["the search stopped before it converged: choose closer initial values with --set"] if not ended else []),
             *_of_the_parameters(problem, z, acts, half, {k for pair in pairs for k in pair}),
             *_of_pairs(names, pairs, correlation),
             *_of_the_residuals(residual_n, measured.force_n),
@@ -193,8 +193,8 @@ def _of_pairs(names: Sequence[str], pairs: Sequence[tuple[int, int]], correlatio
     for j, k in pairs:
         alike = f"(correlation {correlation[j, k]:.3f})".replace("-", "−")
         yield (
-            f"{names[j]} and {names[k]} cannot be distinguished by this motion {alike}: what "
-            "the one lacks the other makes up; fit one of them, or measure more kinds of motion"
+            f"{names[j]} and {names[k]} cannot be distinguished by this motion {alike}: each can compensate the "
+            "other; fit one of them, or measure more kinds of motion"
         )
 
 
@@ -206,11 +206,11 @@ def _of_the_parameters(
     for k, it in enumerate(problem.parameters):
         near = 1e-6 * max(1.0, abs(z[k]))
         if not acts[k]:
-            yield f"{it.name} does not change the force along this motion: {it.value:g} is where the search began"
+            yield f"{it.name} does not change the force along this motion: {it.value:g} is its initial value"
         elif z[k] - problem.least[k] < near or problem.most[k] - z[k] < near:
             yield (
-                f"{it.name} ended at the edge of its range, {values[k]:.6g}{_edge(problem, k, z)}: the best value may "
-                "lie beyond, and the intervals do not reckon with the edge"
+                f"{it.name} ended at the edge of its range, {values[k]:.6g}{_edge(problem, k, z)}: the best value "
+                "may lie beyond, and the intervals ignore the edge"
             )
         elif k not in paired and half[k] > (
             math.log(VAGUE) if coordinate(it).relative is False else abs(problem.u(z)[k]) / VAGUE
@@ -234,9 +234,9 @@ def _of_the_residuals(residual_n: Floats, force_n: Floats) -> Iterator[str]:
     if rho > max(FOLLOWING, CHANCE / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)
         yield (
-            f"residuals, {100 * share:.1f} % of the force, follow one another (correlation {rho:.3f} from row to row): "
-            "the model misses something, the sensor filters, or velocities from places blur sharp turns; intervals are "
-            "widened for it, and hold only if the model does"
+            f"residuals, {100 * share:.1f} % of the force, are autocorrelated (correlation {rho:.3f} from row to row): "
+            "the model misses something, the sensor filters, or velocities from positions blur sharp turns; the "
+            "intervals are widened for this, and are valid only if the model is"
         )
 
 

@@ -53,7 +53,7 @@ def read(path: Path) -> Measured:
     except OSError as error:
         raise StudyError(f"cannot read {path}: {error.strerror}; name a CSV file of {HEADER}") from error
     except UnicodeDecodeError as error:
-        raise StudyError(f"cannot read {path}: it is no UTF-8 text; name a CSV file of {HEADER}") from error
+        raise StudyError(f"cannot read {path}: it is not UTF-8 text; name a CSV file of {HEADER}") from error
     numbered = [(number, line) for number, line in numbered if not line.startswith("#")]
     header = next(csv.reader([numbered[0][1]]), []) if numbered else []
     names: tuple[str, ...] = PLACES + FORCES
@@ -82,7 +82,7 @@ def _rows(path: Path, numbered: list[tuple[int, str]], places: list[int]) -> Flo
         row = [_number(fields[place]) for place in places]
         if None in row:
             bad = fields[places[row.index(None)]]
-            raise StudyError(f"{path}, line {number}: {bad!r} is not a finite number; mend it or leave the row out")
+            raise StudyError(f"{path}, line {number}: {bad!r} is not a finite number; correct it or remove the row")
         rows.append(row)
     return np.array(rows, float)
 
@@ -131,7 +131,7 @@ def centred(motion: Motion) -> Motion:
     even = at_rate(motion, 1 / step_s)
     rows = 2 * max(math.floor(SMOOTHED_S / 2 / step_s), 1) + 1
     if len(even.t_s) < rows:
-        raise StudyError(f"{len(motion.t_s)} rows are too few to tell velocities from: measure for {SMOOTHED_S:g} s")
+        raise StudyError(f"{len(motion.t_s)} rows are too few to estimate velocities: measure for {SMOOTHED_S:g} s")
     slopes = savgol_filter(even.position_m, rows, 2, deriv=1, delta=step_s, axis=0)
     velocity_mps = np.column_stack([np.interp(motion.t_s, even.t_s, column) for column in slopes.T])
     return Motion(motion.t_s, motion.position_m, velocity_mps)
@@ -145,11 +145,11 @@ def at_rate(motion: Motion, rate_hz: float) -> Motion:
     Raises
     ------
     StudyError
-        Two rows are so far apart that nobody knows what was between them.
+        Two rows are too far apart to interpolate between them.
     """
     step_s = np.diff(motion.t_s)
     if len(step_s) == 0:
-        raise StudyError("one row is no motion: measure many, 20 a second at least")
+        raise StudyError("one row is not a motion: measure at least 20 rows per second")
     if step_s.max() > LONGEST_S:
         row, gap_s = int(step_s.argmax()) + 2, float(step_s.max())
         raise StudyError(f"row {row} comes {gap_s:.3g} s after the one before: {LONGEST_S:g} s is the most permitted")

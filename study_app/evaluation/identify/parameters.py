@@ -11,12 +11,12 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from study_app.errors import StudyError
-from study_app.haptics.model.scene import AddedMass, History, Liquid, Scene
+from study_app.haptics.model.effect import Effect
+from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.scene import Liquid, Scene
 
-THRESHOLDS: Final = ("breaking_angle_deg", "breaking_span_m", "resolution_m")
+THRESHOLDS: Final = tuple(name for effect in EFFECTS for name in effect.thresholds)
 """These decide for or against: the force does not change with them, or jumps."""
-
-_OF_EFFECTS: Final = ("wake", "local_wake", "current", "added_mass", "history")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ def find(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple[Parameter,
     """
     tables = dict(_tables(scene, _liquid(scene, liquid_id)))
     if not names:
-        raise StudyError("no parameter is named: say which to fit, such as drag_coefficient")
+        raise StudyError("no parameter is named: name one to fit, such as drag_coefficient")
     found = tuple(_parameter(tables, name) for name in names)
     for k, one in enumerate(found):
         for other in found[:k]:
@@ -91,43 +91,37 @@ def _liquid(scene: Scene, liquid_id: str) -> Liquid:
 def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
     """Yield the tables that say something about the force, in the order in which a plain name is looked for."""
     yield "liquid", liquid
-    for name in _OF_EFFECTS:
-        table = getattr(liquid, name)
-        if name in liquid.effects and table is not None:
-            yield name, _with_smoothing(scene, table)
+    for effect in EFFECTS:
+        if effect.model is not None and effect.name in liquid.effects:
+            yield effect.name, _closed(scene, effect, getattr(liquid, effect.name))
     yield "body", scene.body
 
 
-def _with_smoothing(scene: Scene, table: BaseModel) -> BaseModel:
-    """Return a table with the time that it smooths over, where it leaves that open."""
-    if isinstance(table, AddedMass):
-        return table.model_copy(update={"filter_s": scene.smoothing_s(table)})
-    if isinstance(table, History):
-        return table.model_copy(update={"smoothing_s": scene.smoothing_s(table)})
-    return table
+def _closed(scene: Scene, effect: Effect, table: BaseModel) -> BaseModel:
+    """Return a table with what follows from the scene where it leaves a parameter open."""
+    found = {name: of(scene) for name, of in effect.open_values.items() if getattr(table, name) is None}
+    return table.model_copy(update=found)
 
 
 def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
     place, _, field = name.rpartition(".")
     if field in THRESHOLDS:
         raise StudyError(
-            f"{name} cannot be fitted: it is a threshold, and the force does not change with it or jumps; "
-            "set it with --set and compare the residuals"
+            f"{name} cannot be fitted: it is a threshold, and the force jumps or does not depend on it; set it with "
+            "--set and compare the residuals"
         )
     numbers = {name: dict(_numbers(table)) for name, table in tables.items()}
     for table, fields in numbers.items():
         if field in fields and place in {"", table}:
             least, most, above, whole = fields[field]
             value = getattr(tables[table], field)
-            if value is None and field == "reach_m":
-                value = getattr(tables["body"], "diameter_m")  # noqa: B009 - a table of any kind
             if value is None:
-                raise StudyError(f"the scene gives no {name} to start from: give one with --set {name}=VALUE")
+                raise StudyError(f"the scene has no initial value of {name}: give one with --set {name}=VALUE")
             return Parameter(name, table, field, float(value), least, most, above, whole)
     known = sorted({field for fields in numbers.values() for field in fields} - set(THRESHOLDS))
     near = difflib.get_close_matches(field, known, n=1)
     meant = f"did you mean {near[0]!r}? " if near else ""
-    raise StudyError(f"nothing to fit is called {name!r}: {meant}this liquid and its effects have {', '.join(known)}")
+    raise StudyError(f"no parameter is called {name!r}: {meant}this liquid and its effects have {', '.join(known)}")
 
 
 def _numbers(table: BaseModel) -> Iterator[tuple[str, tuple[float, float, bool, bool]]]:

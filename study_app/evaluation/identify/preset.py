@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from study_app.evaluation import style
-from study_app.evaluation.identify import figure
+from study_app import figure_style as style
+from study_app.evaluation.identify import fit_figure
 from study_app.evaluation.identify.fit import CONFIDENCE, Fit
 from study_app.evaluation.identify.parameters import Parameter
 from study_app.haptics.runtime.offline import Table
@@ -25,7 +25,7 @@ def text(found: Fit) -> str:
     """Return the report: the parameters before and after with their intervals, the residual, and warnings."""
     rows = [
         ["parameter", "from", "fitted", f"{100 * CONFIDENCE:g} % interval"],
-        *([it.name, f"{it.value:.5g}", *found.told(it)] for it in found.parameters),
+        *([it.name, f"{it.value:.5g}", *found.row(it)] for it in found.parameters),
     ]
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     table = [
@@ -50,10 +50,13 @@ def write(found: Fit, to: Path, source: Path) -> tuple[Path, ...]:
     write_file(written[0], preset(found, source).encode())
     write_file(written[1], f"{text(found)}\n".encode())
     csv_files.write_columns(written[2], residuals(found))
-    drawn = figure.draw(found)
+    drawn = fit_figure.draw(found)
     for kind in style.FORMATS:
         written.append(to / f"{name}.{kind}")
-        write_file(written[-1], style.file_bytes(drawn, kind, f"{found.liquid_id}: measured and fitted force"))
+        write_file(
+            written[-1],
+            style.file_bytes(drawn, kind, f"{found.liquid_id}: measured and fitted force", style.PLOT_SETTINGS),
+        )
     return tuple(written)
 
 
@@ -77,7 +80,7 @@ def preset(found: Fit, source: Path) -> str:
         f"Fitted to {source.name} (SHA-256 {digest[:16]}…), {found.summary()}.",
         *(f"Warning: {warning}." for warning in found.warnings),
     )
-    notes = {_place(it, found): f"{100 * CONFIDENCE:g} %: {found.told(it)[1]}" for it in found.parameters}
+    notes = {_place(it, found): f"{100 * CONFIDENCE:g} %: {found.row(it)[1]}" for it in found.parameters}
     return scene_text(for_new_file(found.scene), said=said, notes=notes)
 
 

@@ -60,7 +60,7 @@ class DeviceRow(QWidget):
     def show_device(self, shown: DeviceShown) -> None:
         """Show a device as it was found."""
         self.chip.show_state(shown.tone, shown.sign, shown.word)
-        ways = shown.ways if shown.name == "falcon" else ()
+        ways = shown.ways if len(shown.ways) > 1 else ()
         for line, words in (
             (self.can, shown.can),
             (self.why, shown.why),

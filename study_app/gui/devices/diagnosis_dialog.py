@@ -1,20 +1,18 @@
-"""A Falcon's diagnosis: what goes on while it is looked over, then every mode of failure, found or not."""
+"""A device's diagnosis: what goes on while it is examined, then every mode of failure, found or not."""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QProgressBar, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.devices.doctor_report import Report, lines
-from study_app.devices.falcon.doctor.failure_report import findings_of
-from study_app.devices.falcon.doctor.worker import Examination, Said
-from study_app.devices.falcon.failure_modes import Facts
+from study_app.devices.doctor_worker import ExaminationClient, start_examination
+from study_app.devices.registry import doctor_of, title_of
 from study_app.errors import StoreError
 from study_app.gui.devices.failure_rows import FindingRow
 from study_app.gui.theme.theme import Theme, font
@@ -23,25 +21,18 @@ from study_app.gui.widgets.cards import Card, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.store.support import NAME, write_support
-from study_app.viewmodels.device_list import TITLES
+from study_app.workers.messages import Crashed, Refused
 
 LOOK_MS = 100
 PREPARING = "Preparing … The first time the driver is compiled, which takes about a minute."
 SIZE = QSize(820, 700)
 
 
-class Examined(Protocol):
-    """What goes on elsewhere (see ``devices.falcon.doctor.worker.Examination``)."""
-
-    def said(self) -> list[Said]: ...  # noqa: D102
-    def close(self) -> None: ...  # noqa: D102
-
-
-Begin: TypeAlias = Callable[..., Examined]
+Begin: TypeAlias = Callable[..., ExaminationClient]
 
 
 class DiagnosisDialog(QDialog):
-    """Looks a Falcon over, and shows what is wrong with it. Closing it ends the examination.
+    """Examines a device, and shows what is wrong with it. Closing it ends the examination.
 
     ``over(well)`` comes when the examination has said what it found.
 
@@ -50,13 +41,13 @@ class DiagnosisDialog(QDialog):
     parent, theme
         The window it belongs to, and its colours.
     name
-        Which Falcon: as ``--device`` takes it.
-    firmware
-        File of its program, where it needs one.
+        Which device: as ``--device`` takes it.
+    options
+        Values of its options, by name.
     note
         What else should be known, in a sentence.
     begin
-        What examines; it takes name and firmware.
+        Starts an examination; it takes name and options.
     """
 
     over = Signal(bool)
@@ -67,20 +58,20 @@ class DiagnosisDialog(QDialog):
         theme: Theme,
         name: str,
         *,
-        firmware: Path | None = None,
+        options: Mapping[str, str | Path] | None = None,
         note: str = "",
-        begin: Begin = Examination,
+        begin: Begin = start_examination,
     ) -> None:
         super().__init__(parent)
-        self._name, self._firmware, self._begin = name, firmware, begin
-        title = TITLES.get(name.partition(":")[0], name)
+        self._name, self._options, self._begin = name, options or {}, begin
+        title = title_of(name)
         self.setWindowTitle(f"Diagnose {title}")
         self.setModal(False)
-        self._examination: Examined | None = None
-        self._leaving: threading.Thread | None = None
+        self._examination: ExaminationClient | None = None
+        self.leaving: ExaminationClient | None = None
         self._wanted = False
         self.report: Report | None = None
-        self.rows = [FindingRow(finding) for finding in findings_of(Facts())]
+        self.rows = [FindingRow(finding) for finding in doctor_of(name).findings()]
         self.step = label(PREPARING, "body", "text2", wraps=True)
         self.note = label(note, "label", "warn", wraps=True)
         self.note.setVisible(bool(note))
@@ -91,11 +82,12 @@ class DiagnosisDialog(QDialog):
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(8)
         self.sign = Icon("pulse", "accent", 26)
-        self.again = ActionButton("repeat", "Examine again")
+        self.again = ActionButton("repeat", "Run again")
         self.copy = ActionButton("copy", "Copy report")
         self.support = ActionButton("save", "Save for support …")
         self.close_button = ActionButton("", "Cancel")
         self._lay_out(title)
+        self._order(self.rows)
         self._connect()
         self.setMinimumSize(680, 420)
         room = self.screen().availableSize()
@@ -172,17 +164,17 @@ class DiagnosisDialog(QDialog):
         self._look()
 
     def _look(self) -> None:
-        """Begin as soon as nothing else holds the Falcon; then take what was said since."""
-        if self._wanted and (self._leaving is None or not self._leaving.is_alive()):
+        """Begin as soon as nothing else holds the device; then take what was said since."""
+        if self._wanted and (self.leaving is None or self.leaving.ended):
             self._wanted = False
-            self._examination = self._begin(self._name, firmware=self._firmware)
-        for said in [] if self._examination is None else self._examination.said():
-            if isinstance(said, str):
-                self._say(said, "text", "pulse", "accent")
+            self._examination = self._begin(self._name, options=self._options)
+        for _, answer in [] if self._examination is None else self._examination.answers():
+            if isinstance(answer, str):
+                self._say(answer, "text", "pulse", "accent")
             else:
-                self._finish(said)
+                self._finish(answer)
 
-    def _finish(self, said: Said) -> None:
+    def _finish(self, said: Report | Refused | Crashed) -> None:
         """Show what was found, or why nothing could be looked at."""
         self._timer.stop()
         self.bar.hide()
@@ -191,7 +183,7 @@ class DiagnosisDialog(QDialog):
         self.close_button.show_action("", "Close")
         self._let_go()
         if not isinstance(said, Report):
-            self._say(_sentence(str(said)), "bad", "warning", "bad")
+            self._say(_sentence(said.sentence), "bad", "warning", "bad")
             self.over.emit(False)
             return
         self.report = said
@@ -240,7 +232,7 @@ class DiagnosisDialog(QDialog):
 
     def _ask_where(self) -> None:
         """Ask for a file, in a dialog that nothing waits for."""
-        dialog = QFileDialog(self, "Save a zip file for whoever helps", NAME, "Zip files (*.zip)")
+        dialog = QFileDialog(self, "Save a zip file for support", NAME, "Zip files (*.zip)")
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix("zip")
         dialog.fileSelected.connect(lambda path: self.save_support(Path(path)))
@@ -255,15 +247,16 @@ class DiagnosisDialog(QDialog):
         except StoreError as error:
             self.seen.setText(_sentence(str(error)))
         else:
-            self.seen.setText(f"Saved as {path}. No participant's id, answer or liquid's value is in it.")
+            self.seen.setText(
+                f"Saved as {path}. It contains no participant id, no answers and no parameters of liquids."
+            )
         self.seen.show()
 
     def _let_go(self) -> None:
-        """Have what goes on end, in a thread: the process closes the Falcon first, and nothing waits for that here."""
-        examination, self._examination = self._examination, None
-        if examination is not None:
-            self._leaving = threading.Thread(target=examination.close, name="diagnosis leaving", daemon=True)
-            self._leaving.start()
+        """Have the process end: it closes the device first, and nothing waits for that here."""
+        if self._examination is not None:
+            self._examination.close()
+            self.leaving, self._examination = self._examination, None
 
     def done(self, result: int) -> None:
         """End the examination, however the dialog is closed."""

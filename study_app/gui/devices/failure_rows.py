@@ -17,7 +17,7 @@ from study_app.viewmodels.tones import Tone
 STATES: dict[State, tuple[Tone, str, str]] = {
     "ok": ("ok", "check", "OK"),
     "found": ("bad", "warning", "Found"),
-    "not looked at": ("neutral", "ring", "Not looked at"),
+    "not checked": ("neutral", "ring", "Not checked"),
 }
 WAITING: tuple[Tone, str, str] = ("neutral", "clock", "Waiting")
 
@@ -36,10 +36,10 @@ class Paste(QWidget):
         self.field = QLineEdit(text)
         self.field.setReadOnly(True)
         self.field.setFont(font("label", weight=400))
-        self.field.setAccessibleName("To paste into a terminal")
+        self.field.setAccessibleName("Command for a terminal")
         self.field.setCursorPosition(0)
         self.copy = ActionButton("copy", "Copy", height=38)
-        self.copy.setAccessibleName("Copy what to paste")
+        self.copy.setAccessibleName("Copy command")
         self.copy.setAutoDefault(False)
         self.copy.clicked.connect(self._copy)
         row = QHBoxLayout(self)
@@ -84,7 +84,7 @@ class FindingRow(Themed, QWidget):
         self.show_waiting()
 
     def show_waiting(self) -> None:
-        """Say that nobody has looked yet."""
+        """Say that no diagnosis has run yet."""
         self._show(WAITING, self.finding, found=False)
 
     def show_finding(self, finding: Finding) -> None:
@@ -123,15 +123,15 @@ class FindingRow(Themed, QWidget):
         grid.setHorizontalSpacing(14)
         grid.setVerticalSpacing(4)
         grid.setColumnStretch(1, 1)
-        told = (("Cause", capital(finding.cause)), ("Cure", capital(finding.cure)), ("Known by", finding.known_by))
-        for row, (name, words) in enumerate((name, words) for name, words in told if words):
+        rows = (("Cause", capital(finding.cause)), ("Cure", capital(finding.cure)), ("Detected by", finding.known_by))
+        for row, (name, words) in enumerate((name, words) for name, words in rows if words):
             text = label(words, "label", "text", wraps=True)
             text.setFont(font("label", weight=600 if name == "Cure" and self.found else 400))
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             grid.addWidget(label(name, "label", "text2"), row, 0, Qt.AlignmentFlag.AlignTop)
             grid.addWidget(text, row, 1)
         if finding.paste:
-            grid.addWidget(Paste(finding.paste), len(told), 1)
+            grid.addWidget(Paste(finding.paste), len(rows), 1)
         return whole
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name

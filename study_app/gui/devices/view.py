@@ -1,14 +1,19 @@
-"""The devices' place: what there is to feel with, which one sessions begin with, and what is wrong with a Falcon.
+"""The devices' place: every device, which one sessions begin with, and what is wrong with one.
 
 It draws values and says what is asked for; it opens no device.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
+from study_app.devices.descriptor import DeviceOption
 from study_app.gui.devices.device_rows import LEAST_WORDS, DeviceList
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import dress
@@ -16,27 +21,22 @@ from study_app.gui.widgets.cards import SHADOW, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
-from study_app.viewmodels.device_list import DeviceShown
+from study_app.viewmodels.device_list import DeviceShown, remembered_options
 
 STACKED_BELOW = 1000
-BESIDE = 340
+COLUMN_PX = 340
 NO_FILE = "No file chosen"
 
 
-class FirmwareCard(Card):
-    """The file of a Falcon's program; ``chosen`` carries its path, None to forget it."""
+class OptionCard(Card):
+    """The file of a device's option; ``chosen`` carries its path, None to forget it."""
 
     chosen = Signal(object)
 
-    def __init__(self) -> None:
-        super().__init__("Falcon's firmware", gap=8)
-        about = label(
-            "A Falcon has no program until one is loaded, and none may be given away with this software. Choose the "
-            "file you hold; it is loaded only where the Falcon needs it.",
-            "label",
-            "text2",
-            wraps=True,
-        )
+    def __init__(self, option: DeviceOption) -> None:
+        super().__init__(option.title, gap=8)
+        self._option = option
+        about = label(option.about, "label", "text2", wraps=True)
         about.setFont(font("label", weight=400))
         about.setMinimumWidth(LEAST_WORDS)
         self.file = Elided("label", "text")
@@ -61,7 +61,7 @@ class FirmwareCard(Card):
         self.forget.setEnabled(path is not None)
 
     def _choose(self) -> None:
-        path, _ = QFileDialog.getOpenFileName(self, "Falcon's firmware", self._path, "Firmware (*.bin);;All files (*)")
+        path, _ = QFileDialog.getOpenFileName(self, self._option.title, self._path, self._option.file_filter)
         if path:
             self.chosen.emit(path)
 
@@ -72,9 +72,9 @@ class HelpCard(Card):
     def __init__(self) -> None:
         super().__init__("Before the first session", gap=8)
         for words in (
-            "Plug in cable and mains adapter, then press “Refresh”.",
-            "“Diagnose …” finds, opens, loads, homes and turns it without force, and says what is wrong.",
-            "“liquid-study devices calibrate” measures how strong it is, with a known weight.",
+            "Connect the USB cable and the power adapter, then press “Refresh”.",
+            "“Diagnose …” finds, opens, loads, homes and tests the device without force, and says what is wrong.",
+            "“liquid-study devices calibrate” measures its force with a known weight.",
         ):
             line = label(words, "label", "text2", wraps=True)
             line.setFont(font("label", weight=400))
@@ -86,37 +86,37 @@ class DevicesPlace(Place):
     """Every device with its state.
 
     ``look_asked`` where the machine is to be looked at again; ``chosen`` carries the name of the device that sessions
-    begin with; ``firmware_chosen`` a path or None; ``diagnose_asked`` a Falcon's name; ``left`` comes with `leave`.
+    begin with; ``option_chosen`` an option's name, and a path or None; ``diagnose_asked`` a device's name; ``left``
+    comes with `leave`.
     """
 
     look_asked = Signal()
     chosen = Signal(str)
-    firmware_chosen = Signal(object)
+    option_chosen = Signal(str, object)
     diagnose_asked = Signal(str)
     left = Signal()
 
     def __init__(self) -> None:
         super().__init__()
         self._group = QButtonGroup(self)
-        self.people = DeviceList("To feel with", self._group)
-        self.simulated = DeviceList("Moves by itself", self._group)
-        self.firmware = FirmwareCard()
+        self.people = DeviceList("Input devices", self._group)
+        self.simulated = DeviceList("Simulated devices", self._group)
+        self.options = {option.name: OptionCard(option) for option in remembered_options()}
         self.help = HelpCard()
         self.refresh = ActionButton("repeat", "Refresh", key="F5")
         self.refresh.clicked.connect(self.look_asked)
         for part in (self.people, self.simulated):
             part.chosen.connect(self.chosen)
             part.diagnose_asked.connect(self.diagnose_asked)
-        self.firmware.chosen.connect(self.firmware_chosen)
+        for name, card in self.options.items():
+            card.chosen.connect(partial(self.option_chosen.emit, name))
         self._lay_out()
 
     def _lay_out(self) -> None:
         titles = QVBoxLayout()
         titles.setSpacing(4)
         titles.addWidget(label("Devices", "title"))
-        titles.addWidget(
-            label("The one that is marked is what a new session begins with.", "body", "text2", wraps=True)
-        )
+        titles.addWidget(label("New sessions use the selected device.", "body", "text2", wraps=True))
         head = QHBoxLayout()
         head.setContentsMargins(SHADOW, 0, SHADOW, 0)
         head.addLayout(titles, 1)
@@ -126,15 +126,16 @@ class DevicesPlace(Place):
         lists.addWidget(self.people)
         lists.addWidget(self.simulated)
         lists.addStretch()
-        beside = QVBoxLayout()
-        beside.setSpacing(18)
-        beside.addWidget(self.firmware)
-        beside.addWidget(self.help)
-        beside.addStretch()
+        column = QVBoxLayout()
+        column.setSpacing(18)
+        for card in self.options.values():
+            column.addWidget(card)
+        column.addWidget(self.help)
+        column.addStretch()
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(18)
         self._body.addLayout(lists, 1)
-        self._body.addLayout(beside)
+        self._body.addLayout(column)
         inside = QWidget()
         page = QVBoxLayout(inside)
         page.setContentsMargins(30, 30, 30, 22)
@@ -160,17 +161,18 @@ class DevicesPlace(Place):
 
     def show_devices(self, shown: tuple[DeviceShown, ...], preferred: str) -> None:
         """Show what was found, and which device sessions begin with."""
-        self.people.show_devices(tuple(one for one in shown if not _simulated(one)))
-        self.simulated.show_devices(tuple(one for one in shown if _simulated(one)))
+        self.people.show_devices(tuple(one for one in shown if not one.simulated))
+        self.simulated.show_devices(tuple(one for one in shown if one.simulated))
         self._group.setExclusive(False)  # or what is marked could not lose its mark
         for part in (self.people, self.simulated):
             part.mark(preferred.partition(":")[0])
             dress(part, self.theme)
         self._group.setExclusive(True)
 
-    def show_firmware(self, path: str | None) -> None:
-        """Show which file a Falcon's program is loaded from."""
-        self.firmware.show_file(path)
+    def show_options(self, values: Mapping[str, Path]) -> None:
+        """Show which files are chosen, by the option's name."""
+        for name, card in self.options.items():
+            card.show_file(str(values[name]) if name in values else None)
 
     def show_looking(self, looking: bool) -> None:
         """Say that the machine is being looked at."""
@@ -178,15 +180,11 @@ class DevicesPlace(Place):
         self.refresh.show_action("repeat", "Looking …" if looking else "Refresh")
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Make room: what is beside goes below."""
+        """Make room: move the side column below."""
         super().resizeEvent(event)
         stacked = self.width() < STACKED_BELOW
         way = QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight
         self._body.setDirection(way)
-        for card in (self.firmware, self.help):
-            card.setMinimumWidth(0 if stacked else BESIDE)
-            card.setMaximumWidth(16_777_215 if stacked else BESIDE)
-
-
-def _simulated(shown: DeviceShown) -> bool:
-    return shown.icon == "fast_forward"
+        for card in (*self.options.values(), self.help):
+            card.setMinimumWidth(0 if stacked else COLUMN_PX)
+            card.setMaximumWidth(16_777_215 if stacked else COLUMN_PX)

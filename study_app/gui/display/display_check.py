@@ -55,7 +55,7 @@ def missing_library(error: OSError | ImportError) -> DisplayError:
             f"Qt cannot be loaded: {library} is missing on this system; on Debian or Ubuntu: "
             f"sudo apt install {PACKAGES} ({NEEDS_NO_DISPLAY})"
         )
-    return DisplayError(f"Qt cannot be loaded ({error}): install liquid-study anew with pip")
+    return DisplayError(f"Qt cannot be loaded ({error}): reinstall liquid-study with pip")
 
 
 def platform_is_linux() -> bool:
@@ -67,7 +67,7 @@ def _load_plugin() -> None:
     """Load Qt's X11 plugin as Qt would, to hear which library is missing, if one is."""
     package = importlib.util.find_spec("PySide6")
     if package is None or package.origin is None:
-        raise DisplayError("PySide6 is not installed: install liquid-study anew with pip")
+        raise DisplayError("PySide6 is not installed: reinstall liquid-study with pip")
     plugin = Path(package.origin).parent / "Qt" / "plugins" / "platforms" / "libqxcb.so"
     if not plugin.exists():
         return  # Qt from the system's own packages brings what it needs

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.theme.icons import draw_icon
@@ -17,6 +17,7 @@ from study_app.gui.widgets.controls import PressedByEnter
 from study_app.gui.widgets.labels import label
 
 WIDE_RAIL, NARROW_RAIL = 216, 72
+FOCUS_RING = 2  # px
 
 
 class Destination(NamedTuple):
@@ -38,7 +39,7 @@ DESTINATIONS = (
 
 
 class RailButton(Themed, PressedByEnter):
-    """A place to go, or a switch, in the rail: icon and word; beside each other when wide, one below the other else."""
+    """A place to go, or a switch, in the rail: icon and word; side by side when wide, one below the other else."""
 
     def __init__(self, icon: str, word: str, short: str) -> None:
         super().__init__(word)
@@ -90,12 +91,16 @@ class RailButton(Themed, PressedByEnter):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)
         rect = QRectF(self.rect())
-        if self.here or self.underMouse() or self.hasFocus():
+        if self.here or self.underMouse():
             painter.setBrush(QColor(t.selected if self.here else t.hover))
             painter.drawRoundedRect(rect, RADIUS_CONTROL, RADIUS_CONTROL)
         if self.here and not self._narrow:
             painter.setBrush(QColor(t.accent))
             painter.drawRoundedRect(QRectF(0, 6, 3, rect.height() - 12), 1.5, 1.5)
+        if self.hasFocus():
+            painter.setPen(QPen(QColor(t.accent), FOCUS_RING))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(rect.adjusted(1, 1, -1, -1), RADIUS_CONTROL - 1, RADIUS_CONTROL - 1)
         ink = t.accent if self.here else t.text2
         if self._narrow:
             draw_icon(painter, self.icon_name, QRectF(rect.width() / 2 - 10, 8, 20, 20), ink)

@@ -17,10 +17,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.devices.registry import kind_of, list_devices
-from study_app.errors import StoreError
+from study_app.devices.registry import list_devices
+from study_app.errors import StudyError
 from study_app.gui.display.screens import screens_shown
-from study_app.gui.home.device_options import DEVICE_LABELS, device_or_default
+from study_app.gui.home.device_option_fields import DeviceOptionFields
 from study_app.gui.home.form_fields import add_field, field_with_button, text_field
 from study_app.gui.home.study_folder_state import StudyFolderState, read_study_folder_state
 from study_app.gui.theme.theme import LIGHT, Theme, font
@@ -29,13 +29,14 @@ from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.cards import Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
 from study_app.gui.widgets.labels import label, set_ink
+from study_app.protocol.groups.steps import refuse_beyond_last
 from study_app.session.request import NewSession, draw_seed, study_results
 from study_app.store.sessions.participant_ids import MAX_SESSION, check_participant
 from study_app.store.workstation import DEFAULTS, MachineSettings
+from study_app.viewmodels.device_list import device_label, device_or_default
 from study_app.viewmodels.home import LANGUAGES, StudyFacts
 from study_app.workspace import workspace
 
-NEEDS_FIRMWARE = "falcon"
 FRAME = 60  # of a window, at most
 
 
@@ -49,7 +50,7 @@ class NewSessionDialog(QDialog):
     results
         Folder that holds the studies' folders; the study's own is suggested.
     machine
-        What is set for this machine: device, firmware and screen to begin with.
+        What is set for this machine: device, its options and screen to begin with.
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class NewSessionDialog(QDialog):
         self._reader.done.connect(self._take_state)
         self.setWindowTitle("New session")
         self.setModal(True)
-        self.setMinimumWidth(720)
+        self.setMinimumWidth(736)
         self._all_results = results
         self._suggested = str(study_results(results, facts.protocol.study.name, device_or_default(machine.device)))
         self.results = text_field("Results folder of this study")
@@ -81,10 +82,10 @@ class NewSessionDialog(QDialog):
         self.operator = text_field("Operator")
         self.language = Choice()
         self.device = Choice()
-        self.firmware = text_field("Falcon's firmware")
+        self.device_options = DeviceOptionFields(machine.device_options)
         self.screen_choice = Choice()
-        self.windowed = Check("In a window instead of full-screen")
-        self.pilot = Check("Pilot: framed, kept apart from the data")
+        self.windowed = Check("In a window instead of full screen")
+        self.pilot = Check("Pilot: marked by a frame, stored separately")
         self.verdict_icon = Icon("check", "ok", 18)
         self.verdict = label("", "label", "ok", wraps=True)
         self._free = 1, ""
@@ -111,10 +112,9 @@ class NewSessionDialog(QDialog):
             self.language.addItem(LANGUAGES.get(code, code), code)
         preferred = device_or_default(self._machine.device)
         for name in dict.fromkeys((*list_devices(), preferred)):
-            self.device.addItem(DEVICE_LABELS.get(name, name), name)
+            self.device.addItem(device_label(name), name)
         self.device.setCurrentIndex(self.device.findData(preferred))
-        self.firmware.setText(self._machine.firmware or "")
-        self.firmware.setPlaceholderText("Where it is switched on already: none")
+        self.device_options.show_device(preferred)
         screens = screens_shown()
         for screen in screens:
             self.screen_choice.addItem(f"Screen {screen.number}: {screen.words}", screen.number)
@@ -133,7 +133,7 @@ class NewSessionDialog(QDialog):
         for field in fields:
             field.setFont(font("body"))
         self.device.currentIndexChanged.connect(self._choose_device)
-        self.firmware.textChanged.connect(self._check)
+        self.device_options.changed.connect(self._check)
         self.pilot.toggled.connect(self._choose_pilot)
         self.participant.textChanged.connect(self._check)
         self.session.valueChanged.connect(self._check)
@@ -170,7 +170,7 @@ class NewSessionDialog(QDialog):
         add_field(grid, 0, 0, "Participant", self.participant, hint="letters and digits, no name")
         add_field(grid, 0, 1, "Session", self.session)
         grid.addLayout(self._judge(), 2, 0, 1, 2)
-        add_field(grid, 4, 0, "Seed", field_with_button(self.seed, another), hint="decides every order; recorded")
+        add_field(grid, 4, 0, "Seed", field_with_button(self.seed, another), hint="determines every order; recorded")
         add_field(grid, 4, 1, "Operator", self.operator)
         add_field(grid, 6, 0, "Language of the participant's pages", self.language)
         add_field(grid, 6, 1, "Device", self.device)
@@ -182,9 +182,7 @@ class NewSessionDialog(QDialog):
         grid.addLayout(both, 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
         folder = field_with_button(self.results, change)
         add_field(grid, 10, 0, "Results folder of this study", folder, hint=self.where, across=2)
-        self._firmware_row = self._ask_firmware()
-        grid.addWidget(self._firmware_row, 12, 0, 1, 2)
-        self._firmware_row.setVisible(self._takes_firmware)
+        grid.addWidget(self.device_options, 12, 0, 1, 2)
         self._area = QScrollArea()
         self._area.setWidgetResizable(True)
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -233,38 +231,14 @@ class NewSessionDialog(QDialog):
         below.addWidget(self._ways_row)
         return below
 
-    def _ask_firmware(self) -> QWidget:
-        """Return the row for a Falcon's firmware."""
-        find = ActionButton("", "Choose …", height=40)
-        find.setAutoDefault(False)
-        find.clicked.connect(self._choose_firmware)
-        row = QWidget()
-        inside = QGridLayout(row)
-        inside.setContentsMargins(0, 0, 0, 0)
-        inside.setVerticalSpacing(6)
-        hint = "loaded only where it needs it"
-        add_field(inside, 1, 0, "Falcon's firmware", field_with_button(self.firmware, find), hint=hint)
-        return row
-
     def _choose_folder(self) -> None:
         chosen = QFileDialog.getExistingDirectory(self, "Results folder of this study", self.results.text())
         if chosen:
             self.results.setText(chosen)
 
-    def _choose_firmware(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(
-            self, "Falcon's firmware", self.firmware.text(), "Firmware (*.bin);;All files (*)"
-        )
-        if chosen:
-            self.firmware.setText(chosen)
-
-    @property
-    def _takes_firmware(self) -> bool:
-        return kind_of(self.device.currentData()) == NEEDS_FIRMWARE
-
     def _choose_device(self) -> None:
-        """Ask for firmware where the device may need it, and for another folder where nobody feels it."""
-        self._firmware_row.setVisible(self._takes_firmware)
+        """Ask for the options of the device, and for another folder where it is simulated."""
+        self.device_options.show_device(self.device.currentData())
         self._suggest_folder()
         self._check()
 
@@ -301,9 +275,9 @@ class NewSessionDialog(QDialog):
         self._fit()
 
     def _look(self) -> None:
-        """Read the study's folder again, beside the window's thread: another program may use it, too."""
+        """Read the study's folder again, outside the window's thread: another program may use it, too."""
         if text := self.results.text().strip():
-            self._reader.run(partial(read_study_folder_state, Path(text), self.facts.protocol.study.name))
+            self._reader.run(partial(read_study_folder_state, Path(text), self.facts.protocol))
 
     def _take_state(self, state: StudyFolderState) -> None:
         if state.path == Path(self.results.text().strip()) and state != self._state:
@@ -314,7 +288,7 @@ class NewSessionDialog(QDialog):
         """Return the study's folder as it was last read; one that was just chosen is read at once."""
         path = Path(self.results.text().strip() or ".")
         if self._state is None or self._state.path != path:
-            self._state = read_study_folder_state(path, self.facts.protocol.study.name)
+            self._state = read_study_folder_state(path, self.facts.protocol)
         return self._state
 
     def _fault(self) -> str:
@@ -327,11 +301,11 @@ class NewSessionDialog(QDialog):
             if state.fault:
                 return state.fault
             state.used.check_unused(participant, self.session.value())
-        except StoreError as error:
+            refuse_beyond_last(self.facts.protocol, self.session.value())
+        except StudyError as error:
             return str(error)
-        firmware = self.firmware.text().strip()
-        if self._takes_firmware and firmware and not Path(firmware).is_file():
-            return f"there is no firmware in {firmware}: choose the file, or leave the field empty"
+        if missing := self.device_options.fault():
+            return missing
         return "" if self.seed.hasAcceptableInput() else "the seed is a whole number from 0 to 2147483647"
 
     def _offer_ways(self) -> None:
@@ -366,5 +340,5 @@ class NewSessionDialog(QDialog):
             screen=self.screen_choice.currentData(),
             results=Path(self.results.text().strip()),
             pilot=self.pilot.isChecked(),
-            firmware=Path(firmware) if self._takes_firmware and (firmware := self.firmware.text().strip()) else None,
+            device_options=self.device_options.values(),
         )

@@ -1,24 +1,23 @@
-"""Rehearsing a protocol from the home window: asked here, run as a program of its own, so that nothing here waits."""
+"""Rehearsing a protocol from the home window, in a worker process, so that nothing here waits."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
-from PySide6.QtCore import QProcess, QTimer
+from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import wear
 from study_app.gui.widgets.controls import ActionButton, Number
 from study_app.gui.widgets.labels import label, set_ink
+from study_app.session.simulated.worker import TASK, RehearsalClient, RehearsalOrder
 from study_app.store.folders import rehearsal_folder
 from study_app.viewmodels.home import StudyFacts
+from study_app.workers.client import WorkerClient
 
 MAX_PARTICIPANTS = 200
-PATIENCE_MS = 2000
-DONE = "(simulated)"  # ends the line that is printed of a participant who is done
-ARGUMENTS = ("-m", "study_app", "rehearse")
+LISTEN_MS = 40
 
 
 class RehearsalDialog(QDialog):
@@ -47,7 +46,7 @@ class RehearsalDialog(QDialog):
         self.seed = Number(0, 2_147_483_647, 1)
         self.said = label(
             "Whole sessions run faster than real time, with simulated participants. "
-            f"They are marked as simulated and kept apart, in {self.folder}.",
+            f"They are marked as simulated and stored separately, in {self.folder}.",
             "body",
             "text2",
             wraps=True,
@@ -60,18 +59,17 @@ class RehearsalDialog(QDialog):
         self.start = ActionButton("fast_forward", "Rehearse", role="primary")
         self.cancel = ActionButton("", "Cancel")
         self.start.setDefault(True)
-        self.process = QProcess(self)
-        self.process.setProcessChannelMode(QProcess.ProcessChannelMode.MergedChannels)
-        self._told = ""
+        self.worker: RehearsalClient | None = None
+        self._done: list[str] = []
         self._stopping = False
         self.over = False
         self._lay_out()
         wear(self, theme)
         self.start.clicked.connect(self._start)
         self.cancel.clicked.connect(self.reject)
-        self.process.readyRead.connect(self._listen)
-        self.process.finished.connect(self._finished)
-        self.process.errorOccurred.connect(self._failed)
+        self._listening = QTimer(self)
+        self._listening.setInterval(LISTEN_MS)
+        self._listening.timeout.connect(self._listen)
 
     def _lay_out(self) -> None:
         column = QVBoxLayout(self)
@@ -101,69 +99,80 @@ class RehearsalDialog(QDialog):
         if self.over:
             self.accept()
             return
-        if self.process.state() != QProcess.ProcessState.NotRunning:
+        if self.worker is not None:
             return
         for field in (self.participants, self.seed, self.start):
             field.setEnabled(False)
         self.progress.setRange(0, self.participants.value())
         self.progress.show()
         self._show_done()
-        words = ("--participants", str(self.participants.value()), "--seed", str(self.seed.value()))
-        where = ("--results", str(self.folder))
-        self.process.start(sys.executable, [*ARGUMENTS, self._facts.source, *words, *where])
+        try:
+            self.worker = WorkerClient(TASK, name="rehearsal")
+        except OSError as error:
+            self._fail(str(error))
+            return
+        self.worker.order(RehearsalOrder(self._facts.source, self.participants.value(), self.seed.value(), self.folder))
+        self._listening.start()
 
     def _listen(self) -> None:
-        self._told += bytes(self.process.readAll().data()).decode(errors="replace")
-        self._show_done()
+        """Take the answers since; where the rehearsal is to stop, close once its process has ended."""
+        assert self.worker is not None  # noqa: S101 - listening begins with it
+        if self._stopping:
+            if self.worker.ended:
+                self._listening.stop()
+                super().reject()
+            return
+        for _, answer in self.worker.answers():
+            if isinstance(answer, str):
+                self._done.append(answer)
+                self._show_done()
+            elif isinstance(answer, Path):
+                self._finish()
+            else:
+                self._fail(answer.sentence)
 
     def _show_done(self) -> None:
-        """Show how many participants are done, by the lines that the rehearsal printed of them, and the last line."""
-        lines = self._told.strip().splitlines()
-        done = sum(line.endswith(DONE) for line in lines)
-        self.progress.setValue(done)
-        counted = f"{done} of {self.participants.value()}"
-        self.said.setText(f"{counted}: {lines[-1]}" if lines else f"{counted}: rehearsing …")
+        """Show how many participants are done, and what was said of the last one."""
+        self.progress.setValue(len(self._done))
+        counted = f"{len(self._done)} of {self.participants.value()}"
+        self.said.setText(f"{counted}: {self._done[-1]}" if self._done else f"{counted}: rehearsing …")
 
-    def _failed(self, error: QProcess.ProcessError) -> None:
-        """Say that there was no program to run; whatever else fails ends the process too."""
-        if error == QProcess.ProcessError.FailedToStart:
-            self._told = self.process.errorString()
-            self._finished(-1, QProcess.ExitStatus.CrashExit)
+    def _finish(self) -> None:
+        self._let_go()
+        self.over = True
+        self.said.setText(f"Done: {self.participants.value()} simulated sessions, stored in {self.folder}.")
+        self.start.show_action("", "Open results")
+        self.start.setEnabled(True)
+        self.start.setFocus()
+        self.cancel.setText("Close")
 
-    def _finished(self, code: int, _status: QProcess.ExitStatus) -> None:
-        if self._stopping:
-            super().reject()
-            return
-        self._listen()
-        self.progress.hide()
-        if code == 0:
-            self.over = True
-            self.said.setText(f"Done: {self.participants.value()} simulated sessions, kept in {self.folder}.")
-            self.start.show_action("", "Open results")
-            self.start.setEnabled(True)
-            self.start.setFocus()
-            self.cancel.setText("Close")
-            return
-        lines = self._told.strip().splitlines()
-        self.said.setText(lines[-1] if lines else f"The rehearsal ended with exit code {code}.")
+    def _fail(self, sentence: str) -> None:
+        self._let_go()
+        self.said.setText(sentence)
         set_ink(self.said, "bad")
         self.cancel.setText("Close")
 
+    def _let_go(self) -> None:
+        """Have the process end that has nothing to do any more."""
+        self._listening.stop()
+        self.progress.hide()
+        if self.worker is not None:
+            self.worker.close()
+
     def reject(self) -> None:
         """Have the rehearsal stop, if it runs, and close once it has."""
-        if self.process.state() == QProcess.ProcessState.NotRunning:
+        if self.worker is None or not self.worker.works:
             super().reject()
         elif not self._stopping:
             self._stopping = True
             self.cancel.setEnabled(False)
             self.said.setText("Stopping …")
-            self.process.terminate()
-            QTimer.singleShot(PATIENCE_MS, self.process, self.process.kill)
+            self.worker.close()
 
     def end(self) -> None:
         """Stop the rehearsal and wait for it: the windows are gone."""
-        if self.process.state() != QProcess.ProcessState.NotRunning:
-            self.reject()
-            if not self.process.waitForFinished(PATIENCE_MS):
-                self.process.kill()
-                self.process.waitForFinished(PATIENCE_MS)
+        if self.worker is not None:
+            self._stopping = True
+            self._listening.stop()
+            self.worker.close()
+            self.worker.wait_until_ended()

@@ -13,7 +13,7 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.session_columns import Column
+from study_app.viewmodels.session.columns import Column
 from study_app.viewmodels.sessions import KINDS, SessionFacts, counted
 
 COLUMNS = (
@@ -26,11 +26,11 @@ COLUMNS = (
 )
 EVERY = "every"
 NONE = {
-    "": "No participant’s session yet. The first one appears here when it begins.",
-    "pilot": "No pilot session.",
-    "simulated": "No simulated session.",
-    "sample": "No sample session.",
-    EVERY: "No session yet. The first one appears here when it begins.",
+    "": "No sessions of participants yet. The first one appears here when it begins.",
+    "pilot": "No pilot sessions.",
+    "simulated": "No simulated sessions.",
+    "sample": "No sample sessions.",
+    EVERY: "No sessions yet. The first one appears here when it begins.",
 }
 
 
@@ -74,7 +74,7 @@ class SessionsCard(Card):
         self.rows.chosen_changed.connect(lambda: self.details.setEnabled(self.rows.chosen is not None))
         self.details.clicked.connect(self.rows.open_chosen)
         self.details.setEnabled(False)
-        self.details.setAccessibleName("Details of the chosen session")
+        self.details.setAccessibleName("Details of the selected session")
         self._show_kinds()
         self.setMinimumHeight(200)
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPaintEvent, QPen, QRadialGradient
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QSpacerItem, QVBoxLayout
 
 from study_app.gui.theme.theme import RADIUS_CARD, TANK, font
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon
@@ -15,7 +15,7 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.viewmodels.device_list import DeviceShown
 
-PICTURE = 56
+PICTURE, INSET = 56, 8
 WAKE_POINTS = 48
 
 
@@ -67,13 +67,14 @@ class DeviceCard(Card):
 
 
 class LabCard(Card):
-    """The way into the liquid lab, under a picture of a ball and its wake."""
+    """The way into the liquid lab, under a picture of a ball and its wake, which is lower in a low window."""
 
     lab_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__(padding=20, gap=6)
-        self.column.addSpacing(PICTURE - 8)
+        self._picture = QSpacerItem(0, PICTURE - INSET, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Maximum)
+        self.column.addSpacerItem(self._picture)
         about = label("Tune a liquid by feel and save it.", "label", "text2", wraps=True)
         about.setFont(font("label", weight=400))
         self.open = ActionButton("", "Open", height=38)
@@ -97,7 +98,7 @@ class LabCard(Card):
         card = QPainterPath()
         card.addRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
         painter.setClipPath(card)
-        water = QRectF(body.left(), body.top(), body.width(), PICTURE)
+        water = QRectF(body.left(), body.top(), body.width(), self._picture.geometry().height() + INSET)
         depth = QLinearGradient(water.topLeft(), water.bottomLeft())
         depth.setColorAt(0, QColor(TANK.water_light))
         depth.setColorAt(1, QColor(TANK.water_light).darker(200))
@@ -120,7 +121,7 @@ def _paint_wake(painter: QPainter, water: QRectF) -> None:
         ink.setAlphaF(0.15 + 0.8 * share)
         painter.setPen(QPen(ink, 1.0 + 3.0 * share, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawLine(start, end)
-    middle, radius = points[-1], 13.0
+    middle, radius = points[-1], min(13.0, 0.4 * water.height())
     light = QRadialGradient(middle - QPointF(4, 5), 1.6 * radius)
     light.setColorAt(0, QColor(TANK.proxy_light))
     light.setColorAt(0.5, QColor(TANK.proxy))

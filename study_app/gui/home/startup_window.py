@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QElapsedTimer, Qt, QTimer, Signal
+import time
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
 
@@ -16,8 +19,7 @@ from study_app.viewmodels.number_words import minutes
 LONG_AFTER_S = 4.0
 STEP = "Opening the device and the force model …"
 FIRST_TIME = (
-    "The force model is being compiled for this machine, which is done once after an installation or a change "
-    "and takes about a minute."
+    "The force model is being compiled. This happens once after an installation or an update and takes about a minute."
 )
 
 
@@ -26,7 +28,9 @@ class OpeningWindow(QWidget):
 
     cancelled = Signal()
 
-    def __init__(self, title: str, who: str, *, theme: Theme = LIGHT) -> None:
+    def __init__(
+        self, title: str, who: str, *, theme: Theme = LIGHT, now_s: Callable[[], float] = time.monotonic
+    ) -> None:
         super().__init__()
         self.setWindowTitle("Liquid Study")
         self.setProperty("role", "window")
@@ -58,8 +62,7 @@ class OpeningWindow(QWidget):
         column.addWidget(self.step, 1)
         column.addWidget(bar)
         column.addLayout(foot)
-        self._since = QElapsedTimer()
-        self._since.start()
+        self._now_s, self._since_s = now_s, now_s()
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._tell)
         self._timer.start(250)
@@ -68,7 +71,7 @@ class OpeningWindow(QWidget):
         wear(self, theme)
 
     def _tell(self) -> None:
-        seconds = self._since.elapsed() / 1000
+        seconds = self._now_s() - self._since_s
         self.lasted.setText(minutes(seconds))
         if seconds > LONG_AFTER_S and not self._said:
             self.step.setText(FIRST_TIME)

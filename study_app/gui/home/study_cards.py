@@ -13,6 +13,7 @@ from study_app.gui.widgets.labels import Clamped, Elided, label
 from study_app.viewmodels.home import BrokenFacts, StudyFacts
 
 LEAST_WIDTH = 330
+GAP = 18
 LEAST_HEIGHT = 252
 ABOUT_LINES = 3
 
@@ -81,7 +82,7 @@ class CardGrid(QWidget):
         self.cards: list[QWidget] = []
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
-        self._grid.setSpacing(18)
+        self._grid.setSpacing(GAP)
         self._across = 0
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
@@ -95,7 +96,8 @@ class CardGrid(QWidget):
 
     def arrange(self, width: int) -> None:
         """Place the cards for a window that leaves them ``width``; a lone card does not stretch over it."""
-        across = max(1, width // LEAST_WIDTH)
+        least = max([LEAST_WIDTH, *(card.minimumSizeHint().width() for card in self.cards)])
+        across = max(1, (width + GAP) // (least + GAP))
         if across == self._across:
             return
         for column in range(self._grid.columnCount()):

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.store.blinded.blinding import check_conditions
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.participant_ids import UsedIds, used_ids
 from study_app.store.tables.study_description import check_study
@@ -20,13 +22,14 @@ class StudyFolderState:
     fault: str
 
 
-def read_study_folder_state(path: Path, study: str) -> StudyFolderState:
+def read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState:
     """Read the folder of a study; a folder that cannot be used has a ``fault``."""
     folder, fault = StudyFolder(path), ""
     used = UsedIds(path, frozenset(), ())
     try:
-        check_study(folder, study)
+        check_study(folder, protocol.study.name)
         used = used_ids(folder)
+        check_conditions(path, protocol)
     except StoreError as error:
         fault = str(error)
     return StudyFolderState(path, used, fault)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.devices.registry import kind_of
+from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
 from study_app.gui.application import open_here
 from study_app.gui.display.screens import screens_shown
@@ -31,6 +32,7 @@ from study_app.gui.widgets.main_view import Place
 from study_app.session.request import resumed
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.viewmodels.device_list import DeviceShown, looking
+from study_app.viewmodels.extent import extent_of
 from study_app.viewmodels.home import (
     BrokenFacts,
     Interrupted,
@@ -45,7 +47,7 @@ from study_app.viewmodels.sessions import SessionFacts, sessions
 from study_app.workspace import workspace
 
 STACKED_BELOW = 1080
-BESIDE = 326
+COLUMN_PX = 326
 
 
 class HomePlace(Place):
@@ -106,7 +108,7 @@ class HomePlace(Place):
         titles = QVBoxLayout()
         titles.setSpacing(4)
         titles.addWidget(label("Studies", "title"))
-        titles.addWidget(label("Choose a protocol to start a session, or go on where one stopped.", "body", "text2"))
+        titles.addWidget(label("Choose a protocol to start a session, or resume an interrupted one.", "body", "text2"))
         titles.addWidget(self.folder)
         head = QHBoxLayout()
         head.setContentsMargins(SHADOW, 0, SHADOW, 0)
@@ -129,14 +131,14 @@ class HomePlace(Place):
         page.addWidget(self.banner)
         page.addWidget(self.grid)
         page.addLayout(self._below, 1)
-        self._area = QScrollArea()
-        self._area.setWidgetResizable(True)
-        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._area.setWidget(inside)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setWidget(inside)
         row = QVBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
-        row.addWidget(self._area)
+        row.addWidget(self.area)
 
     @property
     def reading(self) -> bool:
@@ -165,12 +167,24 @@ class HomePlace(Place):
         for shown in cards:
             dress(shown, self.theme)
         self.grid.show_cards(cards)
+        self._order_focus()
         self._arrange()
 
+    def _order_focus(self) -> None:
+        """Let Tab go through the page as it is read: cards are made anew, and Qt would put them last."""
+        cards = [card for card in self.grid.cards if isinstance(card, StudyCard)]
+        sessions, device = self.sessions, self.device
+        parts: tuple[QWidget, ...] = (
+            self.open_protocol, self.banner.resume, *(button for card in cards for button in (card.new, card.rehearse)),
+            sessions.kind, sessions.details, sessions.all, sessions.rows.table,
+            device.devices, device.display, self.lab.open,
+        )  # fmt: skip
+        for before, after in pairwise(parts):
+            QWidget.setTabOrder(before, after)
+
     def show_sessions(self) -> None:
-        """Read the results folder again, beside the window's thread."""
-        studies = tuple(facts for facts in self._facts if isinstance(facts, StudyFacts))
-        self._reader.run(partial(_read, self.results, studies))
+        """Read the results folder again, outside the window's thread."""
+        self._reader.run(partial(_read, self.results, tuple(self._facts)))
 
     def _show_read(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
         results, found, stopped = read
@@ -196,10 +210,10 @@ class HomePlace(Place):
                 windowed=len(names) == 1,
                 screen=self.machine.screen_among(names),
             )
-            real = kind_of(chosen.device) == "falcon"
-            self.session_asked.emit(replace(chosen, firmware=self.machine.firmware_file if real else None))
+            options = descriptor_of(chosen.device).window_values(self.machine.device_options)
+            self.session_asked.emit(replace(chosen, device_options=options))
         except StudyError as error:
-            self.told.emit("The session cannot go on", f"{error}.")
+            self.message.emit("The session cannot be resumed", f"{error}.")
 
     def ask_for_rehearsal(self, facts: StudyFacts) -> None:
         """Open the questions before a rehearsal; the table shows what it left."""
@@ -230,7 +244,7 @@ class HomePlace(Place):
         if not chosen:
             return
         if holds_liquids_alone(chosen):
-            self.told.emit("This is a liquid file", f"{chosen} holds no study: open it in the liquid lab.")
+            self.message.emit("This is a liquid file", f"{chosen} is not a study: open it in the liquid lab.")
             return
         if chosen not in self._opened:
             self._opened.insert(0, chosen)
@@ -244,8 +258,8 @@ class HomePlace(Place):
         self._below.setDirection(down if stacked else right)
         self._beside.setDirection(right if stacked else down)
         for card in (self.device, self.lab):
-            card.setMinimumWidth(0 if stacked else BESIDE)
-            card.setMaximumWidth(16_777_215 if stacked else BESIDE)
+            card.setMinimumWidth(0 if stacked else COLUMN_PX)
+            card.setMaximumWidth(16_777_215 if stacked else COLUMN_PX)
         self.grid.arrange(self.width() - 56)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
@@ -254,9 +268,12 @@ class HomePlace(Place):
         self._arrange()
 
 
-def _read(results: Path, studies: tuple[StudyFacts, ...]) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
+def _read(
+    results: Path, studies: tuple[StudyFacts | BrokenFacts, ...]
+) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
     """Return the sessions in the results folder, and the one that can go on."""
-    answers = {facts.protocol.study.name: facts.protocol.responses_per_participant() for facts in studies}
+    counts = {it.name: set(extent_of(it.protocol).answers) for it in studies if isinstance(it, StudyFacts)}
+    answers = {name: max(each) for name, each in counts.items() if len(each) == 1}
     found = sessions(results, answers)
     return results, found, interrupted(found, studies, datetime.now().astimezone())
 

@@ -16,7 +16,7 @@ from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.lab.ab_comparison import Setting, other
 from study_app.viewmodels.lab import FormSection, LabView, form
 
-HIDDEN = "Hidden while blind"
+HIDDEN = "Hidden during a blind comparison"
 
 
 class SectionBlock(QWidget):
@@ -135,9 +135,9 @@ class FormPanel(Card):
         foot.addWidget(self.open, 1)
         foot.addWidget(self.use, 1)
         column.addWidget(Rule())
+        column.addWidget(self.said)  # above the buttons, which stay in their place when it appears
         column.addLayout(foot)
-        column.addWidget(self.said)
-        self.hidden = MaskedPanel(HIDDEN, "Parameters tell settings apart.")
+        self.hidden = MaskedPanel(HIDDEN, "Parameters would reveal which is which.")
         self._stack = QStackedLayout()
         self._stack.addWidget(whole)
         self._stack.addWidget(self.hidden)

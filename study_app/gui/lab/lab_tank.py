@@ -38,7 +38,6 @@ from study_app.gui.widgets.background import Background
 from study_app.viewmodels.lab import LabView, Point
 from study_app.viewmodels.number_words import grouped
 
-MOUSE = "mouse"
 WORKSPACE_M: Point = (0.1, 0.06, 0.06)
 BALL_M = 0.0034  # radius that the glass is made for: it stays where it is while the ball's own is changed
 RING = "break"
@@ -66,11 +65,11 @@ class LabTank(Themed, QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(420, 260)
         self._view: LabView | None = None
-        self._camera: Camera | None = None
+        self.camera: Camera | None = None
         self._workspace_m, self._radius_m = WORKSPACE_M, BALL_M
-        self._box = Box.around(WORKSPACE_M, BALL_M)
+        self.box = Box.around(WORKSPACE_M, BALL_M)
         self._placer: BallPlacer | None = None
-        self._still: Backdrop | None = None
+        self.still: Backdrop | None = None
         self._wanted: object = None
         self._painting = Background(self)
         self._painting.done.connect(self._take_still)
@@ -88,8 +87,8 @@ class LabTank(Themed, QWidget):
         self._view = view
         if view.workspace_m != self._workspace_m:
             self._workspace_m = view.workspace_m
-            self._box = Box.around(view.workspace_m, BALL_M)
-            self._camera = None
+            self.box = Box.around(view.workspace_m, BALL_M)
+            self.camera = None
         if view.body_radius_m != self._radius_m:
             self._radius_m, self._placer = view.body_radius_m, None
         if self.pointer.held and not self._takes_pointer:
@@ -106,7 +105,7 @@ class LabTank(Themed, QWidget):
     @property
     def _takes_pointer(self) -> bool:
         view = self._view
-        return view is not None and view.device.chosen == MOUSE and view.path is None and not view.busy
+        return view is not None and view.device.pointer and view.path is None and not view.busy
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
         """Take the pointer for the ball."""
@@ -130,7 +129,7 @@ class LabTank(Themed, QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Find the tank's place anew."""
         super().resizeEvent(event)
-        self._camera = None
+        self.camera = None
 
     def _take(self) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
@@ -145,13 +144,13 @@ class LabTank(Themed, QWidget):
 
     def _ready(self) -> Camera:
         """Return the camera of the present size."""
-        if self._camera is None:
+        if self.camera is None:
             room = (self.width() - 2 * MARGIN_X, self.height() - MARGIN_TOP - MARGIN_BOTTOM)
-            self._camera = Camera.fitted(self._box, MARGIN_X, MARGIN_TOP, *room, pitch=PITCH)
+            self.camera = Camera.fitted(self.box, MARGIN_X, MARGIN_TOP, *room, pitch=PITCH)
             self._placer = None
         if self._placer is None:
-            self._placer = BallPlacer(self._camera, self._box, self._radius_m)
-        return self._camera
+            self._placer = BallPlacer(self.camera, self.box, self._radius_m)
+        return self.camera
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint tank, tail, ball, arrows and words."""
@@ -166,7 +165,7 @@ class LabTank(Themed, QWidget):
         view = self._view
         open_view = view if view is not None and not view.workbench.blind else None
         tail = open_view.tail if open_view is not None else None
-        places = tail_places(tail, camera, self._box) if tail is not None else None
+        places = tail_places(tail, camera, self.box) if tail is not None else None
         if places is not None:
             paint_floor(painter, places)
         ball = self._ball()
@@ -183,16 +182,16 @@ class LabTank(Themed, QWidget):
         self._paint_corners(painter)
 
     def _still_of(self, camera: Camera) -> Backdrop | None:
-        """Return what stands still, painted for this size; None while it is being painted, beside this thread."""
-        wanted = ((self.width(), self.height()), self.devicePixelRatioF(), self._box, camera)
+        """Return what stands still, painted for this size; None while it is being painted in the background."""
+        wanted = ((self.width(), self.height()), self.devicePixelRatioF(), self.box, camera)
         if wanted != self._wanted:
-            self._wanted, self._still = wanted, None
+            self._wanted, self.still = wanted, None
             self._painting.run(lambda: (wanted, backdrop(*wanted)))
-        return self._still
+        return self.still
 
     def _take_still(self, painted: tuple[object, Backdrop]) -> None:
         if painted[0] == self._wanted:
-            self._still = painted[1]
+            self.still = painted[1]
             self.update()
 
     def _ball(self) -> BallPlace | None:
@@ -215,7 +214,7 @@ class LabTank(Themed, QWidget):
         """Paint the force on the hand and the wake that the body meets."""
         if view.now is None:
             return
-        high = ARROW_HEIGHTS * (self._box.water - self._box.floor)
+        high = ARROW_HEIGHTS * (self.box.water - self.box.floor)
         limit_n = max(view.workbench.in_hand.scene.force_limit_n, 1e-9)
         taken = QRectF()
         for word, vector, most, colour in (
@@ -255,7 +254,7 @@ class LabTank(Themed, QWidget):
         if view is None:
             return ""
         if view.workbench.blind:
-            return "Tail and arrows are hidden while blind"
+            return "Tail and arrows are hidden during a blind comparison"
         if view.tail is None:
             return "No tail yet" if "wake" in view.workbench.in_hand.scene.liquids[0].effects else "No wake, no tail"
         if view.tail.segments == 0:
@@ -265,7 +264,7 @@ class LabTank(Themed, QWidget):
 
     def _hint(self) -> str:
         if self.pointer.held:
-            return "The mouse moves the ball: click or Esc lets it go"
+            return "The mouse moves the ball: click or press Esc to release it"
         return "Click to move the ball with the mouse" if self._takes_pointer else ""
 
     def _paint_words(self, painter: QPainter, places: TailPlaces | None) -> None:
@@ -279,10 +278,13 @@ class LabTank(Themed, QWidget):
         pairs: list[tuple[Words, Words]] = [
             (
                 (self._first_words(), "lock" if bench.blind else ""),
-                (f"break: turned more than {angle:g}°" if isinstance(angle, int | float) else "", RING),
+                (f"break: turn of more than {angle:g}°" if isinstance(angle, int | float) else "", RING),
             ),
             (
-                (hint or ("Brighter and thicker is newer" if places is not None else ""), "mouse" if hint else ""),
+                (
+                    hint or ("Newer parts are brighter and thicker" if places is not None else ""),
+                    "mouse" if hint else "",
+                ),
                 (f"Tail of {view.felt}" if places is not None else "", ""),
             ),
         ]
@@ -290,9 +292,9 @@ class LabTank(Themed, QWidget):
             both = left[0] and right[0]
             crowded = both and self._wide(left) + self._wide(right) > self.width() - 2.5 * CHIP_EDGE
             top = CHIP_EDGE if row == 0 else self.height() - CHIP_EDGE - CHIP_HEIGHT
-            beside = top + (CHIP_HEIGHT + 6) * (1 if row == 0 else -1) if crowded else top
+            y = top + (CHIP_HEIGHT + 6) * (1 if row == 0 else -1) if crowded else top
             self._chip(painter, left, CHIP_EDGE, top)
-            self._chip(painter, right, self.width() - CHIP_EDGE - self._wide(right), beside)
+            self._chip(painter, right, self.width() - CHIP_EDGE - self._wide(right), y)
 
     def _wide(self, words: Words) -> float:
         return plate(words, self.devicePixelRatioF()).width() / self.devicePixelRatioF() if words[0] else 0.0

@@ -14,14 +14,15 @@ from study_app.gui.theme.themed import Themed, dress
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
 from study_app.gui.widgets.masked_panel import MaskedPanel
-from study_app.viewmodels.lab import CostRow, ErrorRow, LabView, LimiterShown
+from study_app.lab.limiters import Limiter
+from study_app.viewmodels.lab import CostRow, ErrorRow, LabView
 from study_app.viewmodels.number_words import grouped
 
 NAME_WIDTH = 84
 LINE = 26
 COST_HEIGHT, ERROR_HEIGHT = 236, 3 * LINE + 6  # of what is usual, kept free until it is measured
 UNKNOWN = "–"
-LEAST_NS = 1.0  # that a measurement beside a running servo can tell from nothing
+LEAST_NS = 1.0  # the smallest cost that a measurement next to a running servo resolves
 LimiterState = Literal["acting", "acted", "quiet"]
 
 
@@ -51,7 +52,7 @@ class ReadingCard(Card):
 
 
 class CostLine(QWidget):
-    """An effect, a bar as long as its share of the dearest, and its ns."""
+    """An effect, a bar as long as its share of the most expensive, and its ns."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -69,11 +70,11 @@ class CostLine(QWidget):
         row.addWidget(self.ns)
         self.setFixedHeight(LINE)
 
-    def show_cost(self, cost: CostRow, dearest_ns: float) -> None:
+    def show_cost(self, cost: CostRow, most_ns: float) -> None:
         """Show what an effect takes."""
         ns = cost.ns or 0.0
         self.name.show_text(cost.effect)
-        self.bar.show_share(ns / dearest_ns if dearest_ns > 0 else 0.0)
+        self.bar.show_share(ns / most_ns if most_ns > 0 else 0.0)
         words = f"{ns:.0f} ns" if ns >= LEAST_NS else f"< {LEAST_NS:g} ns"
         self.ns.setText(words)
         self.setAccessibleName(f"{cost.effect}: {words}")
@@ -82,7 +83,7 @@ class CostLine(QWidget):
         """Show that the number is not known now."""
         self.bar.show_share(0.0)
         self.ns.setText(UNKNOWN)
-        self.setAccessibleName(f"{self.name.accessibleName()}: being measured")
+        self.setAccessibleName(f"{self.name.accessibleName()}: measuring")
 
 
 class AbsentLine(QWidget):
@@ -111,7 +112,7 @@ class CostCard(ReadingCard):
     """What each effect takes of a tick."""
 
     def __init__(self) -> None:
-        super().__init__("Cost a tick", label("", "small", "text2"), "A price tells settings apart.")
+        super().__init__("Cost per tick", label("", "small", "text2"), "Costs would reveal which is which.")
         self.lines: list[CostLine] = []
         self.absent: list[AbsentLine] = []
         self._costs = QVBoxLayout()
@@ -143,11 +144,11 @@ class CostCard(ReadingCard):
             return
         here = [row for row in view.cost if row.ns is not None]
         away = [row for row in view.cost if row.ns is None]
-        dearest = max((row.ns or 0.0 for row in here), default=0.0)
+        most_ns = max((row.ns or 0.0 for row in here), default=0.0)
         _fit(self.lines, len(here), CostLine, self._costs, self)
         _fit(self.absent, len(away), AbsentLine, self._absent, self)
         for line, row in zip(self.lines, here, strict=True):
-            line.show_cost(row, dearest)
+            line.show_cost(row, most_ns)
         for gone, row in zip(self.absent, away, strict=True):
             gone.show_cost(row)
         tick_ns = view.tick_ns if view.tick_ns is not None else sum(row.ns or 0.0 for row in here)
@@ -165,7 +166,7 @@ class ErrorCard(ReadingCard):
     """How far the felt setting is from its reference."""
 
     def __init__(self) -> None:
-        why = "Errors tell settings apart."
+        why = "Errors would reveal which is which."
         super().__init__("Error against the reference", label("", "small", "text2"), why)
         self._grid = QGridLayout()
         self._grid.setColumnStretch(0, 1)
@@ -220,7 +221,7 @@ class LimiterLine(Themed, QWidget):
         row.addWidget(self.count)
         self.setFixedHeight(LINE + 2)
 
-    def show_limiter(self, limiter: LimiterShown) -> None:
+    def show_limiter(self, limiter: Limiter) -> None:
         """Show whether it acts, acted or did not."""
         state: LimiterState = "acting" if limiter.acting else "acted" if limiter.ticks else "quiet"
         self.name.show_text(limiter.name)
@@ -258,7 +259,7 @@ class LimiterCard(ReadingCard):
     """Which limiter acts, and in how many ticks of the last ten seconds each did."""
 
     def __init__(self) -> None:
-        why = "Limiters tell settings apart."
+        why = "Limiters would reveal which is which."
         super().__init__("Limiters", label("ticks, last 10 s", "small", "text2"), why)
         self.lines: list[LimiterLine] = []
         self._lines = QVBoxLayout()

@@ -11,10 +11,11 @@ from study_app.gui.widgets.controls import Choice, Toggle
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.number_field import NumberField, read_number, write_number
 from study_app.gui.widgets.sliders import Range, Slider
-from study_app.lab.parameters import OFF, ON, Parameter, Value
+from study_app.haptics.model.effect import Parameter, Value
+from study_app.lab.parameters import OFF, ON
 from study_app.viewmodels.lab import FormRow
 
-LABEL_WIDTH, FIELD_WIDTH, UNIT_WIDTH = 108, 86, 40
+LABEL_WIDTH, FIELD_WIDTH, UNIT_WIDTH = 108, 86, 44
 GAP = 8
 HEIGHT = 36
 SWITCHED = {OFF, ON}
@@ -115,8 +116,8 @@ class NumberRow(ParameterRow):
         self.field.setPlaceholderText("none" if number is None else "")
         self.name.setFont(font("label", weight=600 if row.changed else None))
         was = "none" if preset is None else it.shown(preset)
-        self.setToolTip(f"{it.shown(it.least)} to {it.shown(it.most)}; as chosen: {was}")
-        self.field.setAccessibleDescription(f"as chosen: {was}" if row.changed else "")
+        self.setToolTip(f"{it.shown(it.least)} to {it.shown(it.most)}; initially {was}")
+        self.field.setAccessibleDescription(f"initially {was}" if row.changed else "")
 
     def show_refused(self, why: str) -> None:
         """Say why, with a bad edge round what was typed."""
@@ -159,7 +160,7 @@ class NumberRow(ParameterRow):
     def _misread(self, text: str) -> None:
         preset = self._row.preset if self._row is not None else None
         example = self._text(preset) if isinstance(preset, int | float) else "1.5"
-        said = f"“{text}” is no number" if text.strip() else "This needs a number"
+        said = f"“{text}” is not a number" if text.strip() else "This needs a number"
         self.show_refused(f"{said}: write one such as {example}, or press Esc.")
 
     def _forget(self) -> None:

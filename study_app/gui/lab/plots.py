@@ -161,7 +161,7 @@ class CurvePlot(Plot):
         self.box.setYRange(-0.02 * self._top, self._top / (1 - share), padding=0)
 
 
-FORCE_SENTENCE = f"Size of the force of settings A and B on the same motion over the last {SPAN_S:g} s, in N."
+FORCE_SENTENCE = f"Magnitude of the force of settings A and B on the same motion over the last {SPAN_S:g} s, in N."
 SPEED_SENTENCE = f"Speed of the body, and of the wake in settings A and B, over the last {SPAN_S:g} s, in m/s."
 
 
@@ -180,7 +180,7 @@ class PlotCard(Card):
         column.addWidget(plot, 1)
         self.stack = QStackedLayout()
         self.stack.addWidget(shown)
-        self.stack.addWidget(MaskedPanel(HIDDEN, "A trace tells settings apart."))
+        self.stack.addWidget(MaskedPanel(HIDDEN, "A trace would reveal which is which."))
         self.column.addLayout(self.stack, 1)
         self.setMinimumHeight(226)
 

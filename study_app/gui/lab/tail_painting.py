@@ -18,9 +18,10 @@ from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
 from study_app.gui.participant.tank.camera import Box, Camera
 from study_app.gui.theme.theme import TANK
-from study_app.viewmodels.lab import Floats, TailShown
+from study_app.lab.wake_tail import Tail
+from study_app.viewmodels.lab import Floats
 
-SHADES = 14  # steps of age that are told apart
+SHADES = 14  # steps of age that are distinguished
 THICKEST_PX, THINNEST_PX = 5.0, 1.6
 RING_PX = 4.6
 HEAD_PX = 11.0
@@ -41,7 +42,7 @@ class TailPlaces:
     floor: tuple[QPolygonF, ...]
 
 
-def tail_places(tail: TailShown, camera: Camera, box: Box) -> TailPlaces:
+def tail_places(tail: Tail, camera: Camera, box: Box) -> TailPlaces:
     """Return where a tail goes on the screen of ``camera``."""
     count = len(tail.positions_m)
     x, y, z = (np.clip(tail.positions_m[:, k], *span) for k, span in enumerate(_inside(box)))
@@ -78,11 +79,11 @@ def paint_tail(painter: QPainter, places: TailPlaces) -> None:
     """Paint the segments from the oldest to the newest, a head on each that is long enough, then the breaks."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for shade, points in places.runs:
-        ink, width = _look(shade)
+        ink, width = shade_style(shade)
         painter.setPen(_round(ink, width))
         painter.drawPolyline(points)
     for place, turn, shade in places.heads:
-        ink, width = _look(shade)
+        ink, width = shade_style(shade)
         draw_head(painter, place, turn, ink.lighter(112), HEAD_PX + width)
     for place in places.breaks:
         draw_ring(painter, place)
@@ -108,7 +109,7 @@ def draw_head(painter: QPainter, tip: QPointF, turn: float, ink: QColor, size: f
 
 
 @lru_cache(maxsize=SHADES)
-def _look(shade: int) -> tuple[QColor, float]:
+def shade_style(shade: int) -> tuple[QColor, float]:
     """Return colour and width of a step of age, 0 the newest."""
     newness = 1.0 - shade / (SHADES - 1)
     old, new, mix = QColor(TANK.tail_old), QColor(TANK.tail), newness**1.6

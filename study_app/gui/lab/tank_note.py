@@ -16,7 +16,7 @@ EDGE, FOOT = 16, 56
 
 
 class TankNote(Card):
-    """One sentence and one button; nothing while all is well. Waiting is told only once it has taken 300 ms."""
+    """One sentence and one button; nothing while all is well. Waiting is shown only after 300 ms."""
 
     cancel_asked = Signal()
     fade_in_asked = Signal()

@@ -93,7 +93,7 @@ class LabPlace(Place):
         self._middle.setColumnStretch(0, 1)
         self._middle.setColumnStretch(1, 1)
         framed = QVBoxLayout()
-        framed.setContentsMargins(SHADOW, SHADOW - 1, SHADOW, SHADOW)  # as the cards beside and below it
+        framed.setContentsMargins(SHADOW, SHADOW - 1, SHADOW, SHADOW)  # as the neighbouring cards
         framed.addWidget(self.tank)
         self._middle.addLayout(framed, 0, 0, 1, 2)
         self._middle.addWidget(self.force, 1, 0)
@@ -115,7 +115,7 @@ class LabPlace(Place):
         column.addLayout(self._body, 1)
 
     def _arrange(self, *, wide: bool) -> None:
-        """Place the right column beside the middle, or under it where there is no room."""
+        """Place the right column next to the middle, or under it where there is no room."""
         if wide == self._wide:
             return
         self._wide = wide
@@ -186,7 +186,7 @@ class LabPlace(Place):
             part.show_view(view)
 
     def ask_where_to_save(self) -> None:
-        """Ask for the preset's file; nothing waits meanwhile, and the force can be stopped beside the dialog."""
+        """Ask for the preset's file; nothing waits meanwhile, and the force can be stopped while the dialog is open."""
         if (setting := self._free_to_ask()) is None:
             return
         dialog = self._file_dialog(f"Save preset: {setting.title}", "Presets")

@@ -29,7 +29,7 @@ class Actions(Card):
         self.repeat = ActionButton("repeat", "Repeat trial …", key="R")
         self.hint = label("", "label", "text2", wraps=True)
         self.hint.setFont(font("label", weight=400))
-        self.exclude = ActionButton("flag", "Leave out …", key="X")
+        self.exclude = ActionButton("flag", "Exclude …", key="X")
         self.end = ActionButton("cross", "End session …", role="danger")
         self.close_session = ActionButton("check", "Close session", role="primary")
         self._resumes = False
@@ -85,14 +85,14 @@ def _hint(view: OperatorView) -> str:
     if view.over:
         return "The journal is closed and the tables are written."
     if view.waits:
-        return "The force is off. What was answered is kept until the disk takes it."
+        return "The force is off. The answers are kept in memory until the disk accepts them."
     if view.state == "trouble":
-        return "The force is off. Everything answered before is on disk."
+        return "The force is off. All answers so far are on disk."
     if view.state == "force off":
-        return "The force comes back only when you ask for it."
+        return "The force returns only when you turn it on again."
     if view.state == "paused":
-        return "A trial that was under way starts again."
-    return "Repeating asks for a reason and keeps both recordings." if view.may_repeat else ""
+        return "An interrupted trial starts again."
+    return "You will be asked for a reason; both recordings are kept." if view.may_repeat else ""
 
 
 class RepeatQuestion(Question):
@@ -103,59 +103,59 @@ class RepeatQuestion(Question):
             parent,
             theme,
             "Repeat this trial?",
-            f"{setting} starts again from its beginning. What was recorded stays, with your reason beside it.",
+            f"{setting} starts again from the beginning. The first recording is kept, together with your reason.",
         )
         self.setting = setting
         self.reason = QLineEdit()
         self.reason.setFont(font("body"))
-        self.reason.setPlaceholderText("Reason, such as: phone rang")
+        self.reason.setPlaceholderText("Reason, for example: phone rang")
         self.reason.setAccessibleName("Reason")
         self.column.addWidget(self.reason)
-        self.add_buttons("Go on as it is", ActionButton("repeat", "Repeat trial", role="primary"))
+        self.add_buttons("Cancel", ActionButton("repeat", "Repeat trial", role="primary"))
         self.go_on.setEnabled(False)
         self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
 
 
 class ExcludeQuestion(Question):
-    """What is left out of the analysis, and why; ``trial`` is the one under way or the last, None before the first."""
+    """What to exclude from the analysis, and why; ``trial`` is the one under way or the last, None before the first."""
 
     def __init__(self, parent: QWidget, theme: Theme, trial: int | None, setting: str) -> None:
         super().__init__(
             parent,
             theme,
-            "Leave this out of the analysis?",
-            "Nothing is deleted: the list of exclusions says what does not count, by whom and why.",
+            "Exclude this from the analysis?",
+            "Nothing is deleted. The list of exclusions records what was excluded, by whom and why.",
         )
-        self._choices = QButtonGroup(self)
+        self.choices = QButtonGroup(self)
         self._trial = trial
-        for index, words in enumerate((setting, "The whole session")):
+        for index, words in enumerate((setting, "Whole session")):
             choice = Radio(words)
             choice.setFont(font("body"))
             choice.setVisible(index == 1 or trial is not None)
-            self._choices.addButton(choice, index)
+            self.choices.addButton(choice, index)
             self.column.addWidget(choice)
-        self._choices.button(1 if trial is None else 0).setChecked(True)
+        self.choices.button(1 if trial is None else 0).setChecked(True)
         self.reason = QLineEdit()
         self.reason.setFont(font("body"))
-        self.reason.setPlaceholderText("Reason, such as: talked during the trial")
+        self.reason.setPlaceholderText("Reason, for example: talked during the trial")
         self.reason.setAccessibleName("Reason")
         self.column.addWidget(self.reason)
-        self.add_buttons("Let it count", ActionButton("flag", "Leave out", role="primary"))
+        self.add_buttons("Cancel", ActionButton("flag", "Exclude", role="primary"))
         self.go_on.setEnabled(False)
         self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
 
     @property
     def trial(self) -> int | None:
         """Return the trial to leave out, None for the whole session."""
-        return self._trial if self._choices.checkedId() == 0 else None
+        return self._trial if self.choices.checkedId() == 0 else None
 
 
 class EndQuestion(Question):
     """Whether, and why, the session ends now."""
 
     STATUSES = (
-        ("withdrawn", "The participant withdraws"),
-        ("aborted", "I end it for another reason"),
+        ("withdrawn", "The participant withdrew"),
+        ("aborted", "Another reason"),
     )
 
     def __init__(self, parent: QWidget, theme: Theme, answers: str) -> None:
@@ -163,25 +163,25 @@ class EndQuestion(Question):
             parent,
             theme,
             "End this session now?",
-            f"{answers} answers are on disk and stay there. The force is switched off when the session ends.",
+            f"{answers} answers are on disk and are kept. The force is turned off when the session ends.",
         )
-        self._choices = QButtonGroup(self)
+        self.choices = QButtonGroup(self)
         for index, (_, words) in enumerate(self.STATUSES):
             choice = Radio(words)
             choice.setFont(font("body"))
-            self._choices.addButton(choice, index)
+            self.choices.addButton(choice, index)
             self.column.addWidget(choice)
-        self._choices.button(1).setChecked(True)
+        self.choices.button(1).setChecked(True)
         self.reason = QLineEdit()
         self.reason.setFont(font("body"))
-        self.reason.setPlaceholderText("Reason (may stay empty)")
+        self.reason.setPlaceholderText("Reason (optional)")
         self.reason.setAccessibleName("Reason")
         self.column.addWidget(self.reason)
-        self.add_buttons("Go on with the session", ActionButton("cross", "End session", role="danger"))
+        self.add_buttons("Continue the session", ActionButton("cross", "End session", role="danger"))
         self.go_on.setDefault(False)
         self.back.setDefault(True)
 
     @property
     def status(self) -> str:
         """Return "withdrawn" or "aborted"."""
-        return self.STATUSES[self._choices.checkedId()][0]
+        return self.STATUSES[self.choices.checkedId()][0]

@@ -13,13 +13,17 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.operator import OperatorView
 
-WHAT_TO_DO = "The force is off and every answer so far is on disk. End the session, mend the cause, then begin anew."
-RECONNECT = (
-    "The force is off and every answer so far is on disk. Plug the device in, then reconnect it. The session stays "
-    "paused until you resume it; a trial that was under way starts again."
+WHAT_TO_DO = (
+    "The force is off and every answer so far is on disk. End the session, fix the cause, then start a new one."
 )
-WAITS = "The force is off and nothing is lost. Make room or bring the drive back: the session then goes on, paused."
-AFTERWARDS = "The session is closed and the force is off. What the journal holds is safe."
+RECONNECT = (
+    "The force is off and every answer so far is on disk. Plug in the device, then reconnect it. The session stays "
+    "paused until you resume it; an interrupted trial starts again."
+)
+WAITS = (
+    "The force is off and nothing is lost. Free disk space or reconnect the drive; the session then continues, paused."
+)
+AFTERWARDS = "The session is closed and the force is off. Everything in the journal is safe."
 
 
 class Banner(Themed, QWidget):

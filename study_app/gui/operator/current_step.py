@@ -53,7 +53,7 @@ class Now(QWidget):
         self.lie_flat(False)
 
     def lie_flat(self, yes: bool) -> None:
-        """Put the time beside the words instead of under them."""
+        """Put the time next to the words instead of under them."""
         self._grid.addWidget(self._words, 0, 0)
         self._grid.addWidget(self._time, 0 if yes else 1, 1 if yes else 0)
         self._grid.setColumnStretch(0, 3)
@@ -92,13 +92,15 @@ class Now(QWidget):
 
 
 class Tally(QWidget):
-    """What is on disk, how many trials were within limits, marks and repeats; and which limit was broken last."""
+    """What is on disk, how many trials were within limits, marks and repeats; the limit broken last; the track."""
 
     def __init__(self) -> None:
         super().__init__()
         self.counts: list[tuple[QLabel, QLabel]] = []
         self.beyond = label("", "small", "warn", wraps=True)
         self.beyond.hide()
+        self.track = label("", "small", "text2", wraps=True)
+        self.track.hide()
         self._flat = False
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
@@ -111,7 +113,7 @@ class Tally(QWidget):
         self._place()
 
     def show_view(self, view: OperatorView) -> None:
-        """Show the counts, and which limit the newest trial out of limits broke; the tip tells all of them."""
+        """Show the counts, the newest limit that was broken (the tip has all of them), and how the track is doing."""
         if len(self.counts) < len(view.counts):
             for _ in range(len(view.counts) - len(self.counts)):
                 value = figures("", "label")
@@ -124,6 +126,8 @@ class Tally(QWidget):
         self.beyond.setVisible(bool(view.beyond))
         self.beyond.setText(f"{view.beyond[0]}." if view.beyond else "")
         self.beyond.setToolTip("\n".join(view.beyond) if len(view.beyond) > 1 else "")
+        self.track.setVisible(bool(view.track))
+        self.track.setText("  ·  ".join(view.track))
 
     def _place(self) -> None:
         left, right = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight
@@ -133,7 +137,8 @@ class Tally(QWidget):
             self._grid.addWidget(value, row, column + 1, left if self._flat else right)
         for column in range(9):
             self._grid.setColumnStretch(column, int(column in {2, 5} if self._flat else column == 1))
-        self._grid.addWidget(self.beyond, len(self.counts), 0, 1, 9 if self._flat else 2)
+        for row, line in enumerate((self.beyond, self.track), start=len(self.counts)):
+            self._grid.addWidget(line, row, 0, 1, 9 if self._flat else 2)
 
 
 def _column(inside: QWidget, *widgets: QWidget) -> QVBoxLayout:

@@ -11,7 +11,6 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.operator import DeviceView
 
-ICONS = {"falcon": "device", "mouse": "mouse", "simulated": "fast_forward"}
 ALL_ROWS = 99
 
 
@@ -26,7 +25,7 @@ class DeviceCard(Card):
         self.name = label("", "card")
         self.chip = Chip("neutral", "ring", "Waiting", small=True)
         self.diagnose = ActionButton("pulse", "Diagnose …", key="D", height=36)
-        self.diagnose.setToolTip("Switches the force off and pauses first")
+        self.diagnose.setToolTip("Turns the force off and pauses first")
         self.diagnose.clicked.connect(self.diagnose_asked)
         self._most = ALL_ROWS
         self._view: DeviceView | None = None
@@ -54,7 +53,7 @@ class DeviceCard(Card):
     def show_device(self, device: DeviceView) -> None:
         """Show the device's name, state and rows."""
         self._view = device
-        self.icon.show_icon(ICONS[device.kind], "text2")
+        self.icon.show_icon(device.icon, "text2")
         self.name.setText(device.name)
         self.chip.show_state(*(("ok", "check", "Ready") if device.ready else ("bad", "warning", "Fault")))
         while len(self.rows) < len(device.rows):

@@ -66,7 +66,7 @@ class ForcePlot(TracePlot):
         """Draw forces (n, 4: x, y, z, size) [N]."""
         peak = float(forces_n[:, 3].max(initial=0.0))
         wanted = min(max(peak, self._least), self.limit_n)
-        if wanted < NARROWS_BELOW * self._reach:
+        if wanted < NARROWS_BELOW * self.reach:
             self.show_reach(wanted / NARROWS_BELOW if wanted < self.limit_n else self.limit_n)
         self.show_traces(times_s, forces_n)
         if self.size_field is not None:
@@ -75,9 +75,9 @@ class ForcePlot(TracePlot):
     def _make_room(self) -> None:
         super()._make_room()
         for line in self.limits:
-            line.setVisible(self.limit_n <= self._reach)
+            line.setVisible(self.limit_n <= self.reach)
         if self.limit_name is not None:
-            self.limit_name.setVisible(self.limit_n <= self._reach)
+            self.limit_name.setVisible(self.limit_n <= self.reach)
             self.limit_name.setPos(QPointF(-1.01 * self._span_s, self.limit_n))
 
     def wear(self, theme: Theme) -> None:
@@ -101,8 +101,8 @@ class WakePlot(Plot):
 
     def __init__(self) -> None:
         super().__init__()
-        self._asked = self._reach = LEAST_WAKE_MPS
-        self._ticks: tuple[int, float] = (0, 0.0)
+        self._asked = self.reach = LEAST_WAKE_MPS
+        self.rows_and_step: tuple[int, float] = (0, 0.0)
         self.curve = pg.PlotCurveItem(antialias=True)
         draw_quickly(self.curve, solid=True)
         self.box.addItem(self.curve)
@@ -121,7 +121,7 @@ class WakePlot(Plot):
     def show_wake(self, times_s: Floats, speeds_mps: Floats) -> None:
         """Draw speeds (n,) [m/s] over ``times_s`` (n,)."""
         peak = max(float(speeds_mps.max(initial=0.0)), LEAST_WAKE_MPS)
-        if peak > self._reach or peak < 0.4 * self._reach:
+        if peak > self.reach or peak < 0.4 * self.reach:
             self._asked = peak
             self._make_room()
         self.curve.setData(times_s, speeds_mps)
@@ -131,12 +131,12 @@ class WakePlot(Plot):
         step = step_for(self._asked, max(1, int(height / LINE_PX / 1.5) - 1))
         step = step if step <= self._asked else step_for(self._asked / 2.6, 1)  # one line at least above zero
         rows = int(self._asked / step + 1e-9)
-        self._reach = self._asked
-        if (rows, step) != self._ticks:
-            self._ticks = (rows, step)
+        self.reach = self._asked
+        if (rows, step) != self.rows_and_step:
+            self.rows_and_step = (rows, step)
             self.show_ticks("left", [(k * step, number(k * step)) for k in range(rows + 1)])
-        half = 0.5 * self._reach * LINE_PX / (height - LINE_PX)
-        self.box.setYRange(-half, self._reach + half, padding=0)
+        half = 0.5 * self.reach * LINE_PX / (height - LINE_PX)
+        self.box.setYRange(-half, self.reach + half, padding=0)
         self.box.setXRange(-1.02 * TRACE_WINDOW_S, self._right or 0.08 * TRACE_WINDOW_S, padding=0)
 
     def wear(self, theme: Theme) -> None:
@@ -159,7 +159,7 @@ class ForceCard(Card):
         for plot in (self.plot, self.wake):
             plot.setMinimumHeight(48)
         span = f"over the last {TRACE_WINDOW_S:.0f} s"
-        force = f"Force along x, y and z and its size {span}, in N, with the limit of {limit_n:g} N."
+        force = f"Force along x, y and z and its magnitude {span}, in N, with the limit of {limit_n:g} N."
         describe_plot(self.plot, "Force on the hand", force)
         describe_plot(self.wake, "Wake speed", f"Speed of the wake in the scene {span}, in m/s.")
 

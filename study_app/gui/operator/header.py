@@ -46,7 +46,7 @@ class ThemeButton(Themed, QPushButton):
         self.setFixedSize(40, 40)
         self.setProperty("role", "plain")
         self.setToolTip("Light or dark")
-        self.setAccessibleName("Change between light and dark theme")
+        self.setAccessibleName("Switch between light and dark theme")
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the button and the sign of the other theme."""

@@ -6,7 +6,8 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.labels import Elided, Ink, figures, label
-from study_app.viewmodels.operator import OperatorView, Tile, Verdict
+from study_app.viewmodels.operator import OperatorView
+from study_app.viewmodels.servo_health import Tile, Verdict
 
 VERDICTS: dict[Verdict, tuple[str, Ink]] = {
     "ok": ("check", "ok"),

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from study_app.session.ports import JournalPort
-from study_app.viewmodels.session_stages import SessionProgress
+from study_app.store.progress import Progress
 
 
 class WatchedJournal:
@@ -22,7 +22,7 @@ class WatchedJournal:
         Seconds since the session's origin.
     """
 
-    def __init__(self, store: JournalPort, progress: SessionProgress, clock: Callable[[], float]) -> None:
+    def __init__(self, store: JournalPort, progress: Progress, clock: Callable[[], float]) -> None:
         self.progress = progress
         self._store = store
         self._clock = clock
@@ -30,7 +30,7 @@ class WatchedJournal:
     def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
         """Put an event into the journal (StoreError: nothing has changed)."""
         self._store.append(event, t_s=t_s, waits=waits, **fields)
-        self.progress = self.progress.after(event, self._clock() if t_s is None else t_s, fields)
+        self.progress.take({"event": event, "t_s": self._clock() if t_s is None else t_s, **fields})
 
     @property
     def fingerprint(self) -> str:
@@ -38,7 +38,7 @@ class WatchedJournal:
         return self._store.fingerprint
 
     def check_flushed(self) -> None:
-        """Raise StoreError if lines that nobody waited for could not be flushed."""
+        """Raise StoreError if lines that were not waited for could not be flushed."""
         self._store.check_flushed()
 
     def write_tables(self) -> None:
@@ -50,5 +50,5 @@ class WatchedJournal:
         try:
             self._store.finish(status, reason)
         finally:
-            told = {"status": status, "reason": reason, "fingerprint": self._store.fingerprint}
-            self.progress = self.progress.after("session_ended", self._clock(), told)
+            facts = {"status": status, "reason": reason, "fingerprint": self._store.fingerprint}
+            self.progress.take({"event": "session_ended", "t_s": self._clock(), **facts})

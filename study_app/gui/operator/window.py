@@ -238,7 +238,7 @@ class OperatorWindow(QMainWindow):
         self._take_keyboard()
 
     def _take_keyboard(self) -> None:
-        """Take the keyboard where a dialog left it to nobody: Esc must be heard, with no window manager too."""
+        """Take the keyboard after a dialog: Esc must work without a window manager, too."""
         if QGuiApplication.focusWindow() is None:
             self.activateWindow()
 

@@ -1,7 +1,8 @@
-"""The pointer as a hand: hidden and held in the window while the tank is shown, its motion told in metres.
+"""The pointer as a hand: hidden and held in the window while the tank is shown, its motion emitted in metres.
 
-The system's own pointer would be a proxy without delay, so it is never seen beside the ball. It is put back into the
-middle of the window whenever it comes near an edge; motion that was under way then is neither lost nor counted twice.
+The system's own pointer would be a proxy without delay, so it is never shown together with the ball. It is put back
+into the middle of the window whenever it comes near an edge; motion that was under way is neither lost nor counted
+twice.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class PointerCapture(QObject):
         self._widget: QWidget | None = None
         self._hand = [0.0, 0.0, 0.0]
         self._half = (0.0, 0.0, 0.0)
-        self._gain = 0.0
+        self.gain = 0.0
         self._bits = 0
         self._last = QPoint()
         self._returning = False
@@ -48,7 +49,7 @@ class PointerCapture(QObject):
         self._widget = widget
         width, height, depth = workspace_m
         self._half = (width / 2, height / 2, depth / 2)
-        self._gain = height / (SHARE_OF_SCREEN * widget.screen().geometry().height())
+        self.gain = height / (SHARE_OF_SCREEN * widget.screen().geometry().height())
         widget.setCursor(Qt.CursorShape.BlankCursor)
         widget.setMouseTracking(True)
         widget.installEventFilter(self)
@@ -99,7 +100,7 @@ class PointerCapture(QObject):
             self._last, self._returning = middle, False
         step = place - self._last
         self._last = place
-        right, down = step.x() * self._gain, step.y() * self._gain
+        right, down = step.x() * self.gain, step.y() * self.gain
         if modifiers & Qt.KeyboardModifier.ShiftModifier:
             self._move(right, 0.0, down)
         else:

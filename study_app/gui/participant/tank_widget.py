@@ -7,17 +7,19 @@ delayed clock, and nothing is smoothed or eased. Nothing here knows which liquid
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from threading import Thread
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QRegion, QResizeEvent
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QRegion, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.participant.pages.page_widget import page_painter
+from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.participant.tank import sprites
 from study_app.gui.participant.tank.backdrop import Backdrop, backdrop
-from study_app.gui.participant.tank.camera import Box, Camera
+from study_app.gui.participant.tank.camera import Box, Camera, Point
 from study_app.gui.participant.tank.captions import Captions
 from study_app.gui.participant.tank.frame import (
     DEPTH_STEPS,
@@ -33,8 +35,9 @@ from study_app.gui.participant.tank.frame import (
 from study_app.gui.participant.tank.onset_patch import OnsetPatch
 from study_app.gui.participant.tank.photodiode_patch import paint_patch, patch_place
 from study_app.gui.theme.theme import TANK
-from study_app.protocol.model import Explore, Reach
+from study_app.protocol.model import Explore, Follow, Reach
 from study_app.session.pages import TaskPage
+from study_app.session.tasks import track
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words
@@ -42,7 +45,7 @@ if TYPE_CHECKING:
 
 # Where the tank lies in the window, in shares of it.
 AREA = (0.075, 0.122, 0.85, 0.712)
-BESIDE_RADII = 2.0  # of a target: within them the ball is before or behind it
+NEAR_RADII = 2.0  # of a target: within them the ball is before or behind it
 ALWAYS = QRegion(0, 0, 1, 1)  # a frame in which nothing moved is a frame too
 
 
@@ -70,7 +73,8 @@ class TankWidget(QWidget):
     ``painted(sample_ns)`` comes once for every view with the time of what was drawn: when it was painted and handed to
     the window's system, or with ``on_card``, on a surface of the graphics card, when that swapped. ``swapped`` comes
     with each swap. ``photodiode`` is whether a corner toggles with each movement that begins;
-    ``by_mouse`` whether a wheel moves the hand in depth: where only the depth is wrong, that is told.
+    ``by_mouse`` whether a mouse moves the hand: a click goes on, there is no force to switch off, and where only the
+    depth is wrong, a line says which way to turn the wheel.
     """
 
     painted = Signal(object)
@@ -88,6 +92,9 @@ class TankWidget(QWidget):
         by_mouse: bool = False,
     ) -> None:
         super().__init__(parent)
+        if by_mouse:
+            words = replace(words, continue_now=words.click_now, pause_hint=words.pause_title)
+        self._words = words
         self._by_mouse = by_mouse
         self._photodiode = photodiode
         self._pane: QWidget | None = self._made_pane() if on_card else None
@@ -96,16 +103,16 @@ class TankWidget(QWidget):
         self._page = page
         self._box = Box.around(page.workspace_m, page.body_radius_m)
         self._captions = Captions(page, words, text_scale)
-        self._patch = OnsetPatch()
-        self._view: TankView | None = None
+        self.patch = OnsetPatch()
+        self.view: TankView | None = None
         self._unpainted = False
         self._showing = False
         self._drawn_ns: int | None = None
-        self._things: dict[str, Placed] = {}
-        self._ball: BallPlace | None = None
-        self._camera: Camera | None = None
-        self._targets: tuple[TargetPlace, ...] = ()
-        self._placer: BallPlacer | None = None
+        self.things: dict[str, Placed] = {}
+        self.ball: BallPlace | None = None
+        self.camera: Camera | None = None
+        self.targets: tuple[TargetPlace, ...] = ()
+        self.placer: BallPlacer | None = None
         self._stroke = 1.0
 
     @property
@@ -114,19 +121,50 @@ class TankWidget(QWidget):
         return self._page
 
     @property
+    def resting(self) -> bool:
+        """Whether a rest between two intervals is shown."""
+        return self._page.interval is not None and self._page.interval.resting
+
+    @property
     def may_leave(self) -> bool:
         """Whether the exploration shown has had its least time, so that the participant may go on."""
         task = self._page.task
-        return isinstance(task, Explore) and self._view is not None and self._view.task.elapsed_s >= task.min_s
+        return (
+            not self.resting
+            and isinstance(task, Explore)
+            and self.view is not None
+            and self.view.task.elapsed_s >= task.min_s
+        )
 
     @property
     def time_is_up(self) -> bool:
         """Whether the task shown ended because its time is over."""
-        return self._view is not None and self._view.task.elapsed_s >= self._page.task.limit_s
+        return self.view is not None and self.view.task.elapsed_s >= self._page.task.limit_s
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Return the size that the tank was drawn for."""
         return QSize(1920, 1080)
+
+    def turn_to(self, page: TaskPage) -> None:
+        """Draw another interval of the same trial, or the rest before it; a view of before is no frame of it."""
+        self._page = page
+        self._captions.turn_to(page)
+        if self.view is not None:  # the ball stays where it is until the next view
+            self.view = replace(self.view, task=track(page.task).now(), ball_hidden=False)
+        self._unpainted = False
+        self.things = self._frame()
+        self._announce()
+        if self._pane is None:
+            self.repaint()
+        else:
+            self._pane.update()
+
+    def _announce(self) -> None:
+        """Say which interval begins, or comes."""
+        interval = self._page.interval
+        if interval is not None:
+            self.setAccessibleName(f"{interval.announced}. {self._page.instruction}")
+            say(self, interval.announced)
 
     def prepare(self) -> None:
         """Paint the still images now, so that the first frame does not wait for them."""
@@ -134,23 +172,28 @@ class TankWidget(QWidget):
 
     def show_view(self, view: TankView) -> None:
         """Draw the proxy where ``view`` says, with the task as it was then."""
-        self._view = view
+        self.view = view
         self._unpainted = True
         x, y, z = (float(value) for value in view.position_m)
-        self._patch.follow((x, y, z), view.sample_time_ns)
+        self.patch.follow((x, y, z), view.sample_time_ns)
         self._ready()
         things = self._frame()
-        changed = changes(self._things, things) + ALWAYS
-        self._things = things
+        changed = changes(self.things, things) + ALWAYS
+        self.things = things
         if self._pane is None:
             self._repaint(changed)
         else:
             self._pane.update()
 
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Announce the first interval."""
+        super().showEvent(event)
+        self._announce()
+
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Find the tank's place anew."""
         super().resizeEvent(event)
-        self._camera = None
+        self.camera = None
         if self._pane is not None:
             self._pane.setGeometry(self.rect())
 
@@ -199,85 +242,95 @@ class TankWidget(QWidget):
         self._paint_things(painter, region)
         if region.intersects(still.front_at.toAlignedRect()):
             painter.drawImage(still.front_at.topLeft(), still.front)
-        self._captions.draw(painter, region, self._task, self._depth())
+        self._captions.draw(painter, region, self._task, self._hint())
         self._paint_patch(painter, region)
-        self._drawn_ns = None if self._view is None else self._view.sample_time_ns
+        self._drawn_ns = None if self.view is None else self.view.sample_time_ns
 
     @property
     def _task(self) -> TaskShown | None:
-        return None if self._view is None else self._view.task
+        return None if self.view is None else self.view.task
 
-    def _depth(self) -> int:
-        """Return -1 where the ball shown must go further away to be in the lit target, 1 where it must come nearer.
+    def _hint(self) -> str:
+        """Return how the ball gets into the target that waits for it: only its depth is wrong, where a wheel moves it.
 
-        0 where its depth is right, where it is beside the target, too, or where no wheel moves it.
+        In a rest that waits for the ball, that it is to come back; otherwise "".
         """
-        todo, view = self._page.task, self._view
-        if not self._by_mouse or not isinstance(todo, Reach) or view is None or view.task.lit is None:
-            return 0
-        target = todo.targets_m[view.task.lit]
+        todo, view, words = self._page.task, self.view, self._words
+        if view is None or view.task.lit is None or isinstance(todo, Explore):
+            return ""
+        if isinstance(todo, Follow) and not self.resting:
+            return ""
+        target = todo.targets_m[view.task.lit] if isinstance(todo, Reach) else todo.start_m
         x, y, z = (there - float(here) for there, here in zip(target, view.position_m, strict=True))
-        off = math.hypot(x, y) <= BESIDE_RADII * todo.radius_m and abs(z) > todo.radius_m
-        return int(math.copysign(1, z)) if off else 0
+        if self._by_mouse and math.hypot(x, y) <= NEAR_RADII * todo.radius_m and abs(z) > todo.radius_m:
+            return words.nearer if z > 0 else words.further_away
+        return words.back_to_target if self.resting and math.hypot(x, y, z) > todo.radius_m else ""
 
     def _ready(self) -> Backdrop:
         """Return the still images for the present size and screen; lay everything out if they changed."""
         ratio = self.devicePixelRatioF()
-        if self._camera is None:
+        if self.camera is None:
             self._lay_out(ratio)
-        assert self._camera is not None  # noqa: S101  # _lay_out has just set it
-        return backdrop((self.width(), self.height()), ratio, self._box, self._camera)
+        assert self.camera is not None  # noqa: S101  # _lay_out has just set it
+        return backdrop((self.width(), self.height()), ratio, self._box, self.camera)
 
     def _lay_out(self, ratio: float) -> None:
         width, height = self.width(), self.height()
-        self._box, self._camera = look(self._page, self._captions, width, height)
-        self._captions.lay_out(width, height, self._camera.point((0, self._box.floor, self._box.z))[1])
-        self._placer = BallPlacer(self._camera, self._box, self._page.body_radius_m)
+        self._box, self.camera = look(self._page, self._captions, width, height)
+        self._captions.lay_out(width, height, self.camera.point((0, self._box.floor, self._box.z))[1])
+        self.placer = BallPlacer(self.camera, self._box, self._page.body_radius_m)
         for step in range(DEPTH_STEPS):
-            radius, haze = self._placer.size(step)
+            radius, haze = self.placer.size(step)
             sprites.ball(radius, ratio, haze)
-        task = self._page.task
-        self._targets = ()
-        if isinstance(task, Reach):
-            around = task.radius_m + self._page.body_radius_m  # the ball is inside the ring while its centre counts
-            self._targets = tuple(target_place(self._camera, self._box, centre, around) for centre in task.targets_m)
-        self._stroke = max(2.0, self._camera.scale((0, 0, 0)) * 0.0010)
-        self._things = self._frame()
+        todo = self._page.task
+        self.targets = self._placed_targets(todo.targets_m if isinstance(todo, Reach) else ())
+        self._stroke = max(2.0, self.camera.scale((0, 0, 0)) * 0.0010)
+        self.things = self._frame()
+
+    def _placed_targets(self, centres_m: tuple[Point, ...]) -> tuple[TargetPlace, ...]:
+        """Return where targets around these centres [m, hand] are drawn."""
+        todo = self._page.task
+        if self.camera is None or isinstance(todo, Explore):
+            return ()
+        around_m = todo.radius_m + self._page.body_radius_m  # the ball is inside the ring while its centre counts
+        return tuple(target_place(self.camera, self._box, centre, around_m) for centre in centres_m)
 
     def _frame(self) -> dict[str, Placed]:
         """Return the things of the present view."""
         task = self._task
         lit = task.lit if task else None
+        if isinstance(self._page.task, Follow):
+            self.targets = self._placed_targets(((task and task.target_m) or self._page.task.target_m(0.0),))
         things: dict[str, Placed] = {}
-        for index, target in enumerate(self._targets):
-            is_lit = index == lit
-            things[f"target {index}"] = Placed((is_lit, task.dwell if task and is_lit else 0.0), target.place)
-            things[f"marks {index}"] = Placed(is_lit, target.marks)
-        self._ball = None
-        if self._view is not None and self._placer is not None:
-            x, y, z = (float(value) for value in self._view.position_m)
-            self._ball = self._placer.place((x, y, z))
-            things |= ball_things(self._ball)
-        things |= self._captions.things(task, self._depth())
+        for index, target in enumerate(self.targets):
+            is_lit, x = index == lit, target.middle.x()
+            things[f"target {index}"] = Placed((is_lit, task.dwell if task and is_lit else 0.0, x), target.place)
+            things[f"marks {index}"] = Placed((is_lit, x), target.marks)
+        self.ball = None
+        if self.view is not None and not self.view.ball_hidden and self.placer is not None:
+            x, y, z = (float(value) for value in self.view.position_m)
+            self.ball = self.placer.place((x, y, z))
+            things |= ball_things(self.ball)
+        things |= self._captions.things(task, self._hint())
         if self._photodiode:
-            things["patch"] = Placed(self._patch.lit, self._patch_place())
+            things["patch"] = Placed(self.patch.lit, self.patch_area())
         return things
 
     def _paint_things(self, painter: QPainter, region: QRegion) -> None:
         """Paint floor marks, shadow, then ball and targets from the far ones to the near ones."""
         lit = self._task.lit if self._task else None
-        for index, target in enumerate(self._targets):
+        for index, target in enumerate(self.targets):
             if region.intersects(target.marks.toAlignedRect()):
                 self._paint_marks(painter, target, is_lit=index == lit)
         ratio = self.devicePixelRatioF()
-        ball = self._ball
-        if ball is not None and region.intersects(self._things["shadow"].place.toAlignedRect()):
+        ball = self.ball
+        if ball is not None and region.intersects(self.things["shadow"].place.toAlignedRect()):
             dark = sprites.shadow(ball.floor_radius, ratio, ball.floor_flat)
             sprites.draw(painter, dark, ball.floor, opacity=ball.shade, grown=ball.spread)
-        order = sorted(range(len(self._targets)), key=lambda index: -self._targets[index].depth_m)
+        order = sorted(range(len(self.targets)), key=lambda index: -self.targets[index].depth_m)
         drawn = False
         for index in order:
-            target = self._targets[index]
+            target = self.targets[index]
             if ball is not None and not drawn and target.depth_m < ball.depth_m:
                 self._paint_ball(painter, region, ball)
                 drawn = True
@@ -320,19 +373,20 @@ class TankWidget(QWidget):
             painter.drawArc(circle, 90 * 16, -round(min(dwell, 1.0) * 360 * 16))
 
     def _paint_ball(self, painter: QPainter, region: QRegion, ball: BallPlace) -> None:
-        if region.intersects(self._things["plumb"].place.toAlignedRect()):
+        if region.intersects(self.things["plumb"].place.toAlignedRect()):
             ink = QColor(TANK.proxy_light)
             ink.setAlphaF(0.62)
             painter.setPen(QPen(ink, self._stroke * 0.36, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
             painter.drawPoints(ball.feet)
-        if region.intersects(self._things["ball"].place.toAlignedRect()):
+        if region.intersects(self.things["ball"].place.toAlignedRect()):
             sprite = sprites.ball(ball.radius, self.devicePixelRatioF(), ball.haze)
             sprites.draw(painter, sprite, ball.middle)
 
-    def _patch_place(self) -> QRectF:
+    def patch_area(self) -> QRectF:
+        """Return where the photodiode's patch is."""
         return patch_place(self.width(), self.height())
 
     def _paint_patch(self, painter: QPainter, region: QRegion) -> None:
-        place = self._patch_place()
+        place = self.patch_area()
         if self._photodiode and region.intersects(place.toAlignedRect()):
-            paint_patch(painter, place, lit=self._patch.lit)
+            paint_patch(painter, place, lit=self.patch.lit)

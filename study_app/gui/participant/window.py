@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from threading import Thread
 from typing import TYPE_CHECKING
 
@@ -23,6 +22,10 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.display.screens import place
+from study_app.gui.participant.forms.form import FormWidget
+from study_app.gui.participant.intervals.choice_page import ChoiceWidget
+from study_app.gui.participant.intervals.feedback_page import FeedbackWidget
+from study_app.gui.participant.intervals.number_page import NumberWidget
 from study_app.gui.participant.pages.notices import NoticeWidget, PauseWidget
 from study_app.gui.participant.pages.page_widget import PageWidget
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
@@ -35,7 +38,11 @@ from study_app.gui.widgets.accessible import give_role
 from study_app.gui.widgets.escape_key import EscapeHold
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import (
+    ChoicePage,
+    DesignPage,
     EndPage,
+    FeedbackPage,
+    NumberPage,
     Page,
     PausePage,
     QuestionnairePage,
@@ -52,7 +59,7 @@ LEAST_SIZE = QSize(1024, 640)
 WINDOWED_SIZE = QSize(1366, 768)
 PILOT_FRAME = 10
 WAITING_MS = 15
-TIME_UP_MS = 1500  # so long it is told that a task's time is over, before the questions
+TIME_UP_MS = 1500  # "Time is up" is shown for so long before the questions
 AHEAD_MS = 100  # after a page came, what comes next is painted
 SETTLING_MS = 100  # from one of the program's windows to the next, none may have the keyboard for so long
 
@@ -106,7 +113,7 @@ class ParticipantWindow(QWidget):
         self._photodiode = photodiode
         self._words = said
         self._clock = clock
-        self._text_scale = text_scale
+        self.text_scale = text_scale
         self._windowed = windowed
         self._captures = captures_pointer
         self.may_close = False
@@ -117,16 +124,16 @@ class ParticipantWindow(QWidget):
         self._capture = PointerCapture(self)
         self._capture.moved.connect(self.pointer)
         self._capture.pressed.connect(self._press)
-        self._settling = QTimer(self)
-        self._settling.setInterval(SETTLING_MS)
-        self._settling.timeout.connect(self._pause_if_left)
-        self._waiting = QTimer(self)
-        self._waiting.setInterval(WAITING_MS)
-        self._waiting.timeout.connect(self._show_if_painted)
-        self._told_up = QTimer(self)
-        self._told_up.setSingleShot(True)
-        self._told_up.setInterval(TIME_UP_MS)
-        self._told_up.timeout.connect(self._ask)
+        self.settling = QTimer(self)
+        self.settling.setInterval(SETTLING_MS)
+        self.settling.timeout.connect(self._pause_if_left)
+        self.waiting = QTimer(self)
+        self.waiting.setInterval(WAITING_MS)
+        self.waiting.timeout.connect(self._show_if_painted)
+        self.time_up = QTimer(self)
+        self.time_up.setSingleShot(True)
+        self.time_up.setInterval(TIME_UP_MS)
+        self.time_up.timeout.connect(self._ask)
         self._ahead = QTimer(self)
         self._ahead.setSingleShot(True)
         self._ahead.setInterval(AHEAD_MS)
@@ -147,8 +154,8 @@ class ParticipantWindow(QWidget):
 
     @property
     def page(self) -> Page | None:
-        """The page that is shown; None before the first, and while it is told that the time is up."""
-        return None if self._told_up.isActive() else self._page
+        """The page that is shown; None before the first, and while "Time is up" is shown."""
+        return None if self.time_up.isActive() else self._page
 
     @property
     def widget(self) -> PageWidget | TankWidget:
@@ -181,20 +188,25 @@ class ParticipantWindow(QWidget):
         self.activateWindow()
 
     def show_page(self, page: Page) -> None:
-        """Put a page in place of the present one, whole and at once."""
+        """Put a page in place of the present one, whole and at once; the tank stays throughout a trial of intervals."""
+        tank = self.tank
+        if isinstance(page, TaskPage) and page.interval and tank is not None and tank.page.trial == page.trial:
+            self._page = page
+            tank.turn_to(page)
+            return
         self._capture.release()
-        self._waiting.stop()
-        self._told_up.stop()
+        self.waiting.stop()
+        self.time_up.stop()
         if isinstance(page, TextPage) and page.language != self._words.language:
             self._words = words(page.language)
             self._title()
         self._page = page
-        up = self.tank is not None and self.tank.time_is_up
+        up = tank is not None and tank.page.interval is None and tank.time_is_up
         if isinstance(page, QuestionnairePage) and up:
-            self._told_up.start()
+            self.time_up.start()
             self._put(self._wait_page(self._words.time_is_up))
         elif isinstance(page, TaskPage) and self.painting is not None and self.painting.is_alive():
-            self._waiting.start()
+            self.waiting.start()
             self._put(self._wait_page(self._words.trouble_title))
         else:
             self._put(self._make(page, self._widget))
@@ -245,7 +257,7 @@ class ParticipantWindow(QWidget):
         elif not self.isActiveWindow() and self._capture.held:
             self._capture.release()
             self.tank.setCursor(Qt.CursorShape.BlankCursor)
-            self._settling.start()
+            self.settling.start()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Let the page fill the window."""
@@ -277,17 +289,17 @@ class ParticipantWindow(QWidget):
         """While a text or a pause is read, paint the tank that comes after it."""
         if isinstance(self._page, TextPage | PausePage) and self._page.coming is not None:
             size, ratio = self._room().size(), self.devicePixelRatioF()
-            self.painting = paint_ahead(self._page.coming, self._words, self._text_scale, size, ratio)
+            self.painting = paint_ahead(self._page.coming, self._words, self.text_scale, size, ratio)
 
     def _wait_page(self, words_said: str) -> ReadingPage:
         """Return a page that asks for a moment's patience."""
         column = ("clock", words_said, (), PARTICIPANT.accent)
-        return ReadingPage(column, self._words, self._clock, parent=self, text_scale=self._text_scale)
+        return ReadingPage(column, self._words, self._clock, parent=self, text_scale=self.text_scale)
 
     def _show_if_painted(self) -> None:
         """Put the tank in place of the page that asks to wait, once it is painted."""
         if isinstance(self._page, TaskPage) and self.painting is not None and not self.painting.is_alive():
-            self._waiting.stop()
+            self.waiting.stop()
             self._put(self._make(self._page, self._widget))
 
     def _ask(self) -> None:
@@ -307,14 +319,13 @@ class ParticipantWindow(QWidget):
         return self.rect().adjusted(frame, frame + above, -frame, -frame)
 
     def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
-        said, clock, text = self._words, self._clock, self._text_scale
+        said, clock, text = self._words, self._clock, self.text_scale
         made: PageWidget
         match page:
             case TaskPage():
-                by_click = replace(said, continue_now=said.click_now) if self._captures else said
                 tank = TankWidget(
                     page,
-                    by_click,
+                    said,
                     self,
                     text_scale=text,
                     on_card=self._on_card,
@@ -324,8 +335,16 @@ class ParticipantWindow(QWidget):
                 tank.painted.connect(self.painted)
                 tank.swapped.connect(self.swapped)
                 return tank
+            case QuestionnairePage(labels=()):
+                made = FormWidget(page, said, clock, self, text_scale=text)
             case QuestionnairePage():
                 made = QuestionnaireWidget(page, said, clock, self, text_scale=text)
+            case ChoicePage():
+                made = ChoiceWidget(page, said, clock, self, text_scale=text)
+            case NumberPage():
+                made = NumberWidget(page, said, clock, self, text_scale=text)
+            case FeedbackPage():
+                made = FeedbackWidget(page, said, clock, self, text_scale=text)
             case TextPage():
                 made = TextWidget(page, said, clock, self, text_scale=text)
             case PausePage():
@@ -356,14 +375,14 @@ class ParticipantWindow(QWidget):
     def _pause_if_left(self) -> None:
         """Pause where the pointer is the device and went to another program; the operator's window is none."""
         if self.tank is None or self._capture.held:
-            self._settling.stop()
+            self.settling.stop()
         elif QGuiApplication.focusWindow() is None:
-            self._settling.stop()
+            self.settling.stop()
             self._pause()
 
     def _pause(self) -> None:
         """Pause the session; close the last page."""
-        if isinstance(self._page, TextPage | TaskPage | QuestionnairePage):
+        if isinstance(self._page, TextPage | TaskPage | QuestionnairePage | DesignPage | FeedbackPage):
             self.event.emit(PauseAsked(self._clock(), "participant"))
         elif isinstance(self._page, EndPage):
             self.close()

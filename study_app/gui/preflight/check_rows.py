@@ -13,7 +13,7 @@ from study_app.gui.widgets.cards import Bar
 from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.session.preflight import Check
 
-ROW_HEIGHT = 48
+ROW_HEIGHT = 42
 DOT = 13.0
 LEFT = 70
 NAME, BAR = 148, 160

@@ -7,6 +7,7 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.preflight.check_rows import CheckRow
+from study_app.gui.preflight.masking_question import MaskingQuestion
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import dress, take_away, wear
 from study_app.gui.widgets.accessible import describe_plot
@@ -29,13 +30,14 @@ class PreflightWindow(QWidget):
     """The checks of a session whose device and servo are ready, at rest.
 
     ``start_asked`` accepts the warnings shown; ``again_asked`` has everything measured anew; ``cancelled`` goes back.
+    With ``asks_masking`` the window asks whether the device's motors are masked.
     """
 
     start_asked = Signal()
     again_asked = Signal()
     cancelled = Signal()
 
-    def __init__(self, limit_us: float, *, theme: Theme = LIGHT) -> None:
+    def __init__(self, limit_us: float, *, asks_masking: bool = False, theme: Theme = LIGHT) -> None:
         super().__init__()
         self.setWindowTitle("Liquid Study")
         self.setProperty("role", "window")
@@ -47,6 +49,7 @@ class PreflightWindow(QWidget):
         self.chip = Chip("ok", "check", "")
         self.checks = Card(padding=10, gap=0)
         self.rows: list[CheckRow] = []
+        self.masking = MaskingQuestion() if asks_masking else None
         self.plot = LatenessPlot(limit_us)
         describe_plot(self.plot, "Tick lateness", "Histogram of how late the ticks of two seconds began, in µs.")
         self.cancel = ActionButton("", "Cancel", height=46)
@@ -103,7 +106,7 @@ class PreflightWindow(QWidget):
         column.addLayout(foot)
 
     def _beside(self) -> QWidget:
-        """Return what stands beside the checks: how late the servo is, and what will run."""
+        """Return the column next to the checks: how late the servo is, and what will run."""
         lateness = Card("Servo lateness", label("measured at rest, µs", "small", "text2"), padding=18, gap=6)
         self.plot.setMinimumHeight(150)
         lateness.column.addWidget(self.plot, 1)
@@ -112,6 +115,8 @@ class PreflightWindow(QWidget):
         self._grid.setVerticalSpacing(9)
         self._grid.setColumnStretch(1, 1)
         self.runs.column.addLayout(self._grid)
+        if self.masking is not None:
+            self.runs.column.addWidget(self.masking)
         side = QWidget()
         side.setFixedWidth(ASIDE)
         column = QVBoxLayout(side)

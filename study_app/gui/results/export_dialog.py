@@ -44,7 +44,7 @@ class WriteDialog(QDialog):
     to
         The folder that is suggested.
     extras
-        What can be written beside.
+        What can be written in addition.
     opens
         The words on the button that opens what was written.
     """
@@ -117,7 +117,7 @@ class WriteDialog(QDialog):
         where.addWidget(self.to, 1)
         where.addWidget(self.choose)
         form.addLayout(where)
-        form.addWidget(label("Files of an earlier time there give way.", "small", "text2"))
+        form.addWidget(label("Existing files will be overwritten.", "small", "text2"))
         column.addWidget(self._form)
         column.addWidget(self.bar)
         foot = QHBoxLayout()

@@ -1,4 +1,4 @@
-"""A figure of the analysis in the colours of the theme, drawn sharp at every size; drawn beside the window's thread."""
+"""A figure of the analysis in the colours of the theme, sharp at every size, drawn in the background."""
 
 from __future__ import annotations
 

@@ -120,7 +120,7 @@ class WorkLine(Card):
             self.words.show_text(f"{going.what[:1].upper()}{going.what[1:]} …")
             self.bar.show_share(going.share)
         elif untested:
-            self.words.show_text("Stopped before the tests: recognition and the lowest delays are not drawn.")
+            self.words.show_text("Stopped before the tests: recognition and the lowest delays are missing.")
 
 
 class TroubleCard(Card):
@@ -167,7 +167,7 @@ class TroubleCard(Card):
 class FiguresPanel(QScrollArea):
     """The cards of the figures; while there are none, what is going on or why.
 
-    ``asked`` carries what a button beside a sentence does.
+    ``asked`` carries what the button of a sentence does.
     """
 
     asked = Signal(str)

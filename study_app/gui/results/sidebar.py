@@ -1,4 +1,4 @@
-"""Beside the figures: the sessions with their filters, and what is left out of the analysis."""
+"""Beside the figures: the sessions with their filters, and what is excluded from the analysis."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.results import LeftOut, in_figures
-from study_app.viewmodels.session_columns import Column, matching, states_of
+from study_app.viewmodels.session.columns import Column, matching, states_of
 from study_app.viewmodels.sessions import SessionFacts, started_words
 
 COLUMNS = (
@@ -41,7 +41,7 @@ class SessionsCard(Card):
         self.state.setAccessibleName("State")
         self.state.setFont(font("body"))
         self.state.addItem(EVERY, "")
-        self.rows = SessionsTable(COLUMNS, "No session.")
+        self.rows = SessionsTable(COLUMNS, "No sessions.")
         self.head = label("", "label")
         self.head.setFont(font("label", weight=600, tabular=True))
         self.why = label("", "small", "text2", wraps=True)
@@ -50,8 +50,8 @@ class SessionsCard(Card):
         filters.addWidget(self.search, 1)
         filters.addWidget(self.state, 1)
         self.details = ActionButton("file", "", role="plain", height=36)
-        self.details.setAccessibleName("Details of the chosen session")
-        self.details.setToolTip("Details of the chosen session")
+        self.details.setAccessibleName("Details of the selected session")
+        self.details.setToolTip("Details of the selected session")
         self.details.setEnabled(False)
         self.details.clicked.connect(self.rows.open_chosen)
         self.rows.chosen_changed.connect(lambda: self.details.setEnabled(self.rows.chosen is not None))
@@ -87,7 +87,7 @@ class SessionsCard(Card):
     def _filter(self) -> None:
         state = str(self.state.currentData() or "")
         filtered = bool(state or self.search.text().strip())
-        self.rows.none.setText("No session is like that." if filtered else "No session.")
+        self.rows.none.setText("No session matches." if filtered else "No sessions.")
         self.rows.show_matching(matching(self.search.text(), state))
 
 
@@ -102,9 +102,9 @@ class ExclusionsCard(Card):
     list_asked = Signal()
 
     def __init__(self) -> None:
-        self.leave_out = ActionButton("minus", "Leave out …", height=36)
-        super().__init__("Left out", self.leave_out, padding=14, gap=6)
-        self.none = label("Nothing is left out of the analysis.", "label", "text2", wraps=True)
+        self.leave_out = ActionButton("minus", "Exclude …", height=36)
+        super().__init__("Excluded", self.leave_out, padding=14, gap=6)
+        self.none = label("Nothing is excluded from the analysis.", "label", "text2", wraps=True)
         self.none.setFont(font("label", weight=400))
         self.open = ActionButton("file", "Open the list", role="plain", height=30)
         self.leave_out.clicked.connect(self.leave_out_asked)
@@ -118,7 +118,7 @@ class ExclusionsCard(Card):
         self.area.setWidgetResizable(True)
         self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.area.setWidget(inside)
-        self.area.setAccessibleName("Left out")
+        self.area.setAccessibleName("Excluded")
         self.area.setMinimumHeight(96)
         self.lines: list[QWidget] = []
         self.column.addWidget(self.none)
@@ -145,8 +145,8 @@ class ExclusionsCard(Card):
 
     def _line(self, one: LeftOut) -> QWidget:
         """Return one decision with the way to take it back."""
-        back = ActionButton("undo", "Take back …", role="plain", height=30)
-        back.setAccessibleName(f"Take back: {one.what}")
+        back = ActionButton("undo", "Include again …", role="plain", height=30)
+        back.setAccessibleName(f"Include again: {one.what}")
         back.clicked.connect(lambda: self.take_back_asked.emit(one))
         return _line(one, back)
 

@@ -24,13 +24,13 @@ from study_app.viewmodels.results import LeftOut, ResultsView
 from study_app.viewmodels.sessions import SessionFacts
 
 STACKED_BELOW = 1160
-BESIDE, BESIDE_WIDE, WIDE_FROM = 374, 420, 1700
+PANEL_PX, PANEL_WIDE_PX, WIDE_FROM = 374, 420, 1700
 STACKED_HEIGHT, EXCLUSIONS = 330, 360
 MOST = 16_777_215
 REASON_SIGNS = 40
 EXTRAS: Final = (
-    Extra("wide", "Answers with a row a participant (wide)"),
-    Extra("parquet", "Every table as Parquet, too"),
+    Extra("wide", "Wide table: one row per participant"),
+    Extra("parquet", "Every table also as Parquet"),
     Extra("sav", "Answers for SPSS, jamovi and JASP (.sav)"),
     Extra("psych-ds", "A Psych-DS folder of all tables, to share"),
 )
@@ -111,12 +111,12 @@ class ResultsPlace(Place):
         self._left.setSpacing(12 - 2 * SHADOW)
         self._left.addWidget(self.sessions, 3)
         self._left.addWidget(self.exclusions, 1)
-        self._beside = QWidget()
-        self._beside.setLayout(self._left)
+        self._panel = QWidget()
+        self._panel.setLayout(self._left)
         self._left.setContentsMargins(0, 0, 0, 0)
         self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._row.setSpacing(16 - 2 * SHADOW)
-        self._row.addWidget(self._beside)
+        self._row.addWidget(self._panel)
         self._row.addWidget(self.figures, 1)
         inside = QWidget()
         page = QVBoxLayout(inside)
@@ -125,14 +125,14 @@ class ResultsPlace(Place):
         page.addLayout(self._head)
         page.addLayout(self._below)
         page.addLayout(self._row, 1)
-        self._area = QScrollArea()
-        self._area.setWidgetResizable(True)
-        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._area.setWidget(inside)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setWidget(inside)
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
-        whole.addWidget(self._area)
+        whole.addWidget(self.area)
 
     def hand_to(self, folder: Path) -> None:
         """Suggest another folder to write into from now on."""
@@ -164,7 +164,7 @@ class ResultsPlace(Place):
         for button in (self.unblind, self.export, self.report):
             button.setEnabled(view.can_be_written)
         self.exclusions.leave_out.setEnabled(any(one.excluded is None for one in view.sessions))
-        self._beside.setVisible(view.chosen is not None)
+        self._panel.setVisible(view.chosen is not None)
         self.figures.show_view(view)
 
     def _show_studies(self) -> None:
@@ -178,23 +178,23 @@ class ResultsPlace(Place):
         self.study.updateGeometry()
 
     def _show_chips(self) -> None:
-        told = []
+        chips = []
         if self.view.kind == "simulated":
-            told.append(("warn", "info", "Simulated participants", ""))
+            chips.append(("warn", "info", "Simulated participants", ""))
         if self.view.kind == "pilot":
-            told.append(("warn", "info", "Pilot", "Tried out, apart from the data"))
+            chips.append(("warn", "info", "Pilot", "Pilot sessions, stored separately"))
         if self.view.sealed:
-            told.append(("neutral", "lock", "Blinded: shown by code", "Which setting is which is sealed"))
+            chips.append(("neutral", "lock", "Blinded: shown by code", "The names of the settings are sealed"))
         if self.view.opened is not None:
-            told.append(("neutral", "eye", _shortened(self.view.opened.words), self.view.opened.words))
+            chips.append(("neutral", "eye", _shortened(self.view.opened.words), self.view.opened.words))
         if self.view.doubts:
             words = "1 file is" if len(self.view.doubts) == 1 else f"{len(self.view.doubts)} files are"
-            told.append(("warn", "warning", f"{words} not as recorded", "\n".join(self.view.doubts)))
-        if [chip.word for chip in self.chips] != [words for _, _, words, _ in told]:
+            chips.append(("warn", "warning", f"{words} not as recorded", "\n".join(self.view.doubts)))
+        if [chip.word for chip in self.chips] != [words for _, _, words, _ in chips]:
             for chip in self.chips:
                 take_away(chip)
             self.chips = []
-            for tone, icon, words, tip in told:
+            for tone, icon, words, tip in chips:
                 chip = Chip(tone, icon, words)  # type: ignore[arg-type]  # the tones above
                 chip.setToolTip(tip)
                 chip.wear(self.theme)
@@ -253,8 +253,10 @@ class ResultsPlace(Place):
             self,
             self.theme,
             title=f"Report of {self._name()}",
-            explanation="One page with figures, tests, what can be said and what cannot; beside it every number, table "
-            f"and figure as a file. Larger studies take some minutes.{self._by_code()}",
+            explanation=(
+                "One page with figures, tests and conclusions, and every number, table and figure as a file. Large "
+                "studies take some minutes.{self._by_code()}"
+            ),
             go_on="Write the report",
             to=self._handed_to / f"{self._name()}-report",
             opens="Open the report",
@@ -278,7 +280,7 @@ class ResultsPlace(Place):
         dialog.open()
 
     def _by_code(self) -> str:
-        return " Settings stay codes: the key is sealed." if self.view.sealed else ""
+        return " Settings appear as codes because the key is sealed." if self.view.sealed else ""
 
     def _name(self) -> str:
         return "" if self.view.chosen is None else self.view.chosen.name
@@ -289,10 +291,10 @@ class ResultsPlace(Place):
         down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
         self._row.setDirection(down if stacked else right)
         self._left.setDirection(right if stacked else down)
-        beside = BESIDE_WIDE if self.width() >= WIDE_FROM else BESIDE
+        width = PANEL_WIDE_PX if self.width() >= WIDE_FROM else PANEL_PX
         least, most = QSize(0, STACKED_HEIGHT), QSize(MOST, STACKED_HEIGHT)
-        self._beside.setMinimumSize(least if stacked else QSize(beside, 0))
-        self._beside.setMaximumSize(most if stacked else QSize(beside, MOST))
+        self._panel.setMinimumSize(least if stacked else QSize(width, 0))
+        self._panel.setMaximumSize(most if stacked else QSize(width, MOST))
         self.exclusions.setMaximumWidth(EXCLUSIONS if stacked else MOST)
         self.figures.show_whole(stacked)
         self._head.removeWidget(self._chips_there)

@@ -54,7 +54,7 @@ class Decision(Question):
         """Go on, or say what is missing and lead there."""
         for field, what in ((self.by, "a name"), (self.reason, "a reason")):
             if not field.text().strip():
-                self.missing.setText(f"This is recorded with {what}: please give one.")
+                self.missing.setText(f"Please enter {what}; it is recorded.")
                 self.missing.show()
                 field.setFocus()
                 return
@@ -69,8 +69,8 @@ class UnblindDialog(Decision):
             parent,
             theme,
             f"Unblind {study}?",
-            "From now on everybody who looks at this study sees which setting was which, here and in every table, "
-            "figure and report. That cannot be taken back. Your name, your reason and the time are kept with the data.",
+            "Everyone who opens this study will see which setting was which, here and in every table, figure and "
+            "report. This cannot be undone. Your name, the reason and the time are stored with the data.",
         )
         if running:
             row = QHBoxLayout()
@@ -78,7 +78,10 @@ class UnblindDialog(Decision):
             many = "1 session is" if running == 1 else f"{running} sessions are"
             row.addWidget(Icon("warning", "warn", 20), 0, Qt.AlignmentFlag.AlignTop)
             warns = label(
-                f"{many} not complete. Whoever runs the rest is not blind any more.", "label", "warn", wraps=True
+                f"{many} not complete. Operators of the remaining sessions will no longer be blind.",
+                "label",
+                "warn",
+                wraps=True,
             )
             row.addWidget(warns, 1)
             self.column.insertLayout(2, row)
@@ -111,9 +114,9 @@ class LeaveOutDialog(Decision):
         super().__init__(
             parent,
             theme,
-            "Leave out of the analysis",
-            "It does not count in measures, figures and tests any more. Nothing is deleted: what was left out, by whom "
-            "and why stands in exclusions.csv and in every report.",
+            "Exclude from the analysis",
+            "It no longer counts in measures, figures and tests. Nothing is deleted: exclusions.csv and every "
+            "report state what was excluded, by whom and why.",
         )
         self._trials = trials
         self.session = Choice()
@@ -124,11 +127,11 @@ class LeaveOutDialog(Decision):
                 self.session.setCurrentIndex(self.session.count() - 1)
         self.session.currentIndexChanged.connect(self._show_trials)
         self.add_field("Session", self.session)
-        self.add_field("What of it", self.trial)
+        self.add_field("Scope", self.trial)
         self.by.setPlaceholderText("Your initials, or the rule's name")
         self.reason.setPlaceholderText("For example: fell asleep")
         self._show_trials()
-        self.finish("By", "Reason", ActionButton("minus", "Leave out", role="primary"))
+        self.finish("By", "Reason", ActionButton("minus", "Exclude", role="primary"))
         set_ink(self.missing, "bad")
         self.session.setFocus()
 
@@ -140,7 +143,7 @@ class LeaveOutDialog(Decision):
 
     def _show_trials(self) -> None:
         self.trial.clear()
-        self.trial.addItem("The whole session", None)
+        self.trial.addItem("Whole session", None)
         for number, words in self._trials.get(tuple(self.session.currentData() or ("", 0)), ()):
             self.trial.addItem(f"Trial {number}: {words}", number)
 
@@ -152,12 +155,12 @@ class TakeBackDialog(Decision):
         super().__init__(
             parent,
             theme,
-            f"Take back: {what}",
-            f"It was left out with the reason “{reason}”. It will count again in measures, figures and tests. Your "
-            "name, your reason and the time are kept in exclusions_reversed.jsonl.",
+            f"Include again: {what}",
+            f"It was excluded for this reason: “{reason}”. It will count again in measures, figures and tests. Your "
+            "name, the reason and the time are stored in exclusions_reversed.jsonl.",
         )
         self.reason.setPlaceholderText("For example: wrong participant")
-        self.finish("By", "Reason", ActionButton("undo", "Take back", role="primary"))
+        self.finish("By", "Reason", ActionButton("undo", "Include again", role="primary"))
         self.by.setFocus()
 
 

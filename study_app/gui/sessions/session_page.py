@@ -21,8 +21,8 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.row_table import CHIP_ROLE, Index, Table
 from study_app.store.exclusions import Exclusion, exclude, include
-from study_app.viewmodels.session_columns import VALIDITY, status_chip, validity_chip
-from study_app.viewmodels.session_record import NO_MOTION, SessionRecord, TrialRecord, motion, read_record
+from study_app.viewmodels.session.columns import VALIDITY, status_chip, validity_chip
+from study_app.viewmodels.session.record import NO_MOTION, SessionRecord, TrialRecord, motion, read_record
 from study_app.viewmodels.sessions import SessionFacts
 
 HEADINGS = ("Trial", "Presented", "Ended", "Limits", "Answers", "Notes")
@@ -88,13 +88,15 @@ def trial_words(trial: TrialRecord) -> str:
     """Return a line on a trial's limits."""
     said = f"Trial {trial.number}: "
     if trial.excluded is not None:
-        said += f"left out of the analysis ({trial.excluded}). "
+        said += f"excluded from the analysis ({trial.excluded}). "
     if trial.broken:
         said += "; ".join(trial.broken) + "."
     else:
         said += "not measured." if trial.valid is None else "within all limits."
+    if trial.lost:
+        said += f" The recording was lost: {trial.lost}."
     if trial.unconfirmed:
-        said += f" Chosen and not confirmed, so in no table: {', '.join(trial.unconfirmed)}."
+        said += f" Chosen but not confirmed, so not in any table: {', '.join(trial.unconfirmed)}."
     return said
 
 
@@ -128,10 +130,10 @@ class SessionPage(QDialog):
         self.trial = label("", "label", "text2", wraps=True)
         self.motion = MotionPlot()
         self.notes, self.files = (label("", "label", "text2", wraps=True) for _ in range(2))
-        self.leave_out = ActionButton("minus", "Leave out …", height=36)
+        self.leave_out = ActionButton("minus", "Exclude …", height=36)
         self.folder = ActionButton("file", "Open the folder", role="plain", height=34)
         self.close_button = ActionButton("", "Close", role="primary", height=40)
-        self.none_out = label("Nothing of it is left out of the analysis.", "label", "text2", wraps=True)
+        self.none_out = label("Nothing is excluded from the analysis.", "label", "text2", wraps=True)
         self.lines: list[QWidget] = []
         self._lay_out()
         self.trials.selectionModel().selectionChanged.connect(lambda *_changes: self._choose_trial())
@@ -148,7 +150,7 @@ class SessionPage(QDialog):
 
     def read(self) -> None:
         """Read the session's folder again."""
-        self._reader.run(partial(_told, read_record, self.facts.folder))
+        self._reader.run(partial(_result, read_record, self.facts.folder))
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
@@ -164,7 +166,7 @@ class SessionPage(QDialog):
         trials.column.addWidget(self.trial)
         trials.column.addWidget(self.motion)
         left.addWidget(trials, 1)
-        out = Card("Left out", self.leave_out, padding=16, gap=8)
+        out = Card("Excluded", self.leave_out, padding=16, gap=8)
         self._out = out.column
         out.column.addWidget(self.none_out)
         notes = Card("Notes", padding=16, gap=8)
@@ -175,14 +177,14 @@ class SessionPage(QDialog):
         for card in (out, notes, files):
             right.addWidget(card)
         right.addStretch()
-        beside = QWidget()
-        beside.setLayout(right)
+        page = QWidget()
+        page.setLayout(right)
         right.setContentsMargins(0, 0, 0, 0)
         area = QScrollArea()
         area.setWidgetResizable(True)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setFixedWidth(372)
-        area.setWidget(beside)
+        area.setWidget(page)
         area.setAccessibleName("Exclusions, notes and files")
         body = QHBoxLayout()
         body.setSpacing(8)
@@ -200,27 +202,27 @@ class SessionPage(QDialog):
         column.addLayout(body, 1)
         column.addLayout(foot)
 
-    def _show(self, told: SessionRecord | StoreError) -> None:
+    def _show(self, record: SessionRecord | StoreError) -> None:
         """Show what was read, or why it cannot be read."""
-        if isinstance(told, StoreError):
-            sentence = str(told)
+        if isinstance(record, StoreError):
+            sentence = str(record)
             self.limits.setText(f"{sentence[:1].upper()}{sentence[1:]}.")
             set_ink(self.limits, "bad")
             return
         row = self.trials.currentIndex().row()
-        self.record = told
+        self.record = record
         set_ink(self.limits, "text")
-        self.status.show_state(*status_chip(told.facts))
-        self.validity.show_state(*validity_chip(told.facts))
-        self.about.setText(told.about)
-        self.limits.setText(told.limits)
-        self.model.show(told.trials)
-        if told.trials:
+        self.status.show_state(*status_chip(record.facts))
+        self.validity.show_state(*validity_chip(record.facts))
+        self.about.setText(record.about)
+        self.limits.setText(record.limits)
+        self.model.show(record.trials)
+        if record.trials:
             self.trials.selectRow(max(0, row))
-        self.notes.setText("\n".join(told.notes) or "No note was written.")
-        self.files.setText("\n".join(f"{name}  {_size(size)}" for name, size in told.files))
-        self.leave_out.setEnabled(told.facts.excluded is None)
-        self._show_left_out(told.left_out)
+        self.notes.setText("\n".join(record.notes) or "No notes.")
+        self.files.setText("\n".join(f"{name}  {_size(size)}" for name, size in record.files))
+        self.leave_out.setEnabled(record.facts.excluded is None)
+        self._show_left_out(record.left_out)
         self._choose_trial()
 
     def _show_left_out(self, listed: tuple[Exclusion, ...]) -> None:
@@ -228,9 +230,9 @@ class SessionPage(QDialog):
             take_away(line)
         self.lines = []
         for one in listed:
-            what = "The whole session" if one.trial is None else f"Trial {one.trial}"
-            back = ActionButton("undo", "Take back …", role="plain", height=30)
-            back.setAccessibleName(f"Take back: {what}")
+            what = "Whole session" if one.trial is None else f"Trial {one.trial}"
+            back = ActionButton("undo", "Include again …", role="plain", height=30)
+            back.setAccessibleName(f"Include again: {what}")
             back.setAutoDefault(False)
             back.clicked.connect(partial(self._ask_take_back, one, what))
             line = QWidget()
@@ -253,7 +255,7 @@ class SessionPage(QDialog):
         trial = self.chosen
         if trial is None or self.record is None:
             self.trial.setText("")
-            self.motion.show_sentence("No trial was presented yet.")
+            self.motion.show_sentence("No trials yet.")
             return
         self.trial.setText(trial_words(trial))
         set_ink(self.trial, "warn" if trial.broken else "text2")
@@ -261,13 +263,13 @@ class SessionPage(QDialog):
             self.motion.show_sentence(NO_MOTION if trial.recording is None else self.record.motion_hidden)
             return
         self.motion.show_sentence("Reading …")
-        self._mover.run(partial(_told, motion, trial.recording))
+        self._mover.run(partial(_result, motion, trial.recording))
 
-    def _show_motion(self, told: Any) -> None:
-        if isinstance(told, StoreError):
-            self.motion.show_sentence(f"The recording cannot be read: {told}.")
+    def _show_motion(self, motion: Any) -> None:
+        if isinstance(motion, StoreError):
+            self.motion.show_sentence(f"The recording cannot be read: {motion}.")
         else:
-            self.motion.show_motion(*told)
+            self.motion.show_motion(*motion)
 
     def _ask_leave_out(self) -> None:
         assert self.record is not None  # noqa: S101 - the button is off until it was read
@@ -302,14 +304,14 @@ class SessionPage(QDialog):
             decide()
             return read_record(folder)
 
-        self._reader.run(partial(_told, decided, self.facts.folder))
+        self._reader.run(partial(_result, decided, self.facts.folder))
         self._reader.done.connect(self._tell_change, Qt.ConnectionType.SingleShotConnection)
 
     def _tell_change(self) -> None:
         self.changed.emit()
 
 
-def _told(read: Callable[[Path], Any], path: Path) -> Any:
+def _result(read: Callable[[Path], Any], path: Path) -> Any:
     """Return what ``read`` returns, or the refusal."""
     try:
         return read(path)

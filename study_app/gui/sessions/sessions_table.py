@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.row_table import BELOW_ROLE, CARE_ROLE, CHIP_ROLE, MARGIN, Index, Table
-from study_app.viewmodels.session_columns import Column, answers_words, status_chip, validity_chip
+from study_app.viewmodels.session.columns import Column, answers_words, incidents, status_chip, validity_chip
 from study_app.viewmodels.sessions import SessionFacts, started_words
 
 NOWHERE = QModelIndex()
@@ -64,20 +64,27 @@ class SessionsModel(QAbstractTableModel):
                 return chip(facts)[2] if chip else self._words(facts, name)
             case Qt.ItemDataRole.AccessibleTextRole:
                 words = chip(facts)[2] if chip else self._words(facts, name)
-                return f"{words}, {facts.kind}" if name == "study" and facts.kind else words
+                return ", ".join(filter(None, (words, self._below(facts, name))))
             case Qt.ItemDataRole.ToolTipRole:
                 if name == "validity" and facts.excluded is not None:
-                    return f"Left out of the analysis: {facts.excluded}"
-                return f"{facts.name}: began {started_words(facts.started, self._now)}, {answers_words(facts)} answers"
+                    return f"Excluded from the analysis: {facts.excluded}"
+                said = f"{facts.name}: began {started_words(facts.started, self._now)}, {answers_words(facts)} answers"
+                return ", ".join(filter(None, (said, incidents(facts))))
             case Qt.ItemDataRole.FontRole if name == "participant":
                 return font("label", weight=600, scale=1.08)
             case _ if role == CHIP_ROLE:
                 return chip(facts) if chip else None
             case _ if role == BELOW_ROLE:
-                return facts.kind if name == "study" else None
+                return self._below(facts, name)
             case _ if role == CARE_ROLE:
                 return facts.needs_care
         return None
+
+    def _below(self, facts: SessionFacts, name: str) -> str:
+        """Return the small words below a cell's: what kind of session it is, and what happened to its device."""
+        if name == "status" and facts.reconnected:
+            return "device reconnected"
+        return facts.kind if name == "study" else ""
 
     def _words(self, facts: SessionFacts, name: str) -> str:
         match name:

@@ -37,7 +37,7 @@ class OffsetForm(QWidget):
         self.said.setMinimumWidth(LEAST_WORDS)
         self.sign = Icon("warning", "bad", 16)
         self.why = label("", "label", "bad", wraps=True)
-        self.keep = ActionButton("save", "Keep offset", height=38)
+        self.keep = ActionButton("save", "Save offset", height=38)
         self.forget = ActionButton("", "Forget", height=38)
         for button in (self.keep, self.forget):
             button.setAutoDefault(False)
@@ -98,7 +98,7 @@ class OffsetForm(QWidget):
             good = value is not None and least <= value <= most
             field.show_state("" if good else "refused")
             if value is None or not good:
-                self._refuse(f"{name} is a number from {least:g} to {most:g} ms.")
+                self._refuse(f"{name} must be a number from {least:g} to {most:g} ms.")
                 field.setFocus()
                 return
             found.append(value)
@@ -116,8 +116,11 @@ class OffsetForm(QWidget):
 def offset_words(offset: DisplayOffset | None, screen: str) -> str:
     """Return what is known of a screen's offset, in a sentence."""
     if offset is None:
-        return "Not measured. What is painted lights up a little later; receipts say that nobody knows by how much."
-    told = f"{write_number(offset.mean_ms, DECIMALS)} ± {write_number(offset.spread_ms, DECIMALS)} ms"
+        return (
+            "Not measured. The screen shows each frame slightly later; the delay is recorded as “not measured” in "
+            "every receipt."
+        )
+    text = f"{write_number(offset.mean_ms, DECIMALS)} ± {write_number(offset.spread_ms, DECIMALS)} ms"
     when = f", {offset.measured}" if offset.measured else ""
-    where = "" if offset.screen == screen else f" of another screen ({offset.screen}): it does not count here"
-    return f"{told} by {offset.how}{when}{where}."
+    where = "" if offset.screen == screen else f" for another screen ({offset.screen}): not used here"
+    return f"{text} by {offset.how}{when}{where}."

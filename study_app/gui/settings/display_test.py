@@ -25,7 +25,7 @@ from study_app.gui.widgets.number_field import NumberField, write_number
 from study_app.store.workstation import DisplayOffset
 from study_app.viewmodels.frame_times import LEAST_S, FrameFigures, FrameTimes
 
-TOLD_MS = 500
+REPORT_MS = 500
 INTERVAL_MS = (50.0, 5000.0)
 FIRST_MS = 500.0
 NAMES = ("Frames painted", "Median gap", "99 % of gaps within", "Missed in 10 s")
@@ -74,7 +74,7 @@ class DisplayTest(QWidget):
         self._unpainted = False
         self.interval = NumberField()
         self.interval.setFixedWidth(88)
-        self.interval.setAccessibleName("The patch toggles every, ms")
+        self.interval.setAccessibleName("Interval of the patch, ms")
         self.interval.show_text(write_number(FIRST_MS, 0))
         self.values: list[QLabel] = [figures("–", "number") for _ in NAMES]
         self.offset = OffsetForm()
@@ -84,9 +84,9 @@ class DisplayTest(QWidget):
         wear(self, PARTICIPANT)
         self.frames = Frames(self.times.refresh_hz, now_ns=now_ns, parent=self)
         self.frames.due.connect(self.frame)
-        self.told = QTimer(self)
-        self.told.setInterval(TOLD_MS)
-        self.told.timeout.connect(self.tell)
+        self.report_timer = QTimer(self)
+        self.report_timer.setInterval(REPORT_MS)
+        self.report_timer.timeout.connect(self.tell)
 
     def _lay_out(self, screen_words: str) -> None:
         titles = QVBoxLayout()
@@ -126,9 +126,9 @@ class DisplayTest(QWidget):
             for standing in (True, False):
                 row.addWidget(LineField(thick, standing=standing), 2)
         words = label(
-            "Every line is 1 or 2 pixels of the screen. Where a field looks grey all over, shimmers or shows broad "
-            "bands, the system scales the picture: set the screen to its own resolution. All seventeen greys above "
-            "should differ.",
+            "Every line is 1 or 2 pixels wide. If a field looks uniformly grey, shimmers or shows broad bands, the "
+            "system scales the picture: set the screen to its native resolution. All seventeen greys above should "
+            "differ.",
             "body",
             "text2",
             wraps=True,
@@ -142,7 +142,7 @@ class DisplayTest(QWidget):
         toggling = QVBoxLayout()
         toggling.setSpacing(6)
         toggling.addWidget(label("Photodiode's patch", "card"))
-        toggling.addWidget(label("Toggles every, ms", "label", "text2"))
+        toggling.addWidget(label("Interval, ms", "label", "text2"))
         toggling.addWidget(self.interval)
         self.why = label("", "label", "bad", wraps=True)
         toggling.addWidget(self.why)
@@ -153,7 +153,7 @@ class DisplayTest(QWidget):
         measured.addWidget(self.offset)
         measured.addStretch()
         row = QHBoxLayout()
-        row.setContentsMargins(0, 0, 120, 0)  # the patch's corner is nobody else's
+        row.setContentsMargins(0, 0, 120, 0)  # the patch's corner is free
         row.setSpacing(48)
         row.addLayout(toggling)
         row.addLayout(measured, 1)
@@ -178,7 +178,7 @@ class DisplayTest(QWidget):
         """Begin to paint and to count."""
         self._toggled_ns = self._now_ns()
         self.frames.start()
-        self.told.start()
+        self.report_timer.start()
 
     def frame(self) -> None:
         """Ask for a frame, as a session does; the patch toggles when its time has come."""
@@ -188,7 +188,7 @@ class DisplayTest(QWidget):
             self.lit = not self.lit
             self.toggles += 1
         self._unpainted = True
-        self.update(self._patch())
+        self.update(self.patch_area())
 
     def tell(self) -> None:
         """Show what the frames come to."""
@@ -199,7 +199,8 @@ class DisplayTest(QWidget):
         """Show the offset that is kept."""
         self.offset.show_offset(offset, screen)
 
-    def _patch(self) -> QRect:
+    def patch_area(self) -> QRect:
+        """Return where the photodiode's patch is."""
         return patch_place(self.width(), self.height()).toAlignedRect()
 
     def _set_interval(self, value: float) -> None:
@@ -235,7 +236,7 @@ class DisplayTest(QWidget):
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
         """Stop painting."""
         self.frames.stop()
-        self.told.stop()
+        self.report_timer.stop()
         super().closeEvent(event)
         self.left.emit()
 

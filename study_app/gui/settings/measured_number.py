@@ -70,7 +70,7 @@ class Measure(QWidget):
 
     def _refuse(self) -> None:
         least, most = self.limits
-        self._say(f"A number from {least:g} to {most:g} {self.unit}; empty where it is not known.", bad=True)
+        self._say(f"A number from {least:g} to {most:g} {self.unit}; leave empty if unknown.", bad=True)
 
     def _say(self, words: str, *, bad: bool) -> None:
         self.field.show_state("refused" if bad else "")

@@ -16,7 +16,7 @@ FIELD = 120
 
 
 class GreyRamp(QWidget):
-    """Seventeen greys from black to white, each to be told from the next."""
+    """Seventeen greys from black to white, each distinguishable from the next."""
 
     def __init__(self) -> None:
         super().__init__()

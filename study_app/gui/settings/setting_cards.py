@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QButtonGroup, QFileDialog, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from study_app.devices.registry import list_devices
+from study_app.devices.registry import list_devices, title_of
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.settings.display_offset import OffsetForm
 from study_app.gui.settings.measured_number import LEAST_WORDS, Measure
@@ -15,7 +15,6 @@ from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice, Radio, Toggle
 from study_app.gui.widgets.labels import Elided, label
 from study_app.store.workstation import DISTANCE_MM, LEAST_X_HEIGHT_DEG, WIDTH_MM, MachineSettings
-from study_app.viewmodels.device_list import TITLES
 
 SAMPLE = "I think this feels like interacting with a liquid."
 MOST_SAMPLE = 2.4
@@ -56,7 +55,7 @@ class ScreensCard(Card):
             self._make(screens)
         for number, radio in enumerate(self.radios, start=1):
             radio.setChecked(number == chosen)
-        self.note.setText(f"{missing} is not connected; the last screen stands in for it." if missing else "")
+        self.note.setText(f"{missing} is not connected; the last screen is used instead." if missing else "")
         self.note.setVisible(bool(missing))
 
     def _make(self, screens: tuple[ScreenShown, ...]) -> None:
@@ -81,7 +80,7 @@ def _screen_row(screen: ScreenShown) -> tuple[QWidget, Radio]:
     """Return a screen's row, and the mark in it."""
     radio = Radio(f"Screen {screen.number}")
     radio.setFont(font("strong"))
-    size = f"{screen.width_mm:.0f} × {screen.height_mm:.0f} mm" if screen.width_mm > 0 else "its size is not told"
+    size = f"{screen.width_mm:.0f} × {screen.height_mm:.0f} mm" if screen.width_mm > 0 else "size unknown"
     about = label(f"{screen.words}  ·  {size}", "label", "text2", wraps=True)
     about.setFont(font("label", weight=400, tabular=True))
     about.setMinimumWidth(LEAST_WORDS)
@@ -111,7 +110,7 @@ class TextSample(QWidget):
         super().__init__()
         self.scale = 1.0
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(f"A statement as large as participants read it: {SAMPLE}")
+        self.setAccessibleName(f"A statement at the size that participants see: {SAMPLE}")
         self.setFixedHeight(self.sizeHint().height())
 
     def show_scale(self, scale: float) -> None:
@@ -143,7 +142,7 @@ class SeenCard(Card):
     changed = Signal(str, object)
 
     def __init__(self) -> None:
-        super().__init__("Words as large as they must be read", gap=10)
+        super().__init__("Text size for the participant", gap=10)
         self.distance = Measure("Viewing distance, eye to screen", "mm", DISTANCE_MM)
         self.width_mm = Measure("Width of the picture on the screen", "mm", WIDTH_MM)
         self.sample = TextSample()
@@ -157,10 +156,15 @@ class SeenCard(Card):
 
     def show_settings(self, settings: MachineSettings, screen: ScreenShown) -> None:
         """Show what is set, and what follows for this screen."""
-        told = f"The system says {screen.width_mm:.0f} mm." if screen.width_mm > 0 else "The system does not tell it."
+        text = (
+            (f"The system reports {screen.width_mm:.0f} mm.")
+            if screen.width_mm > 0
+            else "The system does not report it."
+        )
         self.distance.show_value(settings.viewing_distance_mm, "")
         self.width_mm.show_value(
-            settings.screen_width_mm, told if settings.screen_width_mm is None else f"{told} The measured one counts."
+            settings.screen_width_mm,
+            text if settings.screen_width_mm is None else (f"{text} The measured value is used."),
         )
         scale = settings.text_scale(screen.width_px, screen.width_mm)
         self.sample.show_scale(scale)
@@ -171,10 +175,12 @@ def _size_words(settings: MachineSettings, screen: ScreenShown, scale: float) ->
     """Return what the distance means for the size of words, in a sentence."""
     seen = settings.x_height_deg(screen.width_px, screen.width_mm)
     if seen is None:
-        return "Measure the distance: words then grow until an x is seen under 0.4°. Until then they are as designed."
+        return (
+            "Measure the distance: text is then enlarged until an x subtends 0.4°. Until then it has its default size."
+        )
     if scale == 1.0:
-        return f"As designed: an x is seen under {seen:.2f}°, and {LEAST_X_HEIGHT_DEG:g}° are needed."
-    return f"{scale:.2f} times as designed, so that an x is seen under {LEAST_X_HEIGHT_DEG:g}° instead of {seen:.2f}°."
+        return f"Default size: an x subtends {seen:.2f}°; at least {LEAST_X_HEIGHT_DEG:g}° is needed."
+    return f"{scale:.2f} times the default size: an x subtends {LEAST_X_HEIGHT_DEG:g}° instead of {seen:.2f}°."
 
 
 class OffsetCard(Card):
@@ -205,7 +211,7 @@ class SessionsCard(Card):
         self.device.setFont(font("body"))
         self.device.setAccessibleName("Device of new sessions")
         for name in list_devices():
-            self.device.addItem(TITLES.get(name, name), name)
+            self.device.addItem(title_of(name), name)
         self.devices = ActionButton("", "Devices", height=40)
         self.folder = Elided("label", "text")
         self.change = ActionButton("", "Change …", height=40)
@@ -246,7 +252,7 @@ class WindowsCard(Card):
         self.theme_choice.setAccessibleName("Theme of the operator's windows")
         for name, words in (("light", "Light"), ("dark", "Dark")):
             self.theme_choice.addItem(words, name)
-        self.sound = Toggle("Sound when a device asks for something")
+        self.sound = Toggle("Sound when a device needs attention")
         self.sound.setFont(font("body"))
         self.theme_choice.activated.connect(lambda _index: self.changed.emit("theme", self.theme_choice.currentData()))
         self.sound.clicked.connect(lambda on: self.changed.emit("sound", on))

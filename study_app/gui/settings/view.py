@@ -53,7 +53,7 @@ class MachinePlace(Place):
         titles = QVBoxLayout()
         titles.setSpacing(4)
         titles.addWidget(label("This machine", "title"))
-        about = "What this computer and its screens are like, apart from every study. Kept at once."
+        about = "Settings of this computer and its screens, independent of every study. Changes are saved immediately."
         titles.addWidget(label(about, "body", "text2", wraps=True))
         head = QHBoxLayout()
         head.setContentsMargins(SHADOW, 0, SHADOW, 0)
@@ -128,7 +128,7 @@ class MachinePlace(Place):
         self.sessions.show_settings(settings, folder)
         self.windows.show_settings(settings)
         self.offset.patch.setChecked(settings.photodiode)
-        self.kept_in.show_text(f"Kept in {kept_in}")
+        self.kept_in.show_text(f"Saved in {kept_in}")
         self._show()
 
     def _show(self) -> None:

@@ -27,7 +27,7 @@ class Theme:
     """Colours by role, as ``#RRGGBB``; ``dark`` tells which way hover and shadow go.
 
     ``ctl`` edges controls (≥ 3:1), ``border`` and ``grid`` only decorate; ``text3`` never stands on ``sunk``; ``stop``
-    is the force stop's and nobody else's. ``hover`` is the fill of a control under the pointer, ``selected`` of the
+    is the force stop's alone. ``hover`` is the fill of a control under the pointer, ``selected`` of the
     place one is at.
     """
 

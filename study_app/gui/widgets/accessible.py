@@ -1,4 +1,4 @@
-"""What screen readers are told beyond Qt's own roles: headings, plots, the participant's window."""
+"""What screen readers receive beyond Qt's own roles: headings, plots, the participant's window."""
 
 from __future__ import annotations
 

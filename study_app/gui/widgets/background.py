@@ -1,4 +1,4 @@
-"""Jobs beside the window's thread: neither a slow disk nor a long computation freezes a window."""
+"""Jobs outside the window's thread: neither a slow disk nor a long computation freezes a window."""
 
 from __future__ import annotations
 

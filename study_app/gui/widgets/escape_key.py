@@ -77,7 +77,7 @@ class EscapeAnywhere(QObject):
         return False
 
     def _watch(self, window: QWindow | None) -> None:
-        """Listen to the window that has the keyboard now: no other one is told of keys."""
+        """Listen to the window that has the keyboard now: no other one receives keys."""
         if window is not None and window is not self._watched:
             window.removeEventFilter(self)  # one that comes back is listened to once
             window.installEventFilter(self)

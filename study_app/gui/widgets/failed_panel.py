@@ -28,7 +28,7 @@ class FailedPanel(Themed, QWidget):
     def __init__(self, panel: QWidget, name: str) -> None:
         super().__init__(panel)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing below it is painted any more
-        self.line = label(f"{name}: this panel failed. The session goes on.", "label", "bad", wraps=True)
+        self.line = label(f"{name}: this panel failed. The session continues.", "label", "bad", wraps=True)
         self.setToolTip(self.line.text())
         row = QHBoxLayout(self)
         row.setContentsMargins(14, 8, 14, 8)
@@ -76,7 +76,7 @@ class Panels(QObject):
 
     def __init__(self, names: Mapping[QWidget, str]) -> None:
         super().__init__()
-        self._names = dict(names)
+        self.names = dict(names)
         self.covers: dict[QWidget, FailedPanel | None] = {}
 
     def draw(self, panel: QWidget, how: Callable[[], object]) -> None:
@@ -85,29 +85,29 @@ class Panels(QObject):
             return
         try:
             how()
-        except Exception as error:  # the panel guard: what fails is told, and switched off
+        except Exception as error:  # the panel guard: what fails is reported, and switched off
             if not self.take(error, panel):
                 raise
 
     def take(self, error: BaseException, drawn: QWidget | None = None) -> bool:
         """Return whether ``error`` was raised in a panel, by default any of them; that one is switched off then."""
         panel = next(filter(None, map(self._panel_of, _widgets(error.__traceback__))), drawn)
-        if panel not in self._names or not isinstance(error, Exception):
+        if panel not in self.names or not isinstance(error, Exception):
             return False
         if panel not in self.covers:
             self.covers[panel] = None
             QTimer.singleShot(0, panel, lambda: self._cover(panel))  # not while it is being painted
-            self.failed.emit(self._names[panel], error)
+            self.failed.emit(self.names[panel], error)
         clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
         return True
 
     def _panel_of(self, widget: QWidget) -> QWidget | None:
-        return next((panel for panel in self._names if panel is widget or panel.isAncestorOf(widget)), None)
+        return next((panel for panel in self.names if panel is widget or panel.isAncestorOf(widget)), None)
 
     def _cover(self, panel: QWidget) -> None:
         for child in panel.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
             child.setEnabled(False)  # no keys go there
-        cover = self.covers[panel] = FailedPanel(panel, self._names[panel])
+        cover = self.covers[panel] = FailedPanel(panel, self.names[panel])
         dress(cover, getattr(panel.window(), "theme", LIGHT))
         cover.show()
 

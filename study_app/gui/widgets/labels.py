@@ -46,12 +46,12 @@ class Elided(QLabel):
         self.setFont(font(role))
         self.setProperty("role", ink)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self._whole = ""
+        self.whole = ""
 
     def show_text(self, text: str) -> None:
         """Show ``text``, as much of it as there is room for."""
-        if text != self._whole:
-            self._whole = text
+        if text != self.whole:
+            self.whole = text
             self.setAccessibleName(text)
             self.updateGeometry()
             self._elide()
@@ -59,7 +59,7 @@ class Elided(QLabel):
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the room for the whole text."""
         metrics = QFontMetricsF(self.font())
-        return QSize(round(metrics.horizontalAdvance(self._whole)) + 2, round(metrics.height()) + 2)
+        return QSize(round(metrics.horizontalAdvance(self.whole)) + 2, round(metrics.height()) + 2)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the least that still says something."""
@@ -71,9 +71,9 @@ class Elided(QLabel):
         self._elide()
 
     def _elide(self) -> None:
-        shown = self.fontMetrics().elidedText(self._whole, Qt.TextElideMode.ElideRight, self.width())
+        shown = self.fontMetrics().elidedText(self.whole, Qt.TextElideMode.ElideRight, self.width())
         self.setText(shown)
-        self.setToolTip(self._whole if shown != self._whole else "")
+        self.setToolTip(self.whole if shown != self.whole else "")
 
 
 class Clamped(QLabel):
@@ -87,7 +87,7 @@ class Clamped(QLabel):
         self.setWordWrap(True)
         self.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.setAccessibleName(text)
-        self._whole, self._most = text, lines
+        self.whole, self._most = text, lines
         self.setFixedHeight(lines * self.fontMetrics().lineSpacing() + 2)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
@@ -97,8 +97,8 @@ class Clamped(QLabel):
 
     def show_text(self, text: str) -> None:
         """Show ``text``, as much of it as there is room for."""
-        if text != self._whole:
-            self._whole = text
+        if text != self.whole:
+            self.whole = text
             self.setAccessibleName(text)
             self._cut()
 
@@ -109,16 +109,16 @@ class Clamped(QLabel):
             rest = self.fontMetrics().elidedText(rest, Qt.TextElideMode.ElideRight, self.width())
             lines = [*lines[: self._most - 1], rest]
         self.setText("\n".join(lines))
-        self.setToolTip(self._whole if lines and lines[-1].endswith("…") else "")
+        self.setToolTip(self.whole if lines and lines[-1].endswith("…") else "")
 
     def _broken(self, width: int) -> list[str]:
         """Return the text in lines that fit into ``width``."""
-        layout = QTextLayout(self._whole, self.font())
+        layout = QTextLayout(self.whole, self.font())
         layout.beginLayout()
         lines = []
         while (line := layout.createLine()).isValid():
             line.setLineWidth(width)
-            lines.append(self._whole[line.textStart() : line.textStart() + line.textLength()].strip())
+            lines.append(self.whole[line.textStart() : line.textStart() + line.textLength()].strip())
         layout.endLayout()
         return lines
 

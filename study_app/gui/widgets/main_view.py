@@ -9,12 +9,12 @@ from study_app.gui.theme.themed import Themed
 
 
 class Place(Themed, QWidget):
-    """A part that fills the main window beside the rail.
+    """A part that fills the main window next to the rail.
 
-    ``told`` carries a title and a sentence that the main window is to say, ``go_asked`` the name of another place.
+    ``message`` carries a title and a sentence that the main window is to say, ``go_asked`` the name of another place.
     """
 
-    told = Signal(str, str)
+    message = Signal(str, str)
     go_asked = Signal(str)
 
     def enter(self) -> None:

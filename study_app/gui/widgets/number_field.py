@@ -36,7 +36,7 @@ def write_number(value: float, decimals: int) -> str:
 class NumberField(QLineEdit):
     """A low field for a number; Return or leaving it takes it, Esc goes back, Up and Down step; Return tries again.
 
-    ``entered(value)`` comes once for what was typed; ``unread(text)`` where it is no number; ``abandoned()`` at Esc;
+    ``entered(value)`` comes once for what was typed; ``unread(text)`` where it is not a number; ``abandoned()`` at Esc;
     ``stepped(steps)`` at Up and Down. While something is typed, `show_text` does not touch it.
     """
 
@@ -129,7 +129,7 @@ class NumberField(QLineEdit):
         self._take()
 
     def _take(self) -> None:
-        """Say what was typed, once; it stays where it says no number."""
+        """Say what was typed, once; it stays where it is not a number."""
         if not self.isModified():
             return
         value = read_number(self.text())

@@ -1,6 +1,6 @@
 """Live plots in the program's own look: pyqtgraph draws the curves, everything else about it is switched off.
 
-Horizontal grid only, few ticks, curves named at their ends and told apart by stroke as well as colour.
+Horizontal grid only, few ticks, curves named at their ends and distinguished by stroke as well as colour.
 """
 
 from __future__ import annotations
@@ -66,6 +66,7 @@ class Plot(Themed, pg.GraphicsView):
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.box = pg.ViewBox(enableMenu=False, enableMouse=False, defaultPadding=0)
         self.axes = {side: pg.AxisItem(side) for side in ("left", "bottom")}
+        self.ticks: dict[str, list[tuple[float, str]]] = {}
         whole = pg.GraphicsLayout()
         whole.setContentsMargins(0, 0, 0, 0)
         whole.setSpacing(0)
@@ -108,6 +109,7 @@ class Plot(Themed, pg.GraphicsView):
 
     def show_ticks(self, side: str, ticks: list[tuple[float, str]]) -> None:
         """Write ``ticks`` (place, text) at an axis; those of y also get a grid line."""
+        self.ticks[side] = ticks
         self.axes[side].setTicks([ticks])
         if side == "left":
             for line in self._grid:
@@ -143,7 +145,7 @@ class TracePlot(Plot):
     def __init__(self, span_s: float, reach: float, names: Sequence[str] = NAMES) -> None:
         super().__init__()
         self._span_s = span_s
-        self._asked = self._reach = reach
+        self._asked = self.reach = reach
         self._rows_and_step = (0, 0.0)
         self._name_height = self._names_after_s = 0.0
         self._newest: list[float] = []
@@ -174,9 +176,9 @@ class TracePlot(Plot):
         most = 3 if height > 130 else 2 if height > 84 else 1  # grid lines on either side of zero
         step = step_for(self._asked, most)
         rows = max(1, int(np.ceil(self._asked / step - 1e-9)))
-        self._reach = rows * step
-        self._name_height = 2 * self._reach * (LINE_PX + 1) / (height - LINE_PX)
-        beyond = self._reach * height / (height - LINE_PX)
+        self.reach = rows * step
+        self._name_height = 2 * self.reach * (LINE_PX + 1) / (height - LINE_PX)
+        beyond = self.reach * height / (height - LINE_PX)
         self.box.setYRange(-beyond, beyond, padding=0)
         named = max(end.textItem.boundingRect().width() for end in self.ends) + NAMES_AFTER_PX + 2
         share = min(0.4, named / width)
@@ -189,7 +191,7 @@ class TracePlot(Plot):
 
     def show_traces(self, times_s: Floats, values: Floats) -> None:
         """Draw ``values`` (n, curves) over ``times_s`` (n,), zero being now."""
-        if len(values) and float(np.nanmax(np.abs(values))) > 1.08 * self._reach:
+        if len(values) and float(np.nanmax(np.abs(values))) > 1.08 * self.reach:
             self.show_reach(float(np.nanmax(np.abs(values))))
         for axis, curve in enumerate(self.curves):
             curve.setData(times_s, values[:, axis])
@@ -202,7 +204,7 @@ class TracePlot(Plot):
         """Put every name at its curve's newest end, or as near to it as the others and the plot's edges let it."""
         if not self._newest:
             return
-        for end, height in zip(self.ends, apart(self._newest, self._name_height, self._reach), strict=True):
+        for end, height in zip(self.ends, apart(self._newest, self._name_height, self.reach), strict=True):
             end.setPos(QPointF(self._names_after_s, height))
 
     def wear(self, theme: Theme) -> None:
@@ -245,8 +247,8 @@ class LatenessPlot(Plot):
     def _make_room(self) -> None:
         """Keep two lines of text free above the bars: the limit's name stands above that of the 99th percentile."""
         across, up = self._decades
-        beside = min(0.2, HALF_TICK_PX / max(1.0, self.box.width()))  # half of the last tick's text
-        last = across * (1 + beside / (1 - beside))
+        share = min(0.2, HALF_TICK_PX / max(1.0, self.box.width()))  # half of the last tick's text
+        last = across * (1 + share / (1 - share))
         self.box.setXRange(-0.02 * across, last, padding=0)
         apart = 1 if self.box.width() >= DIGIT_PX * (across + 1) * (last + 0.02 * across) else 2
         self.show_ticks("bottom", [(k, number(10.0**k)) for k in range(0, across + 1, apart)])

@@ -29,7 +29,7 @@ Index = QModelIndex | QPersistentModelIndex
 CHIP_ROLE = Qt.ItemDataRole.UserRole + 1
 """Tone, icon and word of a chip, in place of the text."""
 BELOW_ROLE = Qt.ItemDataRole.UserRole + 2
-"""A word in small letters below the text."""
+"""A word in small letters below the text or chip."""
 CARE_ROLE = Qt.ItemDataRole.UserRole + 3
 """Whether the row is tinted because it needs care."""
 
@@ -42,16 +42,19 @@ class _Cells(QStyledItemDelegate):
         assert isinstance(table, Table)  # noqa: S101 - made by it
         theme = table.theme
         place = QRectF(option.rect).adjusted(MARGIN if index.column() == 0 else GAP, 0, -GAP, 0)  # type: ignore[attr-defined]
-        chip = index.data(CHIP_ROLE)
+        chip, below = index.data(CHIP_ROLE), index.data(BELOW_ROLE)
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if chip is not None:
             size = QSize(min(chip_size(chip[2], small=True).width(), int(place.width())), 24)
-            body = QRectF(place.left(), place.center().y() - 12, size.width(), 24)
+            top = place.top() + 1 if below else place.center().y() - 12
+            body = QRectF(place.left(), top, size.width(), 24)
             paint_chip(painter, body, theme, *chip, small=True)
+            if below:
+                lower = QRectF(place.left() + GAP, body.bottom(), place.width() - GAP, place.bottom() - body.bottom())
+                _write(painter, lower, font("small"), theme.text2, below)
             painter.restore()
             return
-        below = index.data(BELOW_ROLE)
         face = index.data(Qt.ItemDataRole.FontRole) or font("label", weight=400, tabular=True)
         upper = QRectF(place) if not below else QRectF(place.left(), place.top() + 3, place.width(), place.height() / 2)
         _write(painter, upper, face, theme.text if index.column() == 0 else theme.text2, str(index.data() or ""))

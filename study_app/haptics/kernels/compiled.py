@@ -14,7 +14,6 @@ import os
 import re
 import secrets
 import shutil
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +21,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 from numba.core.options import DefaultOptions
+from platformdirs import user_cache_path
 
 log = logging.getLogger(__name__)
 
@@ -50,28 +50,23 @@ def _digest_of_sources() -> str:
     return digest.hexdigest()[:16]
 
 
-def _user_cache() -> Path:
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "liquid-study"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "liquid-study"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "liquid-study"
-
-
 def _use_own_cache() -> Path | None:
     """Use the first folder that can be written, and say which if it is not the first; without one, none."""
-    wanted = [*map(Path, filter(None, [os.environ.get("NUMBA_CACHE_DIR")])), _user_cache()]
+    wanted = [
+        *map(Path, filter(None, [os.environ.get("NUMBA_CACHE_DIR")])),
+        user_cache_path("liquid-study", appauthor=False, opinion=False),
+    ]
     digest = _digest_of_sources()
     for place in wanted:
         if _writable(place / digest):
             if place is not wanted[0]:
-                log.warning("%s cannot be written: what is compiled is kept in %s", wanted[0], place)
+                log.warning("%s cannot be written: compiled code is stored in %s", wanted[0], place)
             vars(numba.config)["CACHE_DIR"] = str(place / digest)
             sweep_caches(place / digest)
             return place / digest
     places = " and ".join(map(str, wanted))
     log.warning(
-        "%s cannot be written: every start compiles anew, for up to a minute; name a folder in NUMBA_CACHE_DIR", places
+        "%s cannot be written: every start compiles again, for up to a minute; name a folder in NUMBA_CACHE_DIR", places
     )
     return None
 
@@ -87,23 +82,23 @@ def _writable(folder: Path) -> bool:
 
 
 def sweep_caches(own: Path) -> None:
-    """Remove caches beside ``own`` that no program used for a day, but for the newest.
+    """Remove the caches next to ``own`` that no program used for a day, except the newest.
 
     A cache says by its time of change when a program last began with it. It is renamed before it is removed, so that of
     two programs that sweep at once each removes what it renamed. A program that begins with it meanwhile gets it back,
     and numba makes anew what is missing. What cannot be removed stays.
     """
     with contextlib.suppress(OSError):
-        beside = [path for path in own.parent.iterdir() if path != own and path.is_dir()]
-        for left in (path for path in beside if _HALF_REMOVED.fullmatch(path.name)):
+        others = [path for path in own.parent.iterdir() if path != own and path.is_dir()]
+        for left in (path for path in others if _HALF_REMOVED.fullmatch(path.name)):
             shutil.rmtree(left, ignore_errors=True)
-        caches = sorted((path.stat().st_mtime, path) for path in beside if _DIGEST.fullmatch(path.name))
+        caches = sorted((path.stat().st_mtime, path) for path in others if _DIGEST.fullmatch(path.name))
         for used_at, path in caches[: max(0, len(caches) + 1 - KEPT_FOLDERS)][:SWEPT_AT_ONCE]:
             if time.time() - used_at > UNUSED_S:
-                _remove_cache(path, used_at)
+                remove_cache(path, used_at)
 
 
-def _remove_cache(path: Path, used_at: float) -> None:
+def remove_cache(path: Path, used_at: float) -> None:
     """Remove a cache, unless a program has begun with it since ``used_at`` [s since 1970]."""
     gone = path.with_name(f".{path.name}.{secrets.token_hex(4)}.gone")
     with contextlib.suppress(OSError):

@@ -37,12 +37,12 @@ CONTROL = np.dtype(
         # written by the loop
         ("taken", np.int64),  # the request in force
         ("numbers_taken", np.int64),  # likewise
-        ("deadline_ns", np.int64),  # when the next turn is due
-        ("turns", np.int64),  # how many were taken
-        ("overruns", np.int64),  # deadlines passed over because a turn did not fit
+        ("deadline_ns", np.int64),  # when the next tick is due
+        ("ticks", np.int64),  # how many were taken
+        ("overruns", np.int64),  # deadlines passed over because a tick did not fit
         ("began_ns", np.int64),  # when the last tick began
         ("worst_gap_ns", np.int64),  # the longest time between two ticks since the scene in force was handed over
-        ("status", np.int64),  # STATUS_* of the last turn; any but STATUS_OK ended the loop
+        ("status", np.int64),  # STATUS_* of the last tick; any but STATUS_OK ended the loop
     ],
     align=True,
 )
@@ -79,30 +79,42 @@ class Output(NamedTuple):
 
 
 @kernel
-def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, device: Any, clock: Any, turns: int) -> int:
-    """Turn until the host or a fault ends it, or ``turns`` are done (below 0: without end); return how many were taken.
+def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, device: Any, clock: Any, ticks: int) -> int:
+    """Run until the host or a fault ends it, or ``ticks`` are done (below 0: without end); return how many were taken.
 
     Parameters
     ----------
-    control, safety : (1,) arrays of ``CONTROL`` and ``layout.SAFETY``
-    slots : the two models a scene may be in
-    exchanged : `Records`
-    output, device, clock : what is written to and called
+    control : (1,) array
+        One row of ``CONTROL``.
+    slots : tuple of Model
+        The two models a scene may be in.
+    safety : (1,) array
+        One row of ``layout.SAFETY``.
+    exchanged : Records
+        One reading and one command.
+    output : Output
+        Where samples are written.
+    device : DeviceCalls
+        The functions that read and write the device, with their contexts.
+    clock : ClockCalls
+        The function that sleeps, with its context.
+    ticks : int
+        How many ticks; below 0 without end.
 
     Notes
     -----
-    After ``turns`` it only pauses, and the device goes on holding the last force; all other ways out write zero.
+    After ``ticks`` it only pauses, and the device goes on holding the last force; all other ways out write zero.
     """
     first, second = slots
     ring, written = output.ring, output.written
     host = control[0]
     done = 0
     while host.run != 0 and host.status == STATUS_OK:
-        if turns >= 0 and done >= turns:
+        if ticks >= 0 and done >= ticks:
             return done
         began_ns = _sleep(clock.sleep, clock.context, host.deadline_ns)
         sample = ring[written[0] % ring.shape[0]]
-        sample.tick = host.turns
+        sample.tick = host.ticks
         sample.time_ns = began_ns
         sample.lateness_ns = began_ns - host.deadline_ns
         _sense(sample, safety[0], exchanged.reading, device)
@@ -124,7 +136,7 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
         host.status = sample.status
         fence()
         written[0] += 1
-        host.turns += 1
+        host.ticks += 1
         done += 1
         _set_deadline(host, ended_ns)
     let_go(exchanged.command, device)
@@ -217,7 +229,7 @@ def _take_numbers(host: Any, model: Any, spare: Any, slot: int) -> None:
 
 @kernel
 def _set_deadline(host: Any, ended_ns: int) -> None:
-    """Set the next deadline and pass over those that are gone: a gap is never made up for by a burst of turns."""
+    """Set the next deadline and pass over those that are gone: a gap is never made up for by a burst of ticks."""
     host.deadline_ns += host.period_ns
     if ended_ns > host.deadline_ns:
         missed = (ended_ns - host.deadline_ns) // host.period_ns
@@ -227,7 +239,7 @@ def _set_deadline(host: Any, ended_ns: int) -> None:
 
 @kernel
 def offer_scene(control: Any, slot: int, serial: int) -> None:
-    """Make the scene in ``slot``, already packed, the one that the next turn takes; numbers not taken yet are void."""
+    """Make the scene in ``slot``, already packed, the one that the next tick takes; numbers not taken yet are void."""
     control[0].numbers = control[0].numbers_taken
     control[0].serial[slot] = serial
     fence()
@@ -236,7 +248,7 @@ def offer_scene(control: Any, slot: int, serial: int) -> None:
 
 @kernel
 def offer_numbers(control: Any, slot: int, serial: int) -> None:
-    """Give the scene in force the numbers of that in ``slot``, the spare one, from the next turn on."""
+    """Give the scene in force the numbers of that in ``slot``, the spare one, from the next tick on."""
     control[0].serial[slot] = serial
     fence()
     control[0].numbers += 1

@@ -1,18 +1,18 @@
-"""The energy account: a liquid gives back to the hand no more than the hand put into it.
+"""The passivity controller: a liquid gives back to the hand no more than the hand put into it.
 
 Passivity observer and controller (Hannaford & Ryu 2002) in their exact form for a held force: from one sample to the
 next the hand does the work -f·Δp on the liquid, whatever happened in between. Here f is the force really sent, without
 buoyancy and weight, which only lend energy, and Δp the step of the hand in the frame of the current.
 
-The account E begins at 0 with a scene and holds at most what the liquid can return::
+The energy E begins at 0 with a scene and holds at most what the liquid can return::
 
     E ← min(E - f·Δp, reserve),    reserve = (4/27) c |v_wake|³ N T / scale + m |v - v_current|² / (2 scale) + K τ P
 
-A wake of speed u gives a body of speed v the power c (u - v)² v, at most that at v = u/3, and it lasts for N ticks of
-T. m is the added mass and, with a history, its inertia in a sway of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24), as
-far as they are sent (`pack`); with "kalman" both hold the energy of the velocity as they smooth it. τ is the lag of the
-velocity estimator and P = max(-f·v̂, 0) the power that it takes: a filtered damper stores up to K τ P (`storage`).
-Without these the lag of each quick reversal would count as a debt.
+The first terms are what the effects can return, summed by them (``state.returnable_j``): a wake of speed u gives a
+body of speed v the power c (u - v)² v, at most that at v = u/3, and it lasts for N ticks of T; m is the mass of
+inertial effects, as far as it is sent (`pack`). τ is the lag of the velocity estimator and P = max(-f·v̂, 0) the
+power that it takes: a filtered damper stores up to K τ P (`stored_energy`). Without these the lag of each quick
+reversal would count as a debt.
 
 A loop that is late and a force held for too long show as E < 0. E is kept three times: for a force that acts at once,
 for one that acts as late as the loop is believed to be, a tick at least, and for one that acts a tick later still; the
@@ -40,7 +40,7 @@ from typing import Any
 from study_app.haptics.kernels.compiled import kernel, part
 from study_app.haptics.kernels.incremental_passivity import ALLOWANCE_J as INCREMENTAL_ALLOWANCE_J
 from study_app.haptics.kernels.incremental_passivity import begin_incremental, close_incremental, observe_incremental
-from study_app.haptics.kernels.stored_energy import filter_storage, liquid_storage
+from study_app.haptics.kernels.stored_energy import filter_storage
 from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm, square
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.layout import LIMITER_ENERGY, Record
@@ -57,31 +57,31 @@ DELIVERY_STEPS_PER_N = 2.0**14
 
 
 @kernel
-def reset_observer(account: Record) -> None:
+def reset_observer(passivity: Record) -> None:
     """Begin at 0, with nothing sent: what came before was another liquid's."""
-    account.balance_j = 0.0
-    account.late_balance_j = 0.0
-    account.later_balance_j = 0.0
-    account.reserve_j = 0.0
-    account.turn = 0
-    for turn in range(MOST_DELAY + 2):
-        clear(account.sent_n[turn])
-        clear(account.acted_n[turn])
-        account.stored_j[turn] = 0.0
-    clear(account.impulse_ns)
-    clear(account.late_impulse_ns)
-    clear(account.later_impulse_ns)
-    clear(account.acted_impulse_ns)
-    account.impulse_s = 0.0
-    begin_incremental(account.fast)
-    clear(account.velocity_mps)
-    account.longest_m = 0.0
-    account.strongest_n = 0.0
-    account.gain = 1.0
-    account.norm_share = 1.0
-    account.settling = 0
-    clear(account.lift_n)
-    clear(account.lift_before_n)
+    passivity.balance_j = 0.0
+    passivity.late_balance_j = 0.0
+    passivity.later_balance_j = 0.0
+    passivity.reserve_j = 0.0
+    passivity.row = 0
+    for tick in range(MOST_DELAY + 2):
+        clear(passivity.sent_n[tick])
+        clear(passivity.acted_n[tick])
+        passivity.stored_j[tick] = 0.0
+    clear(passivity.impulse_ns)
+    clear(passivity.late_impulse_ns)
+    clear(passivity.later_impulse_ns)
+    clear(passivity.acted_impulse_ns)
+    passivity.impulse_s = 0.0
+    begin_incremental(passivity.fast)
+    clear(passivity.velocity_mps)
+    passivity.longest_m = 0.0
+    passivity.strongest_n = 0.0
+    passivity.gain = 1.0
+    passivity.norm_share = 1.0
+    passivity.settling = 0
+    clear(passivity.lift_n)
+    clear(passivity.lift_before_n)
 
 
 @part
@@ -90,25 +90,25 @@ def update_observer(model: Any, safety: Record, interval_s: float) -> None:
 
     Where several forces were sent between two samples, their mean over time counts.
     """
-    parameters, state, account = model.parameters[0], model.state[0], safety.account
+    parameters, state, passivity = model.parameters[0], model.state[0], safety.passivity
     delay_ticks = max(safety.delay_ticks, 1)
-    sent_n = account.sent_n[account.turn]
-    late_n = account.sent_n[_row_before(account, delay_ticks)]
-    later_n = account.sent_n[_row_before(account, delay_ticks + 1)]
-    acted_n = account.acted_n[_row_before(account, safety.delay_ticks)]
+    sent_n = passivity.sent_n[passivity.row]
+    late_n = passivity.sent_n[_row_before(passivity, delay_ticks)]
+    later_n = passivity.sent_n[_row_before(passivity, delay_ticks + 1)]
+    acted_n = passivity.acted_n[_row_before(passivity, safety.delay_ticks)]
     for axis in range(3):
-        account.acted_impulse_ns[axis] += acted_n[axis] * safety.turn_s
-        account.impulse_ns[axis] += sent_n[axis] * safety.turn_s
-        account.late_impulse_ns[axis] += late_n[axis] * safety.turn_s
-        account.later_impulse_ns[axis] += later_n[axis] * safety.turn_s
-    account.impulse_s += safety.turn_s
+        passivity.acted_impulse_ns[axis] += acted_n[axis] * safety.tick_s
+        passivity.impulse_ns[axis] += sent_n[axis] * safety.tick_s
+        passivity.late_impulse_ns[axis] += late_n[axis] * safety.tick_s
+        passivity.later_impulse_ns[axis] += later_n[axis] * safety.tick_s
+    passivity.impulse_s += safety.tick_s
     if interval_s == 0.0:
         return
-    if account.impulse_s == 0.0:  # two samples at once: no time to average over
-        account.impulse_s = 1.0
-        copy(sent_n, account.impulse_ns)
-        copy(late_n, account.late_impulse_ns)
-        copy(later_n, account.later_impulse_ns)
+    if passivity.impulse_s == 0.0:  # two samples at once: no time to average over
+        passivity.impulse_s = 1.0
+        copy(sent_n, passivity.impulse_ns)
+        copy(late_n, passivity.late_impulse_ns)
+        copy(later_n, passivity.later_impulse_ns)
     share = interval_s / SMOOTHING_S
     weight = share / (1.0 + share * (0.5 + share / 12.0))  # 1 - exp(-share), to 1 % over four milliseconds
     per_scale, per_s = 1.0 / parameters.scale, 1.0 / interval_s
@@ -117,47 +117,47 @@ def update_observer(model: Any, safety: Record, interval_s: float) -> None:
         moved_m = state.position_m[axis] - state.previous_m[axis] - state.drift_mps[axis] * interval_s
         step_m = moved_m * per_scale
         square_m2 += step_m * step_m
-        work_j -= account.impulse_ns[axis] * step_m
-        late_work_j -= account.late_impulse_ns[axis] * step_m
-        later_work_j -= account.later_impulse_ns[axis] * step_m
-        account.velocity_mps[axis] += weight * (step_m * per_s - account.velocity_mps[axis])
-        mean_n = account.later_impulse_ns[axis] / account.impulse_s
-        observe_incremental(account.fast, axis, mean_n, step_m * per_s, interval_s)
-    close_incremental(account.fast, interval_s)
-    if square_m2 > account.longest_m * account.longest_m:
-        account.longest_m = math.sqrt(square_m2)
-    stored_j, forgiven_j = filter_storage(model, account), FORGIVEN_W * interval_s
-    account.stored_j[account.turn] = stored_j
-    late_j = max(stored_j, account.stored_j[_row_before(account, delay_ticks)])
-    later_j = max(late_j, account.stored_j[_row_before(account, delay_ticks + 1)])
-    most_j = liquid_storage(model, safety.delay_ticks)
-    account.reserve_j = most_j + late_j
-    per_time = 1.0 / account.impulse_s
-    account.balance_j = min(_forgive(account.balance_j, forgiven_j) + work_j * per_time, most_j + stored_j)
-    account.late_balance_j = min(
-        _forgive(account.late_balance_j, forgiven_j) + late_work_j * per_time, account.reserve_j
+        work_j -= passivity.impulse_ns[axis] * step_m
+        late_work_j -= passivity.late_impulse_ns[axis] * step_m
+        later_work_j -= passivity.later_impulse_ns[axis] * step_m
+        passivity.velocity_mps[axis] += weight * (step_m * per_s - passivity.velocity_mps[axis])
+        mean_n = passivity.later_impulse_ns[axis] / passivity.impulse_s
+        observe_incremental(passivity.fast, axis, mean_n, step_m * per_s, interval_s)
+    close_incremental(passivity.fast, interval_s)
+    if square_m2 > passivity.longest_m * passivity.longest_m:
+        passivity.longest_m = math.sqrt(square_m2)
+    stored_j, forgiven_j = filter_storage(model, passivity), FORGIVEN_W * interval_s
+    passivity.stored_j[passivity.row] = stored_j
+    late_j = max(stored_j, passivity.stored_j[_row_before(passivity, delay_ticks)])
+    later_j = max(late_j, passivity.stored_j[_row_before(passivity, delay_ticks + 1)])
+    most_j = state.returnable_j / parameters.scale
+    passivity.reserve_j = most_j + late_j
+    per_time = 1.0 / passivity.impulse_s
+    passivity.balance_j = min(_forgive(passivity.balance_j, forgiven_j) + work_j * per_time, most_j + stored_j)
+    passivity.late_balance_j = min(
+        _forgive(passivity.late_balance_j, forgiven_j) + late_work_j * per_time, passivity.reserve_j
     )
-    account.later_balance_j = min(
-        _forgive(account.later_balance_j, forgiven_j) + later_work_j * per_time, most_j + later_j
+    passivity.later_balance_j = min(
+        _forgive(passivity.later_balance_j, forgiven_j) + later_work_j * per_time, most_j + later_j
     )
-    clear(account.impulse_ns)
-    clear(account.late_impulse_ns)
-    clear(account.later_impulse_ns)
-    clear(account.acted_impulse_ns)
-    account.impulse_s = 0.0
+    clear(passivity.impulse_ns)
+    clear(passivity.late_impulse_ns)
+    clear(passivity.later_impulse_ns)
+    clear(passivity.acted_impulse_ns)
+    passivity.impulse_s = 0.0
 
 
 @part
-def _row_before(account: Record, ticks: int) -> int:
+def _row_before(passivity: Record, ticks: int) -> int:
     """Return the row of the force that was sent so many ticks before the last one."""
-    row: int = account.turn - ticks
+    row: int = passivity.row - ticks
     return row if row >= 0 else row + MOST_DELAY + 2
 
 
 @part
-def _left_j(account: Record) -> float:
+def _left_j(passivity: Record) -> float:
     """Return how far the lowest balance is above what may be owed [J]; below 0 it is a debt."""
-    return float(ALLOWANCE_J + min(account.balance_j, account.late_balance_j, account.later_balance_j))
+    return float(ALLOWANCE_J + min(passivity.balance_j, passivity.late_balance_j, passivity.later_balance_j))
 
 
 @part
@@ -166,38 +166,38 @@ def _forgive(balance_j: float, forgiven_j: float) -> float:
 
 
 @part
-def reduce_gain(parameters: Record, account: Record, sample: Record) -> None:
+def reduce_gain(parameters: Record, passivity: Record, sample: Record) -> None:
     """Send a share of the force, halved by every halving debt, and all of it again only seconds after the last."""
-    left_j = min(_left_j(account), INCREMENTAL_ALLOWANCE_J + account.fast.balance_j)
-    account.gain = min(account.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
+    left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
+    passivity.gain = min(passivity.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
     if left_j < 0.0:
-        account.gain = min(account.gain, HALVING_J / (HALVING_J - left_j))
-    if account.gain < 1.0:
+        passivity.gain = min(passivity.gain, HALVING_J / (HALVING_J - left_j))
+    if passivity.gain < 1.0:
         sample.limiters |= LIMITER_ENERGY
         for axis in range(3):
-            lift_n = account.lift_n[axis]
-            sample.device_force_n[axis] = lift_n + (sample.device_force_n[axis] - lift_n) * account.gain
+            lift_n = passivity.lift_n[axis]
+            sample.device_force_n[axis] = lift_n + (sample.device_force_n[axis] - lift_n) * passivity.gain
 
 
 @part
 def apply_controller(parameters: Record, safety: Record, sample: Record) -> None:
     """Change the force about to be sent so that a debt is paid back, and cannot grow beyond one step's work."""
-    account = safety.account
-    left_j = _left_j(account)
+    passivity = safety.passivity
+    left_j = _left_j(passivity)
     given = _give_way(parameters, safety, left_j, sample.device_force_n)
     kept = left_j < 0.0 and _keep_within(
-        max(account.strongest_n + left_j / account.longest_m, 0.0), account, sample.device_force_n
+        max(passivity.strongest_n + left_j / passivity.longest_m, 0.0), passivity, sample.device_force_n
     )
     changed = given or kept
-    if changed or account.settling:  # the turn after, too: the force comes back
+    if changed or passivity.settling:  # the tick after, too: the force comes back
         sample.limiters |= LIMITER_ENERGY
-    account.settling = changed
+    passivity.settling = changed
 
 
 @part
-def _keep_within(most_n: float, account: Record, force_n: Any) -> bool:
+def _keep_within(most_n: float, passivity: Record, force_n: Any) -> bool:
     """Shorten the force, buoyancy aside, to ``most_n``; return whether it was longer."""
-    lift_n = account.lift_n
+    lift_n = passivity.lift_n
     size_n = distance(force_n, lift_n)
     if size_n <= most_n:
         return False
@@ -212,8 +212,8 @@ def _give_way(parameters: Record, safety: Record, left_j: float, force_n: Any) -
 
     Return whether the force was changed.
     """
-    account = safety.account
-    v_mps, lift_n = account.velocity_mps, account.lift_n
+    passivity = safety.passivity
+    v_mps, lift_n = passivity.velocity_mps, passivity.lift_n
     square_mps2 = square(v_mps)
     if square_mps2 <= SURE_MPS * SURE_MPS:
         return False
@@ -228,8 +228,8 @@ def _give_way(parameters: Record, safety: Record, left_j: float, force_n: Any) -
         wanted_n = left_j / (SPENDING_S * speed_mps)
     else:
         limit_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * parameters.scale
-        bearable_n = BRAKE * account.gain * limit_nspm * speed_mps
-        wanted_n = -min(-left_j / (parameters.period_s * speed_mps), bearable_n)
+        brake_n = BRAKE * passivity.gain * limit_nspm * speed_mps
+        wanted_n = -min(-left_j / (parameters.period_s * speed_mps), brake_n)
     if along_n <= wanted_n:
         return False
     excess_n = min(speed_mps / SURE_MPS - 1.0, 1.0) * (along_n - wanted_n)
@@ -239,12 +239,12 @@ def _give_way(parameters: Record, safety: Record, left_j: float, force_n: Any) -
 
 
 @part
-def log_command(account: Record, force_n: Any) -> None:
+def log_command(passivity: Record, force_n: Any) -> None:
     """Log the force that the device is asked for, as the one that it sends."""
-    stored_j = account.stored_j[account.turn]
-    account.turn = account.turn + 1 if account.turn <= MOST_DELAY else 0
-    account.stored_j[account.turn] = stored_j  # until the next sample
-    _log(account, force_n)
+    stored_j = passivity.stored_j[passivity.row]
+    passivity.row = passivity.row + 1 if passivity.row <= MOST_DELAY else 0
+    passivity.stored_j[passivity.row] = stored_j  # until the next sample
+    _log(passivity, force_n)
 
 
 @kernel
@@ -264,24 +264,24 @@ def log_delivery(safety: Record, sample: Record, sent_n: Any) -> None:
         return
     for axis in range(3):
         sample.device_force_n[axis] = round(sent_n[axis] * DELIVERY_STEPS_PER_N) / DELIVERY_STEPS_PER_N
-    _log(safety.account, sample.device_force_n)
+    _log(safety.passivity, sample.device_force_n)
     sample.withheld_n = distance(safety.permitted_n, sample.device_force_n)
 
 
 @part
-def _log(account: Record, force_n: Any) -> None:
+def _log(passivity: Record, force_n: Any) -> None:
     """Keep the force of this tick, buoyancy aside."""
-    sent_n = account.sent_n[account.turn]
+    sent_n = passivity.sent_n[passivity.row]
     for axis in range(3):
-        sent_n[axis] = force_n[axis] - account.lift_n[axis]
-    copy(sent_n, account.acted_n[account.turn])
-    if square(sent_n) > account.strongest_n * account.strongest_n:
-        account.strongest_n = norm(sent_n)
+        sent_n[axis] = force_n[axis] - passivity.lift_n[axis]
+    copy(sent_n, passivity.acted_n[passivity.row])
+    if square(sent_n) > passivity.strongest_n * passivity.strongest_n:
+        passivity.strongest_n = norm(sent_n)
 
 
 @part
-def log_acted(account: Record, force_n: Any) -> None:
-    """Log what moved the hand in this tick, where it was not the force that this account is of."""
-    acted_n = account.acted_n[account.turn]
+def log_acted(passivity: Record, force_n: Any) -> None:
+    """Log what moved the hand in this tick, where it was not the force that the observer counted."""
+    acted_n = passivity.acted_n[passivity.row]
     for axis in range(3):
-        acted_n[axis] = force_n[axis] - account.lift_n[axis]
+        acted_n[axis] = force_n[axis] - passivity.lift_n[axis]

@@ -7,7 +7,8 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.effects.surface import submerge
-from study_app.haptics.model.layout import EFFECT_SURFACE, REGION_BOX, REGION_EVERYWHERE, Record
+from study_app.haptics.model.effects import surface
+from study_app.haptics.model.layout import REGION_BOX, REGION_EVERYWHERE, Record
 
 HYSTERESIS_M = 1e-3
 FADE_S = 20e-3
@@ -24,7 +25,7 @@ def update_volume_fractions(model: Any, interval_s: float) -> None:
     free = 1.0
     for i in range(parameters.liquids - 1, -1, -1):
         liquid, local = model.liquids[i], model.liquid_states[i]
-        surfaced = liquid.effects & EFFECT_SURFACE
+        surfaced = liquid.effects & surface.BIT
         local.inside = _contains(liquid.region, state.position_m, local.inside, surfaced)
         target = free if local.inside else 0.0
         step = interval_s / FADE_S if state.placed else 1.0

@@ -1,9 +1,9 @@
-"""What is sent to the hand: always the last step of a turn, in the hand frame [N].
+"""What is sent to the hand: always the last step of a tick, in the hand frame [N].
 
-Order: slope limits on drag and inertia, finite, norm, fade, the energy account's weakening, slew, its settling, norm; a
-force stop or a fault goes past all of them to zero. The slew limit counts from the force of the turn before as it was
+Order: slope limits on drag and inertia, finite, norm, fade, gain of the passivity controller, slew, its settling, norm;
+a force stop or a fault goes past all of them to zero. The slew limit counts from the force of the tick before as it was
 without the settling: a brake that it remembered would go on acting after its time, and drive what it should damp.
-``lift_n``, what of the force is buoyancy and weight, is shortened along with it: the energy account needs it.
+``lift_n``, what of the force is buoyancy and weight, is shortened along with it: the passivity controller needs it.
 """
 
 from __future__ import annotations
@@ -22,9 +22,6 @@ from study_app.haptics.kernels.passivity import (
 from study_app.haptics.kernels.vector import clear, copy, distance, dot, is_finite, norm, square, square_distance
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.haptics.model.layout import (
-    EFFECT_ADDED_MASS,
-    EFFECT_DRAG,
-    EFFECT_HISTORY,
     LIMITER_ENERGY,
     LIMITER_FADE,
     LIMITER_NON_FINITE,
@@ -40,7 +37,6 @@ from study_app.haptics.model.layout import (
 )
 
 START_FADE_S = 0.5
-SCENE_FADE_S = 0.05
 FADE_OUT_S = 0.045
 LEAST_SLEW = 1.0 / 3.0
 """Share of the slew limit that a fade gets, and a loop that has shown a great debt."""
@@ -53,7 +49,7 @@ def new_safety(device_limit_n: float = math.inf, delay_ticks: int = BELIEVED_TIC
     """
     safety = records(SAFETY, 1)
     safety[0].fade_s = START_FADE_S
-    reset_observer(safety[0].account)
+    reset_observer(safety[0].passivity)
     safety[0].device_limit_n = device_limit_n
     safety[0].delay_ticks = delay_ticks
     return safety
@@ -63,25 +59,25 @@ def new_safety(device_limit_n: float = math.inf, delay_ticks: int = BELIEVED_TIC
 def begin_scene(safety: Record) -> None:
     """Let the force of another scene fade in, its energy at 0; a start fade that is not over begins again.
 
-    A brake that was sent for the scene before is let go on the next turn, which says so.
+    A brake that was sent for the scene before is let go on the next tick, which says so.
     """
-    settling = safety.account.settling
+    settling = safety.passivity.settling
     safety.fade = 0.0
-    reset_observer(safety.account)
-    safety.account.settling = settling
+    reset_observer(safety.passivity)
+    safety.passivity.settling = settling
 
 
 @part
 def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None:
-    """Turn the force of the effects into the force to be sent, ``sample.device_force_n``.
+    """Convert the force of the effects into the force to be sent, ``sample.device_force_n``.
 
-    ``interval_s`` is the time since the last accepted sample, 0 where this turn brought none.
+    ``interval_s`` is the time since the last accepted sample, 0 where this tick brought none.
     """
     parameters, state = model.parameters[0], model.state[0]
-    account = safety.account
-    force_n, lift_n = sample.device_force_n, account.lift_n
+    passivity = safety.passivity
+    force_n, lift_n = sample.device_force_n, passivity.lift_n
     update_observer(model, safety, interval_s)
-    copy(lift_n, account.lift_before_n)
+    copy(lift_n, passivity.lift_before_n)
     copy(state.force_n, force_n)
     copy(state.lift_n, lift_n)
     _limit_slope(model, safety, sample)
@@ -92,11 +88,11 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
         clear(force_n)
         clear(lift_n)
     limit_n = min(parameters.force_limit_n, safety.device_limit_n)
-    account.norm_share = min(limit_n / max(norm(force_n), limit_n), 1.0) if limit_n > 0.0 else 1.0
+    passivity.norm_share = min(limit_n / max(norm(force_n), limit_n), 1.0) if limit_n > 0.0 else 1.0
     _limit_norm(force_n, lift_n, limit_n, sample)
-    _fade(force_n, lift_n, safety, sample)
+    _fade(force_n, lift_n, parameters, safety, sample)
     copy(force_n, safety.permitted_n)
-    reduce_gain(parameters, account, sample)
+    reduce_gain(parameters, passivity, sample)
     _limit_slew(force_n, parameters, state, safety, sample)
     copy(force_n, safety.slewed_n)
     apply_controller(parameters, safety, sample)
@@ -106,7 +102,7 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
         clear(lift_n)
         clear(safety.slewed_n)
         clear(safety.permitted_n)
-    log_command(account, force_n)
+    log_command(passivity, force_n)
     copy(force_n, sample.command_n)
     sample.delay_ticks = safety.delay_ticks
     sample.permitted_n = norm(safety.permitted_n)
@@ -115,8 +111,10 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
 
 @part
 def _limit_slope(model: Any, safety: Record, sample: Record) -> None:
-    """Shorten each drag to F·min(1, B|w|/|F|): a secant a sampled damper of the hand's mass stays stable under.
+    """Shorten each liquid's damping to F·min(1, B|w|/|F|): the secant of the maximum stable damping.
 
+    Drag that builds up late gets what is left of B, at the greater speed that it belongs to: in fast strokes it follows
+    so soon that freed handles of 50 g and less swung at scales of 10 and more.
     Where the body passes between liquids they share the limit B, so that their sum keeps it.
     """
     parameters = model.parameters[0]
@@ -125,28 +123,33 @@ def _limit_slope(model: Any, safety: Record, sample: Record) -> None:
         shares += model.liquid_states[i].share
     for i in range(parameters.liquids):
         local = model.liquid_states[i]
-        if model.liquids[i].effects & EFFECT_DRAG and local.share > 0.0:
+        if local.share > 0.0:
             most_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * local.share / shares
-            if square(local.drag.force_n) > most_nspm * most_nspm * square(local.relative_mps):
+            if square(local.damping_n) > most_nspm * most_nspm * square(local.relative_mps):
                 sample.limiters |= LIMITER_SLOPE
-                excess = 1.0 - most_nspm * norm(local.relative_mps) / norm(local.drag.force_n)
+                excess = 1.0 - most_nspm * norm(local.relative_mps) / norm(local.damping_n)
                 for axis in range(3):
-                    sample.device_force_n[axis] -= excess * local.drag.force_n[axis]
+                    sample.device_force_n[axis] -= excess * local.damping_n[axis]
+            if local.late_mps > 0.0:
+                most_n = max(most_nspm - local.prompt_nspm, 0.0) * local.late_mps
+                if square(local.late_n) > most_n * most_n:
+                    sample.limiters |= LIMITER_SLOPE
+                    excess = 1.0 - most_n / norm(local.late_n)
+                    for axis in range(3):
+                        sample.device_force_n[axis] -= excess * local.late_n[axis]
 
 
 @part
 def _limit_inertia(model: Any, safety: Record, sample: Record) -> None:
-    """Weaken added mass and history to what the loop bears (`pack`): fast motion meets them as dampers, too."""
+    """Reduce inertial forces to their stable share (`pack`): fast motion meets them as dampers, too."""
     for i in range(model.parameters[0].liquids):
-        liquid, local = model.liquids[i], model.liquid_states[i]
-        excess = 1.0 - liquid.inertia_share[safety.delay_ticks]
+        local = model.liquid_states[i]
+        excess = 1.0 - model.liquids[i].inertia_share[safety.delay_ticks]
         if excess > 0.0 and local.share > 0.0:
             sample.limiters |= LIMITER_SLOPE
-            for axis in range(3):
-                if liquid.effects & EFFECT_ADDED_MASS:
-                    sample.device_force_n[axis] -= excess * local.added_mass.force_n[axis]
-                if liquid.effects & EFFECT_HISTORY:
-                    sample.device_force_n[axis] -= excess * local.history.force_n[axis]
+            for k in range(local.inertial):
+                for axis in range(3):
+                    sample.device_force_n[axis] -= excess * local.inertia_n[k, axis]
 
 
 @part
@@ -165,21 +168,24 @@ def _scale(force_n: Any, lift_n: Any, factor: float) -> None:
 
 
 @part
-def _fade(force_n: Any, lift_n: Any, safety: Record, sample: Record) -> None:
-    """Weaken the force while it fades in (start 500 ms, scene 50 ms) or out (no usable sample, or a late turn)."""
+def _fade(force_n: Any, lift_n: Any, parameters: Record, safety: Record, sample: Record) -> None:
+    """Weaken the force while it fades in or out (no usable sample, or a late tick).
+
+    It fades in as slowly as the scene asks for, and after a start in 500 ms at least.
+    """
     if safety.withheld or safety.late_s > 0.0:
         sample.limiters |= safety.withheld if safety.withheld else LIMITER_STALE
-        lasted_s = max(safety.late_s, safety.turn_s if safety.withheld else 0.0)
+        lasted_s = max(safety.late_s, safety.tick_s if safety.withheld else 0.0)
         safety.fade = max(safety.fade - lasted_s / FADE_OUT_S, 0.0)
         if safety.late_s >= FADE_OUT_S:
             safety.fade_s = START_FADE_S
     else:
-        safety.fade = min(safety.fade + safety.turn_s / safety.fade_s, 1.0)
+        safety.fade = min(safety.fade + safety.tick_s / max(safety.fade_s, parameters.fade_s), 1.0)
     if safety.fade < 1.0:
         sample.limiters |= LIMITER_FADE
         _scale(force_n, lift_n, safety.fade)
     else:
-        safety.fade_s = SCENE_FADE_S
+        safety.fade_s = 0.0
 
 
 @part
@@ -190,12 +196,12 @@ def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record,
     let go at a reversal would do work on the hand: what of it lies along the motion, and is not wanted there, is
     dropped at once.
     """
-    most_n = parameters.slew_n * (LEAST_SLEW if safety.fade < 1.0 else max(safety.account.gain, LEAST_SLEW))
+    most_n = parameters.slew_n * (LEAST_SLEW if safety.fade < 1.0 else max(safety.passivity.gain, LEAST_SLEW))
     if square_distance(force_n, safety.slewed_n) <= most_n * most_n:
         return
     sample.limiters |= LIMITER_SLEW
-    account = safety.account
-    v_mps, lift_n, before_n = state.estimate_mps, account.lift_n, account.lift_before_n
+    passivity = safety.passivity
+    v_mps, lift_n, before_n = state.estimate_mps, passivity.lift_n, passivity.lift_before_n
     wanted_nmps = dot(force_n, v_mps)
     share = most_n / distance(force_n, safety.slewed_n)
     for axis in range(3):

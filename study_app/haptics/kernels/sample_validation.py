@@ -86,18 +86,18 @@ def _plausible(state: Record, sample: Record, interval_s: float) -> bool:
 
 @part
 def watchdog(parameters: Record, safety: Record, sample: Record) -> None:
-    """Say how long the turn is, and let the force go when no usable sample came: 5 ms fade, 50 ms zero and fault.
+    """Say how long the tick is, and let the force go when no usable sample came: 5 ms fade, 50 ms zero and fault.
 
-    A turn that comes late itself is no better, however fresh its sample: the device held an old force meanwhile. It
-    finds the fade where turns in time would have taken it: after 50 ms at zero, to return as slowly as at a start.
+    A tick that comes late itself is no better, however fresh its sample: the device held an old force meanwhile. It
+    finds the fade where ticks in time would have taken it: after 50 ms at zero, to return as slowly as at a start.
     """
     if safety.started == 0:
         safety.started = 1
-        safety.turn_ns = sample.time_ns
+        safety.tick_ns = sample.time_ns
         safety.usable_ns = sample.time_ns
-    since_ns = sample.time_ns - safety.turn_ns
-    safety.turn_s = min(max(since_ns * 1e-9, 0.0), LONGEST_S)
-    safety.turn_ns = sample.time_ns
+    since_ns = sample.time_ns - safety.tick_ns
+    safety.tick_s = min(max(since_ns * 1e-9, 0.0), LONGEST_S)
+    safety.tick_ns = sample.time_ns
     safety.late_s = max(since_ns - parameters.period_s * 1e9 - STALE_NS, 0.0) * 1e-9
     age_ns = sample.time_ns - safety.usable_ns
     if age_ns == 0:

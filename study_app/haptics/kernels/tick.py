@@ -14,8 +14,9 @@ from study_app.haptics.kernels.effects.buoyancy import buoyancy_force
 from study_app.haptics.kernels.effects.current import current_velocity
 from study_app.haptics.kernels.effects.drag import drag_force
 from study_app.haptics.kernels.effects.history import basset_force
-from study_app.haptics.kernels.effects.local_wake import clear_local_wake, deposit_local_wake, local_wake_velocity
+from study_app.haptics.kernels.effects.local_wake import deposit_local_wake, local_wake_velocity
 from study_app.haptics.kernels.effects.surface import wetted_fraction
+from study_app.haptics.kernels.effects.unsteady_drag import unsteady_drag_force
 from study_app.haptics.kernels.effects.wake import update_wake, wake_velocity
 from study_app.haptics.kernels.estimators.kalman import take_force
 from study_app.haptics.kernels.estimators.velocity import estimate_velocity, reset_estimator
@@ -23,20 +24,18 @@ from study_app.haptics.kernels.regions import update_volume_fractions
 from study_app.haptics.kernels.safety import guard
 from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
 from study_app.haptics.kernels.vector import clear, copy, subtract
-from study_app.haptics.kernels.wake_segments import empty
-from study_app.haptics.model.layout import (
-    EFFECT_ADDED_MASS,
-    EFFECT_BUOYANCY,
-    EFFECT_CURRENT,
-    EFFECT_DRAG,
-    EFFECT_HISTORY,
-    EFFECT_LOCAL_WAKE,
-    EFFECT_SURFACE,
-    EFFECT_WAKE,
-    LIMITER_ESTIMATOR,
-    STATUS_OK,
-    Record,
+from study_app.haptics.model.effects import (
+    added_mass,
+    buoyancy,
+    current,
+    drag,
+    history,
+    local_wake,
+    surface,
+    unsteady_drag,
+    wake,
 )
+from study_app.haptics.model.layout import LIMITER_ESTIMATOR, STATUS_OK, Record
 
 
 @kernel
@@ -52,16 +51,17 @@ def tick(model: Any, safety: Record, sample: Record) -> None:
     watchdog(model.parameters[0], safety, sample)
     if interval_s > 0.0:
         take_force(model.state[0], safety)
-        step_model(model, interval_s)
+        step_model(model, interval_s, safety.delay_ticks)
     write_sample(model.state[0], sample)
     guard(model, safety, sample, interval_s)
 
 
 @part
-def step_model(model: Any, interval_s: float) -> None:
+def step_model(model: Any, interval_s: float, delay_ticks: int) -> None:
     """Let the liquids respond to the place the body has reached, Δt after the one before.
 
     Every effect is evaluated before the wake takes this tick in: the first tick of a motion meets a liquid at rest.
+    ``delay_ticks`` is how many writes late a force is believed to act.
     """
     parameters, state = model.parameters[0], model.state[0]
     if state.tracking == 0:
@@ -73,56 +73,53 @@ def step_model(model: Any, interval_s: float) -> None:
     clear(state.lift_n)
     clear(state.wake_mps)
     clear(state.drift_mps)
+    state.returnable_j = 0.0
+    state.linear = 0
     for i in range(parameters.liquids):
         if model.liquid_states[i].share > 0.0:
-            apply_effects(model, i, interval_s)
+            apply_effects(model, i, interval_s, delay_ticks)
         else:
-            reset_liquid(model, i)
-    if parameters.effects & EFFECT_BUOYANCY:
+            model.liquid_states[i].ticks = 0
+    if parameters.effects & buoyancy.BIT:
         buoyancy_force(model)
 
 
 @part
-def apply_effects(model: Any, i: int, interval_s: float) -> None:
-    """Let one liquid, in which the body is, act on it by the effects it asks for: in this order, no others."""
-    liquid, local, state = model.liquids[i], model.liquid_states[i], model.state[0]
-    copy(state.velocity_mps, local.motion_mps)
+def apply_effects(model: Any, i: int, interval_s: float, delay_ticks: int) -> None:
+    """Let one liquid, in which the body is, act on it by the effects it asks for: in this order, no others.
+
+    A damper meets the velocity as it is estimated; the knee is for liquids.
+    """
+    parameters, state = model.parameters[0], model.state[0]
+    liquid, local, rows = model.liquids[i], model.liquid_states[i], model.rows
+    copy(state.estimate_mps if liquid.drag.law == drag.LAW_LINEAR else state.velocity_mps, local.motion_mps)
     clear(local.wake_mps)
-    if liquid.effects & EFFECT_CURRENT:
+    clear(local.damping_n)
+    local.late_mps = 0.0
+    local.inertial = 0
+    if liquid.effects & current.BIT:
         current_velocity(liquid, local, state)
-        copy(local.current.velocity_mps, state.drift_mps)
-    if liquid.effects & EFFECT_WAKE:
-        wake_velocity(liquid, local, model.segments)
-    if liquid.effects & EFFECT_LOCAL_WAKE:
-        local_wake_velocity(liquid, local, state, model.cells, interval_s)
+    if liquid.effects & wake.BIT:
+        wake_velocity(parameters, liquid, local, state, rows.segments)
+    if liquid.effects & local_wake.BIT:
+        local_wake_velocity(parameters, liquid, local, state, rows.cells, interval_s)
     subtract(local.motion_mps, local.wake_mps, local.relative_mps)
     copy(local.wake_mps, state.wake_mps)
-    if liquid.effects & EFFECT_SURFACE:
+    if liquid.effects & surface.BIT:
         wetted_fraction(local)
-    if liquid.effects & EFFECT_DRAG:
+    if liquid.effects & drag.BIT:
         drag_force(liquid, local, state)
-    if liquid.effects & EFFECT_ADDED_MASS:
-        added_mass_force(liquid, local, state, interval_s)
-    if liquid.effects & EFFECT_HISTORY:
-        basset_force(liquid, local, state, model.intervals, model.exponentials, interval_s)
-    if liquid.effects & EFFECT_WAKE:
-        update_wake(liquid, local, state, model.elements, model.segments, interval_s)
-    if liquid.effects & EFFECT_LOCAL_WAKE:
-        deposit_local_wake(liquid, local, state, model.cells, interval_s)
-
-
-@part
-def reset_liquid(model: Any, i: int) -> None:
-    """Let one liquid forget the body: it is out of it, or was lost."""
-    liquid, local = model.liquids[i], model.liquid_states[i]
-    if liquid.effects & EFFECT_WAKE:
-        empty(liquid.wake, local.wake, model.segments)
-    if liquid.effects & EFFECT_LOCAL_WAKE:
-        clear_local_wake(local.local_wake)
-    if liquid.effects & EFFECT_ADDED_MASS:
-        local.added_mass.primed = 0
-    if liquid.effects & EFFECT_HISTORY:
-        local.history.primed = 0
+    if liquid.effects & added_mass.BIT:
+        added_mass_force(parameters, liquid, local, state, delay_ticks, interval_s)
+    if liquid.effects & history.BIT:
+        basset_force(parameters, liquid, local, state, rows, delay_ticks, interval_s)
+    if liquid.effects & unsteady_drag.BIT:
+        unsteady_drag_force(parameters, liquid, local, state, delay_ticks, interval_s)
+    if liquid.effects & wake.BIT:
+        update_wake(liquid, local, state, rows.elements, rows.segments, interval_s)
+    if liquid.effects & local_wake.BIT:
+        deposit_local_wake(liquid, local, state, rows.cells, interval_s)
+    local.ticks += 1
 
 
 @kernel
@@ -130,7 +127,7 @@ def reset_tracking(model: Any) -> None:
     """Forget the motion so far: all that is known of the body is where it is."""
     reset_estimator(model.parameters[0], model.state[0])
     for i in range(model.parameters[0].liquids):
-        reset_liquid(model, i)
+        model.liquid_states[i].ticks = 0
     model.state[0].tracking = 1
 
 

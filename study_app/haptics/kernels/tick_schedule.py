@@ -1,4 +1,4 @@
-"""When the turns of a simulated servo come: late by some jitter, or not at all, as on a busy computer."""
+"""When the ticks of a simulated servo come: late by some jitter, or not at all, as on a busy computer."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from study_app.haptics.model.layout import records
 PACE = np.dtype(
     [
         ("period_s", np.float64),
-        ("jitter_s", np.float64),  # a turn is late by anything up to this
-        ("missed", np.float64),  # share of the turns that do not come
+        ("jitter_s", np.float64),  # a tick is late by anything up to this
+        ("missed", np.float64),  # share of the ticks that do not come
         ("late_s", np.float64),  # how late the last one was
         ("random", np.uint64),
     ],
@@ -33,13 +33,13 @@ def new_schedule(period_s: float, *, jitter_s: float = 0.0, missed: float = 0.0,
 
 @kernel
 def next_tick(pace: Any) -> float:
-    """Return the time until the servo's next turn [s]: its deadlines stay regular, it is late or misses some."""
-    turns = 1.0
+    """Return the time until the servo's next tick [s]: its deadlines stay regular, it is late or misses some."""
+    ticks = 1.0
     while pace.missed > 0.0 and random(pace) < pace.missed:
-        turns += 1.0
+        ticks += 1.0
     before_s = pace.late_s
     pace.late_s = pace.jitter_s * random(pace)
-    elapsed_s: float = turns * pace.period_s + pace.late_s - before_s
+    elapsed_s: float = ticks * pace.period_s + pace.late_s - before_s
     return elapsed_s
 
 

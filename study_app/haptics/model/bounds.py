@@ -1,106 +1,157 @@
 """The most each effect can do to the force, over how the body is expected to move; plain arithmetic, no compiler.
 
 The motion box of a scene allows every motion with |v| ≤ v_max, |a| ≤ a_max and a depth of the body's centre within its
-range. A bound is the greatest change of the force [N] that leaving the effect out makes for any of them.
+range. A bound is the greatest change of the force [N] that leaving the effect out makes for any of them; each effect's
+formula is in its descriptor (``haptics.model.effects``).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 
-from study_app.haptics.model.laws import Law, drag_n
-from study_app.haptics.model.scene import (
-    Channel,
-    Current,
-    Effect,
-    Knee,
-    Liquid,
-    LocalWake,
-    Scene,
-    Uniform,
-    Vortex,
-    Wake,
-)
-
-GRAVITY_MPS2 = 9.80665
-REFERENCE: Law = "haider-levenspiel"
-"""The law that others are measured by: its published constants are confirmed, and it is nearest to experiments."""
+from study_app.haptics.model.effect import GRAVITY_MPS2, Flow
+from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.effects.drag import resistance_n
+from study_app.haptics.model.scene import Effect, Knee, Liquid, Scene
 
 
 def bounds(scene: Scene, liquid: Liquid) -> Mapping[Effect, float]:
-    """Return the bound [N] of every effect that the liquid has parameters for.
-
-    With V and R of the ball, v and a the greatest speed and acceleration:
-
-    - ``drag``: F(v), by the reference law where the liquid has a viscosity;
-    - ``wake``, ``local_wake``: F(v + u) − F(v), u the most that the liquid can follow; the laws are convex, so this is
-      more than what a following liquid takes away;
-    - ``current``: the same with its greatest speed u, and what added mass and history make of its shear s: to the ball
-      that moves through it the liquid changes its velocity by up to u, at up to s v;
-    - ``buoyancy``: g |ρ V_sub − ρ_body V|, at the worse end of the depth range;
-    - ``added_mass``: C_a ρ V (a + s v);
-    - ``history``: H(a, v) + H(s v, u) with H(a, v) = 12 R² √(2π ρ µ a v), the Basset integral for a body that was
-      carried along at −v and then turned to v at a: no motion in the box makes it greater;
-    - ``surface``: all of the others where the centre can cross the surface, for without it the ball is in or out.
-    """
-    motion = scene.motion_in(liquid)
-    depth_m = motion.depth_m or (math.inf, math.inf)
-    speed_mps = lowered_mps(motion.speed_mps or 0.0, scene.knee)
-    acceleration_mps2 = motion.acceleration_mps2 or 0.0
-    radius_m = scene.body.diameter_m / 2
-    volume_m3 = 4 / 3 * math.pi * radius_m**3
-    lift_n = liquid.density_kg_m3 * volume_m3 * GRAVITY_MPS2
-    weight_n = scene.body.density_kg_m3 * volume_m3 * GRAVITY_MPS2
-    mass_kg = liquid.added_mass.coefficient * liquid.density_kg_m3 * volume_m3
-    per_root = 12 * radius_m**2 * math.sqrt(2 * math.pi * liquid.density_kg_m3 * (liquid.viscosity_pa_s or 0.0))
-
-    def more_by(flow_mps: float) -> float:
-        return resistance_n(scene, liquid, speed_mps + flow_mps) - resistance_n(scene, liquid, speed_mps)
-
-    found: dict[Effect, float] = {"drag": resistance_n(scene, liquid, speed_mps)}
-    if liquid.wake is not None:
-        found["wake"] = more_by(speed_mps * fullest(liquid.wake))
-    if liquid.local_wake is not None:
-        found["local_wake"] = more_by(speed_mps * fullest(liquid.local_wake))
-    found["added_mass"] = mass_kg * acceleration_mps2
-    found["history"] = per_root * math.sqrt(acceleration_mps2 * speed_mps)
-    if liquid.current is not None:
-        flow_mps, change_mps2 = fastest_mps(liquid.current), shear_per_s(liquid.current) * speed_mps
-        sheared_n = {"added_mass": mass_kg * change_mps2, "history": per_root * math.sqrt(change_mps2 * flow_mps)}
-        found["current"] = more_by(flow_mps) + sum(sheared_n.values())
-        found["added_mass"] += sheared_n["added_mass"]
-        found["history"] += sheared_n["history"]
-    if liquid.viscosity_pa_s is None:
-        del found["history"]
-    if depth_m[1] <= -radius_m:
-        found = dict.fromkeys(found, 0.0)
-    found["buoyancy"] = max(abs(lift_n * submerged(depth, radius_m) - weight_n) for depth in depth_m)
-    if motion.depth_m is not None:
-        frontal, volume = _in_doubt(motion.depth_m, radius_m)
-        carried_n = found["added_mass"] + found.get("history", 0.0) + lift_n
-        found["surface"] = frontal * (found["drag"] + found.get("current", 0.0)) + volume * carried_n
-    return found
+    """Return the bound [N] of every effect that the liquid has parameters for."""
+    return Extremes(scene, liquid).bounds_n
 
 
-def _in_doubt(depth_m: tuple[float, float], radius_m: float) -> tuple[float, float]:
-    """Return how much of frontal area and volume is wrong at most, 0 … 1, if the ball is all in or all out."""
-    nearest_m = max(depth_m[0], -depth_m[1], 0.0)
-    if nearest_m == 0.0:
-        return 1.0, 1.0
-    return max(1 - (nearest_m / radius_m) ** 2, 0.0), submerged(-nearest_m, radius_m)
+@dataclass(frozen=True)
+class Extremes:
+    """The extremes of the motion in one liquid of a scene, and what the bounds of effects are made of."""
+
+    scene: Scene
+    liquid: Liquid
+
+    @cached_property
+    def bounds_n(self) -> Mapping[Effect, float]:
+        """The bound [N] of every effect of the scene's format that the liquid has parameters for, by name."""
+        known = [it for it in EFFECTS if it.format <= self.scene.format or it.name in self.liquid.effects]
+        found = {effect.name: effect.bound_n(self) for effect in known}
+        return {name: bound_n for name, bound_n in found.items() if bound_n is not None}
+
+    @cached_property
+    def exerted_n(self) -> Mapping[Effect, float]:
+        """About the greatest force [N] that each effect exerts by itself."""
+        found = {effect.name: effect.exerted_n(self) for effect in EFFECTS if effect.exerted_n is not None}
+        return {name: newtons for name, newtons in found.items() if newtons is not None}
+
+    @cached_property
+    def has_top(self) -> bool:
+        """Whether the liquid has a top face or the scene says how deep the body gets."""
+        return self.scene.motion_in(self.liquid).depth_m is not None
+
+    @cached_property
+    def depth_m(self) -> tuple[float, float]:
+        """The least and the greatest depth of the body's centre; without a top it is deep."""
+        return self.scene.motion_in(self.liquid).depth_m or (math.inf, math.inf)
+
+    @cached_property
+    def relative_mps(self) -> float:
+        """The greatest speed of the body, after the knee, against the flow that may be called for."""
+        flow_mps = sum(it.speed_mps for it in _flows(self.liquid, called_for=True))
+        return met_mps(self.scene, self.liquid, self.scene.motion_in(self.liquid).speed_mps or 0.0) + flow_mps
+
+    @cached_property
+    def speed_mps(self) -> float:
+        """The greatest speed of the body in the liquid, after the knee; 0 where it is never in it."""
+        if self._is_outside:
+            return 0.0
+        return met_mps(self.scene, self.liquid, self.scene.motion_in(self.liquid).speed_mps or 0.0)
+
+    @cached_property
+    def acceleration_mps2(self) -> float:
+        """The greatest acceleration of the body in the liquid."""
+        return 0.0 if self._is_outside else self.scene.motion_in(self.liquid).acceleration_mps2 or 0.0
+
+    @cached_property
+    def flow(self) -> Flow:
+        """How fast the liquid flows by itself."""
+        if self._is_outside:
+            return Flow(0.0, 0.0)
+        flows = _flows(self.liquid)
+        return Flow(sum(it.speed_mps for it in flows), sum(it.shear_per_s for it in flows))
+
+    @property
+    def reynolds(self) -> float:
+        """The greatest Reynolds number ρ|w|D/µ; infinite without a viscosity."""
+        liquid = self.liquid
+        if liquid.viscosity_pa_s is None:
+            return math.inf
+        return self.relative_mps * liquid.density_kg_m3 * self.scene.body.diameter_m / liquid.viscosity_pa_s
+
+    @property
+    def radius_m(self) -> float:
+        """Of the body."""
+        return self.scene.body.diameter_m / 2
+
+    @property
+    def volume_m3(self) -> float:
+        """Of the body."""
+        return self.scene.body.volume_m3
+
+    @property
+    def lift_n(self) -> float:
+        """The weight of the liquid in the place of the whole body."""
+        return self.liquid.density_kg_m3 * self.volume_m3 * GRAVITY_MPS2
+
+    @property
+    def weight_n(self) -> float:
+        """The weight of the body."""
+        return self.scene.body.density_kg_m3 * self.volume_m3 * GRAVITY_MPS2
+
+    def drag_by_flow_n(self, flow_mps: float) -> float:
+        """Return F(v + u) − F(v), the drag that a flow u adds at most."""
+        faster_n = resistance_n(self.scene, self.liquid, self.speed_mps + flow_mps)
+        return faster_n - resistance_n(self.scene, self.liquid, self.speed_mps)
+
+    def inertial_n(self, accelerated_n: Callable[[Extremes, float, float], float]) -> float:
+        """Return the force at the body's greatest acceleration and in the shear of the flow together."""
+        return accelerated_n(self, self.acceleration_mps2, self.speed_mps) + self._sheared_n(accelerated_n)
+
+    def sheared_n(self) -> float:
+        """Return what inertial effects make of the shear of the flow."""
+        return sum(self._sheared_n(effect.accelerated_n) for effect in EFFECTS if effect.accelerated_n is not None)
+
+    def _sheared_n(self, accelerated_n: Callable[[Extremes, float, float], float]) -> float:
+        return accelerated_n(self, self.flow.shear_per_s * self.speed_mps, self.flow.speed_mps)
+
+    def total_n(self, extent: str) -> float:
+        """Return the sum of the bounds of effects that grow with this extent of the wetted body."""
+        return sum(effect.bound_n(self) or 0.0 for effect in EFFECTS if effect.extent == extent)
+
+    def submerged(self, depth_m: float) -> float:
+        """Return the share of the body's volume below the surface, its centre ``depth_m`` under it."""
+        return submerged(depth_m, self.radius_m)
+
+    def doubtful_shares(self) -> tuple[float, float]:
+        """Return how much of frontal area and volume is wrong at most, 0 … 1, if the ball is all in or all out."""
+        nearest_m = max(self.depth_m[0], -self.depth_m[1], 0.0)
+        if nearest_m == 0.0:
+            return 1.0, 1.0
+        return max(1 - (nearest_m / self.radius_m) ** 2, 0.0), self.submerged(-nearest_m)
+
+    @cached_property
+    def _is_outside(self) -> bool:
+        return self.depth_m[1] <= -self.radius_m
 
 
-def resistance_n(scene: Scene, liquid: Liquid, relative_mps: float, law: Law | None = None) -> float:
-    """Return the size of the drag [N] on the scene's body at a relative speed; by default the truest law there is."""
-    return drag_n(
-        law or ("constant" if liquid.viscosity_pa_s is None else REFERENCE),
-        relative_mps,
-        density_kg_m3=liquid.density_kg_m3,
-        viscosity_pa_s=liquid.viscosity_pa_s,
-        diameter_m=scene.body.diameter_m,
-        drag_coefficient=scene.body.drag_coefficient,
-    )
+def _flows(liquid: Liquid, *, called_for: bool = False) -> list[Flow]:
+    """Return the flows that the liquid has a table of, or only those that are called for or left to the gate."""
+    return [
+        effect.flow(getattr(liquid, effect.name))
+        for effect in EFFECTS
+        if effect.flow is not None
+        and getattr(liquid, effect.name) is not None
+        and (not called_for or effect.name in liquid.effects or liquid.effects == "auto")
+    ]
 
 
 def submerged(depth_m: float, radius_m: float) -> float:
@@ -109,25 +160,9 @@ def submerged(depth_m: float, radius_m: float) -> float:
     return h * h * (3 * radius_m - h) / (4 * radius_m**3)
 
 
-def fullest(wake: Wake | LocalWake) -> float:
-    """Return the most of the body's speed that its wake can have: (N/S)^y."""
-    return float((wake.length / wake.scaling) ** wake.exponent)
-
-
-def fastest_mps(current: Current) -> float:
-    """Return the greatest speed of a current [m/s]."""
-    if isinstance(current, Uniform):
-        return math.hypot(*current.velocity_mps)
-    if isinstance(current, Channel | Vortex):
-        return abs(current.peak_mps)
-    raise TypeError(f"no bound is known for a current of kind {current!r}")
-
-
-def shear_per_s(current: Current) -> float:
-    """Return how much a current changes over a way, at most [m/s per m]."""
-    if isinstance(current, Channel):
-        return 4 * abs(current.peak_mps) / current.width_m
-    return 2 * abs(current.peak_mps) / current.core_m if isinstance(current, Vortex) else 0.0
+def met_mps(scene: Scene, liquid: Liquid, speed_mps: float) -> float:
+    """Return a speed [m/s] as the effects of a liquid meet it: after the knee, but for a damper."""
+    return speed_mps if liquid.drag.law == "linear" else lowered_mps(speed_mps, scene.knee)
 
 
 def lowered_mps(speed_mps: float, knee: Knee) -> float:

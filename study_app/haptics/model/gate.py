@@ -3,7 +3,7 @@
 A liquid names its effects, or says ``effects = "auto"``. Then the effects with the smallest bounds (``bounds``) are
 left out as long as the *sum* of what is left out stays within the scene's accuracy: 5 % of the sum of all bounds or
 0.05 N, whichever is greater, by default. That is below the smallest difference of force that people feel, 7 %; since
-nobody feels more than the force limit, a greater sum counts as that. [choice] Drag takes the cheapest law of C_d that
+the force limit caps what is felt, a greater sum counts as that. [choice] Drag takes the cheapest law of C_d that
 stays within the same target of the reference law at every speed. A wake is never taken by itself: it has no parameters
 that density and viscosity could tell.
 """
@@ -11,24 +11,13 @@ that density and viscosity could tell.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from study_app.haptics.model.bounds import REFERENCE, bounds, fastest_mps, lowered_mps, resistance_n
-from study_app.haptics.model.laws import LAWS, Law
-from study_app.haptics.model.scene import Drag, Effect, Liquid, Scene
+from study_app.haptics.model.bounds import Extremes, bounds
+from study_app.haptics.model.effects import EFFECTS, NAMED
+from study_app.haptics.model.scene import Effect, Liquid, Scene
 
-ORDER: Final[tuple[Effect, ...]] = (
-    "drag",
-    "wake",
-    "local_wake",
-    "current",
-    "buoyancy",
-    "surface",
-    "added_mass",
-    "history",
-)
-NEVER_BY_ITSELF: Final[tuple[Effect, ...]] = ("wake", "local_wake")
-_SPEEDS: Final = 60
+NEVER_BY_ITSELF: Final = tuple(effect.name for effect in EFFECTS if not effect.automatic)
 
 
 class Verdict(NamedTuple):
@@ -66,31 +55,6 @@ def describe_gate(scene: Scene, cost_ns: Mapping[tuple[str, Effect], float] | No
     return tuple(lines[:-1])
 
 
-def cheapest_law(scene: Scene, liquid: Liquid) -> Law:
-    """Return the cheapest law of drag within the accuracy target of the reference law, at every speed of the motion."""
-    if liquid.viscosity_pa_s is None:
-        return "constant"
-    candidates: tuple[Law, ...] = ("constant", *LAWS)
-    return next((law for law in candidates if _is_true_enough(scene, liquid, law)), REFERENCE)
-
-
-def _is_true_enough(scene: Scene, liquid: Liquid, law: Law) -> bool:
-    """Return whether a law stays within the accuracy target of the reference law's force at each speed."""
-    for k in range(1, _SPEEDS + 1):
-        speed_mps = _fastest_mps(scene, liquid) * k / _SPEEDS
-        true_n = resistance_n(scene, liquid, speed_mps)
-        wrong_n = abs(resistance_n(scene, liquid, speed_mps, law) - true_n)
-        if wrong_n > max(scene.accuracy.relative * true_n, scene.accuracy.absolute_n):
-            return False
-    return True
-
-
-def _fastest_mps(scene: Scene, liquid: Liquid) -> float:
-    """Return the greatest speed relative to the liquid."""
-    speed_mps = lowered_mps(scene.motion_in(liquid).speed_mps or 0.0, scene.knee)
-    return speed_mps + (fastest_mps(liquid.current) if liquid.current is not None else 0.0)
-
-
 def _budget_n(scene: Scene, total_n: float) -> float:
     """Return how much force may be left out."""
     return max(scene.accuracy.relative * min(total_n, scene.force_limit_n), scene.accuracy.absolute_n)
@@ -98,34 +62,48 @@ def _budget_n(scene: Scene, total_n: float) -> float:
 
 def _verdicts(scene: Scene, liquid: Liquid) -> tuple[Verdict, ...]:
     found = bounds(scene, liquid)
-    auto = liquid.effects == "auto"
-    total_n = sum(bound_n for effect, bound_n in found.items() if not (auto and effect in NEVER_BY_ITSELF))
-    judged = _chosen(scene, liquid, found, total_n) if auto else _named(liquid, found)
+    barred = _barred(scene, liquid, found)
+    total_n = sum(bound_n for effect, bound_n in found.items() if effect not in barred)
+    judged = _chosen(scene, liquid, found, barred, total_n) if liquid.effects == "auto" else _named(liquid, found)
     return tuple(
         Verdict(liquid.id, effect, found[effect], found[effect] / total_n if total_n > 0 else 0.0, *judged[effect])
-        for effect in ORDER
+        for effect in NAMED
         if effect in found
     )
 
 
+def _barred(scene: Scene, liquid: Liquid, found: Mapping[Effect, float]) -> dict[Effect, str]:
+    """Return the effects that cannot be among those that are chosen or named, and why."""
+    if liquid.effects != "auto":
+        rivals = {it.name: it.excludes for it in EFFECTS if it.excludes and it.name in found}
+        names = [name for one, others in rivals.items() for name in (others if one in liquid.effects else (one,))]
+        return dict.fromkeys(names, "another model of the same thing is named")
+    barred = {
+        name: why
+        for effect in EFFECTS
+        if effect.bars is not None and effect.name in found
+        for names, why in (effect.bars(Extremes(scene, liquid)),)
+        for name in names
+    }
+    return barred | dict.fromkeys(NEVER_BY_ITSELF, "not determined by density and viscosity: name it to use it")
+
+
 def _named(liquid: Liquid, found: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:
     """Return what the file says."""
-    named = {effect: effect in liquid.effects for effect in found}
-    law = f", law {liquid.drag.law}"
-    return {
-        effect: (taken, f"named{law if effect == 'drag' else ''}" if taken else "not named")
-        for effect, taken in named.items()
-    }
+    judged: dict[Effect, tuple[bool, str]] = dict.fromkeys(found, (False, "not named"))
+    for name in found:
+        if name in liquid.effects:
+            note = NAMED[name].note
+            judged[name] = True, f"named{note(liquid) if note is not None else ''}"
+    return judged
 
 
 def _chosen(
-    scene: Scene, liquid: Liquid, found: Mapping[Effect, float], total_n: float
+    scene: Scene, liquid: Liquid, found: Mapping[Effect, float], barred: Mapping[Effect, str], total_n: float
 ) -> dict[Effect, tuple[bool, str]]:
     """Leave out the smallest while the sum of what is left out stays within the target."""
     budget_n = _budget_n(scene, total_n)
-    judged: dict[Effect, tuple[bool, str]] = dict.fromkeys(
-        NEVER_BY_ITSELF, (False, "density and viscosity say nothing about it: name it to have it")
-    )
+    judged: dict[Effect, tuple[bool, str]] = {name: (False, why) for name, why in barred.items()}
     left_out_n = 0.0
     for effect in sorted((effect for effect in found if effect not in judged), key=lambda effect: found[effect]):
         with_it_n = left_out_n + found[effect]
@@ -134,31 +112,32 @@ def _chosen(
             judged[effect] = False, _left_out(found[effect], left_out_n, budget_n)
         else:
             judged[effect] = True, f"without it {with_it_n:.3g} N would be missing, more than {budget_n:.3g} N"
-    if "current" in judged and judged["current"][0] and not judged["drag"][0]:
-        judged["drag"] = True, "carries the current"
-    if judged["drag"][0]:
-        judged["drag"] = True, f"{judged['drag'][1]}; {_law(scene, liquid)}"
+    for name in [name for name, (taken, _) in judged.items() if taken and NAMED[name].through]:
+        carrier = next(it for it in NAMED[name].through if it not in barred)
+        if not judged[carrier][0]:
+            judged[carrier] = True, f"carries the {NAMED[name].label.lower()}"
+    for name, (_, table_why) in _tables(scene, liquid).items():
+        if judged[name][0]:
+            judged[name] = True, f"{judged[name][1]}; {table_why}"
     return judged
 
 
 def _left_out(bound_n: float, left_out_n: float, budget_n: float) -> str:
     if bound_n == 0.0:
         return "does nothing here"
-    return f"{left_out_n:.3g} N left out in all, within {budget_n:.3g} N"
+    return f"{left_out_n:.3g} N omitted in total, within {budget_n:.3g} N"
 
 
-def _law(scene: Scene, liquid: Liquid) -> str:
-    law, accuracy = cheapest_law(scene, liquid), scene.accuracy
-    if liquid.viscosity_pa_s is None:
-        return "law constant, for want of a viscosity"
-    if law == REFERENCE:
-        return f"law {law}"
-    return f"law {law}, within {100 * accuracy.relative:g} % or {accuracy.absolute_n:g} N of {REFERENCE}"
+def _tables(scene: Scene, liquid: Liquid) -> dict[Effect, tuple[Any, str]]:
+    """Return the tables that effects choose, and why."""
+    extremes = Extremes(scene, liquid)
+    return {effect.name: effect.choose(extremes) for effect in EFFECTS if effect.choose is not None}
 
 
 def _resolved(scene: Scene, liquid: Liquid) -> Liquid:
     taken = tuple(verdict.effect for verdict in _verdicts(scene, liquid) if verdict.included)
-    return liquid.model_copy(update={"effects": taken, "drag": Drag(law=cheapest_law(scene, liquid))})
+    tables = {name: table for name, (table, _) in _tables(scene, liquid).items()}
+    return liquid.model_copy(update={"effects": taken, **tables})
 
 
 def _heading(scene: Scene, liquid: Liquid) -> str:
@@ -172,7 +151,7 @@ def _heading(scene: Scene, liquid: Liquid) -> str:
 
 
 def _table(verdicts: tuple[Verdict, ...], cost_ns: Mapping[tuple[str, Effect], float] | None) -> list[str]:
-    rows = [["effect", "bound [N]", "share", *(["ns a tick"] if cost_ns is not None else []), "", "why"]]
+    rows = [["effect", "bound [N]", "share", *(["ns per tick"] if cost_ns is not None else []), "", "why"]]
     for verdict in verdicts:
         row = [verdict.effect, _newtons(verdict.bound_n), f"{verdict.share:.1%}"]
         if cost_ns is not None:

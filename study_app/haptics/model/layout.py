@@ -11,25 +11,17 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from study_app.haptics.model.device_dynamics import MOST_DELAY
-from study_app.haptics.model.effects.records import (
-    ADDED_MASS,
-    ADDED_MASS_STATE,
-    BUOYANCY,
-    CURRENT,
-    CURRENT_STATE,
-    DRAG,
-    DRAG_STATE,
-    HISTORY,
-    HISTORY_STATE,
-    LOCAL_WAKE,
-    LOCAL_WAKE_STATE,
-    SURFACE_STATE,
-    WAKE,
-    WAKE_STATE,
-)
-from study_app.haptics.model.kalman_records import KALMAN_STATE
+from study_app.haptics.model.effect import Fields
+from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.estimators.kalman_records import KALMAN_STATE
 
 Record: TypeAlias = Any  # one row of a recarray: fields as attributes, compiled or not
+
+
+def record_type(fields: Fields) -> np.dtype[Any]:
+    """Return the type of a record of an effect."""
+    return np.dtype(list(fields), align=True)
+
 
 # Limiters that acted in a tick, as bits of Sample.limiters.
 LIMITER_SLOPE = 1 << 0
@@ -39,7 +31,7 @@ LIMITER_NORM = 1 << 3
 LIMITER_SLEW = 1 << 4
 LIMITER_FADE = 1 << 5
 LIMITER_STALE = 1 << 6
-LIMITER_GLITCH = 1 << 7  # the position was refused: nobody may believe it
+LIMITER_GLITCH = 1 << 7  # the position was rejected and must not be used
 LIMITER_STOP = 1 << 8
 LIMITER_ESTIMATOR = 1 << 9  # the velocity is EWMA's: the Kalman filter was in trouble within the last second
 
@@ -54,12 +46,15 @@ STATUS_NON_FINITE = 3
 # The device button that stops the force, heard by the servo itself, as a bit of Sample.buttons: button 4.
 BUTTON_STOP = 1 << 3
 
+FORCE_STEP_N = 2.0**-14
+"""Recordings hold forces as whole multiples of it [N]; whoever judges a force judges it so, live and afterwards."""
+
 SAMPLE = np.dtype(
     [
-        ("tick", np.int64),  # counts turns of the servo since it started
+        ("tick", np.int64),  # counts ticks of the servo since it started
         ("time_ns", np.int64),  # when the device was read, on the servo's monotonic clock
-        ("lateness_ns", np.int64),  # how late the turn began after its deadline
-        ("busy_ns", np.int64),  # how long the turn took, from reading to writing
+        ("lateness_ns", np.int64),  # how late the tick began after its deadline
+        ("busy_ns", np.int64),  # how long the tick took, from reading to writing
         ("scene", np.int64),  # serial number of the scene in force; 0 is rest (no liquid, no force)
         ("position_m", np.float64, (3,)),  # device, hand frame
         ("velocity_mps", np.float64, (3,)),  # scene frame, after estimator and knee
@@ -104,18 +99,8 @@ COMMAND = np.dtype(
 
 
 # What follows is the memory of one scene ("model", haptics.pack) and of the safety layer, in the scene frame unless
-# said otherwise. The fields of an effect sit in a record of their own (``effects.records``), untouched where the effect
-# is not asked for.
-
-# Effects a liquid asks for, as bits of Liquid.effects.
-EFFECT_DRAG = 1 << 0
-EFFECT_WAKE = 1 << 1
-EFFECT_LOCAL_WAKE = 1 << 2
-EFFECT_CURRENT = 1 << 3
-EFFECT_BUOYANCY = 1 << 4
-EFFECT_SURFACE = 1 << 5
-EFFECT_ADDED_MASS = 1 << 6
-EFFECT_HISTORY = 1 << 7
+# said otherwise. The fields of an effect sit in records of their own (``model.effects``), untouched where the effect is
+# not asked for.
 
 REGION_EVERYWHERE = 0
 REGION_BOX = 1
@@ -138,7 +123,7 @@ PARAMETERS = np.dtype(
         ("origin_m", np.float64, (3,)),  # where the hand's origin is
         ("period_s", np.float64),  # nominal time between ticks
         ("liquids", np.int64),  # how many of the liquids' rows count
-        ("effects", np.int64),  # EFFECT_* bits that any of them asks for
+        ("effects", np.int64),  # bits of the effects that any of them asks for
         ("radius_m", np.float64),  # of the body
         ("weight_n", np.float64),  # of the body
         ("estimator", np.int64),  # ESTIMATOR_*
@@ -152,6 +137,7 @@ PARAMETERS = np.dtype(
         ("knee_threshold_mps", np.float64),
         ("slope_limit_nspm", np.float64, (MOST_DELAY + 1,)),  # greatest |drag| / |w| [N·s/m, scene], by the delay
         ("force_limit_n", np.float64),
+        ("fade_s", np.float64),  # how long the force takes to fade in
         ("slew_n", np.float64),  # the most that the force changes within a tick, while the loop shows no energy debt
         ("filter_lag_s", np.float64),  # mean delay of the velocity estimator, as far as it stores energy
         ("fallback_lag_s", np.float64),  # the same of EWMA, which stands in for a Kalman filter in trouble
@@ -172,16 +158,10 @@ REGION = np.dtype(
 
 LIQUID = np.dtype(
     [
-        ("effects", np.int64),
-        ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # how much of added mass and history the loop bears
+        ("effects", np.int64),  # bits of those it asks for
+        ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # stable share of inertial forces, by the delay
         ("region", REGION),
-        ("drag", DRAG),
-        ("wake", WAKE),
-        ("local_wake", LOCAL_WAKE),
-        ("current", CURRENT),
-        ("buoyancy", BUOYANCY),
-        ("added_mass", ADDED_MASS),
-        ("history", HISTORY),
+        *((effect.name, record_type(effect.parameters)) for effect in EFFECTS if effect.parameters is not None),
     ],
     align=True,
 )
@@ -206,6 +186,8 @@ STATE = np.dtype(
         ("drift_mps", np.float64, (3,)),  # velocity of the current at the body, of the same liquid
         ("force_n", np.float64, (3,)),  # sum of the effects
         ("lift_n", np.float64, (3,)),  # what of it is buoyancy and weight
+        ("returnable_j", np.float64),  # the most that effects can give back, times the scale
+        ("linear", np.int64),  # 1 where a force grows as the speed, 0 where all grow as its square
     ],
     align=True,
 )
@@ -219,6 +201,8 @@ WINDOW = np.dtype(
     align=True,
 )
 
+MOST_INERTIAL = max(sum(effect.damping_nspm is not None for effect in EFFECTS), 1)
+
 LIQUID_STATE = np.dtype(
     [
         ("inside", np.int64),  # 1 while the body is within the borders (with hysteresis)
@@ -228,13 +212,14 @@ LIQUID_STATE = np.dtype(
         ("motion_mps", np.float64, (3,)),  # v - v_current
         ("wake_mps", np.float64, (3,)),  # v_wake; zero where no wake is asked for
         ("relative_mps", np.float64, (3,)),  # w = v - v_current - v_wake
-        ("drag", DRAG_STATE),
-        ("wake", WAKE_STATE),
-        ("local_wake", LOCAL_WAKE_STATE),
-        ("current", CURRENT_STATE),
-        ("surface", SURFACE_STATE),
-        ("added_mass", ADDED_MASS_STATE),
-        ("history", HISTORY_STATE),
+        ("ticks", np.int64),  # ticks since the body entered; 0 where effects begin anew
+        ("damping_n", np.float64, (3,)),  # sum of the forces that are held to the slope limit
+        ("late_n", np.float64, (3,)),  # drag that builds up late, held to what the slope limit leaves
+        ("late_mps", np.float64),  # the speed that it belongs to, |w| or that of the wake; 0 where there is none
+        ("prompt_nspm", np.float64),  # the slope of the drag that acts at once
+        ("inertial", np.int64),  # how many inertial forces are reduced
+        ("inertia_n", np.float64, (MOST_INERTIAL, 3)),  # these forces, in the order of their effects
+        *((effect.name, record_type(effect.state)) for effect in EFFECTS if effect.state is not None),
     ],
     align=True,
 )
@@ -254,13 +239,13 @@ INCREMENTAL = np.dtype(
 )
 
 # The energy that hand and liquid owe each other, at the hand (haptics.energy).
-ACCOUNT = np.dtype(
+PASSIVITY = np.dtype(
     [
         ("balance_j", np.float64),  # E: what the hand put in and did not get back yet, were forces to act at once
         ("late_balance_j", np.float64),  # the same, if they act as late as the loop is believed to be
         ("later_balance_j", np.float64),  # the same, if they act one tick later still
-        ("turn", np.int64),  # the row of the newest force below
-        ("sent_n", np.float64, (MOST_DELAY + 2, 3)),  # forces of the last turns, without buoyancy and weight
+        ("row", np.int64),  # the row of the newest force below
+        ("sent_n", np.float64, (MOST_DELAY + 2, 3)),  # forces of the last ticks, without buoyancy and weight
         ("acted_n", np.float64, (MOST_DELAY + 2, 3)),  # the same of what moved the hand: another liquid's, in a shadow
         ("acted_impulse_ns", np.float64, (3,)),  # of such forces, as late as the loop is believed to be, times time
         ("reserve_j", np.float64),  # the most that liquids and estimator could give back at the last sample
@@ -275,9 +260,9 @@ ACCOUNT = np.dtype(
         ("strongest_n", np.float64),  # the strongest force so far
         ("gain", np.float64),  # share of the force that is sent
         ("norm_share", np.float64),  # share of it that the force limit leaves
-        ("settling", np.int64),  # 1 if the force of the last turn was changed to pay a debt
+        ("settling", np.int64),  # 1 if the force of the last tick was changed to pay a debt
         ("lift_n", np.float64, (3,)),  # buoyancy and weight in the force that is sent
-        ("lift_before_n", np.float64, (3,)),  # the same of the turn before
+        ("lift_before_n", np.float64, (3,)),  # the same of the tick before
     ],
     align=True,
 )
@@ -288,20 +273,20 @@ SAFETY = np.dtype(
         ("stop", np.int64),  # nonzero: zero force at once; back to 0: the force fades in as at the start
         ("fault", np.int64),  # STATUS_* that stopped the force for good, until the host clears it
         ("withheld", np.int64),  # LIMITER_* bits for which the force is fading out
-        ("started", np.int64),  # 1 after the first turn
-        ("turn_ns", np.int64),  # time of the last turn
+        ("started", np.int64),  # 1 after the first tick
+        ("tick_ns", np.int64),  # time of the last tick
         ("usable_ns", np.int64),  # time of the last sample that was accepted
-        ("turn_s", np.float64),  # time since the turn before
-        ("late_s", np.float64),  # by how much more than is forgiven this turn came late
+        ("tick_s", np.float64),  # time since the tick before
+        ("late_s", np.float64),  # by how much more than is forgiven this tick came late
         ("fade", np.float64),  # share of the force that is sent, 0 … 1
-        ("fade_s", np.float64),  # how long a fade from 0 to 1 takes at present
+        ("fade_s", np.float64),  # how long a fade from 0 to 1 takes at least: after a start; else 0
         ("device_limit_n", np.float64),  # the device's own force limit
         ("delay_ticks", np.int64),  # how many writes late a force is believed to act, 0 … MOST_DELAY
         ("slower", np.int64),  # samples in a row that the device measured a longer delay at
         ("faster", np.int64),  # samples in a row that it measured a shorter one at
         ("permitted_n", np.float64, (3,)),  # the force after slope limits, norm and fades
-        ("slewed_n", np.float64, (3,)),  # the force of the last turn, before the energy account changed it
-        ("account", ACCOUNT),  # begins anew with each scene
+        ("slewed_n", np.float64, (3,)),  # the force of the last tick, before the passivity controller changed it
+        ("passivity", PASSIVITY),  # begins anew with each scene
     ],
     align=True,
 )

@@ -1,6 +1,6 @@
-"""What damping a sampled loop bears: the table behind the slope limit, which knows nothing of compiled code.
+"""The maximum stable damping of a sampled loop: the table behind the slope limit, which knows nothing of compiled code.
 
-The table is ``slope_limits.csv`` beside this file, measured by ``validation.stability`` on the servo's own
+The table is ``slope_limits.csv`` in this folder, measured by ``validation.stability`` on the servo's own
 tick; how its numbers follow from the measurement is said there.
 """
 
@@ -27,8 +27,8 @@ CUT_INERTIA_SHARE: Final = 0.15
 MEASURED_KG: Final = 0.1
 """The free handle that the table was measured with."""
 LIGHTER: Final = 2.0
-"""Power of the ratio of masses in which a lighter handle bears less: at 1.7, freed handles of 50 g were restless in
-honey, where the delay was one tick longer than believed; from 1.8 on none of 801 handles of 30 to 250 g was."""
+"""The limit of a lighter handle is lower by this power of the ratio of masses: at 1.7, freed handles of 50 g oscillated
+in honey, where the delay was one tick longer than believed; from 1.8 on none of 801 handles of 30 to 250 g was."""
 SLEW_N: Final = 1.5
 """The most that the force on a handle of `MEASURED_KG` or more changes within a millisecond."""
 KALMAN_SLEW: Final = 0.8
@@ -39,15 +39,15 @@ _THESIS: Final = Ewma()
 _SAME: Final = 1e-9  # of two periods that differ by rounding alone
 
 
-class Bearable(NamedTuple):
-    """The greatest damping [N·s/m at the hand] that a loop bears of drag, and of added mass and history beside it."""
+class DampingLimits(NamedTuple):
+    """The maximum stable damping [N·s/m at the hand] of drag, and of added mass and history in addition."""
 
     drag_nspm: float
     inertia_nspm: float
 
 
 class Entry(NamedTuple):
-    """One line of the table: a velocity estimator, a tick period and a delay, and what a loop of that kind bears.
+    """One line of the table: a velocity estimator, a tick period and a delay, and the limits of such a loop.
 
     ``alpha`` is that of "ewma"; None for the others.
     """
@@ -56,21 +56,21 @@ class Entry(NamedTuple):
     alpha: float | None
     period_s: float
     delay_ticks: int
-    bearable: Bearable
+    limits: DampingLimits
 
 
 def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> float:
-    """Return the greatest damping of drag [N·s/m at the hand]; see `bearable`."""
-    return bearable(period_s, delay_ticks, velocity).drag_nspm
+    """Return the greatest damping of drag [N·s/m at the hand]; see `damping_limits`."""
+    return damping_limits(period_s, delay_ticks, velocity).drag_nspm
 
 
-def bearable(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> Bearable:
-    """Return what a loop bears that has a tick period [s], a delay [ticks] and a velocity estimator.
+def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> DampingLimits:
+    """Return the limits of a loop with a tick period [s], a delay [ticks] and a velocity estimator.
 
     Between two entries of the table, of periods as of alphas, the worse one counts, and of delays the next longer;
     beyond the fastest, less in the ratio of the periods. Windows stand in the table as they come; one that is set to
-    smooth less is also held to what the raw difference bears. A given velocity comes from no estimator; it is taken as
-    the thesis' own, "ewma". The entries of "kalman" hold where the delay is one tick longer or shorter than believed,
+    smooth less also has the limit of the raw difference. A given velocity has no estimator; it is taken as the thesis'
+    own, "ewma". The entries of "kalman" hold where the delay is one tick longer or shorter than believed,
     and while EWMA stands in for the filter.
 
     Raises
@@ -81,11 +81,11 @@ def bearable(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) ->
     found = [one for row in _rows(velocity) for one in _neighbours(row, period_s, delay_ticks)]
     if not found:
         raise StudyError(
-            f"no stable force is known for {1 / period_s:g} ticks a second with {delay_ticks} ticks of delay: "
+            f"no stable force is known for {1 / period_s:g} ticks per second with {delay_ticks} ticks of delay: "
             "run at 250 Hz or more, with a delay of 4 ticks at most"
         )
     beyond = min(1.0, period_s / min(entry.period_s for entry in table()))
-    return Bearable(*(beyond * min(limits) for limits in zip(*found, strict=True)))
+    return DampingLimits(*(beyond * min(limits) for limits in zip(*found, strict=True)))
 
 
 def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity = _THESIS) -> float:
@@ -111,8 +111,8 @@ def _rows(velocity: Velocity) -> tuple[tuple[str, float | None], ...]:
     return ((velocity.kind, None), ("raw", None)) if noisier else ((velocity.kind, None),)
 
 
-def _neighbours(row: tuple[str, float | None], period_s: float, delay_ticks: int) -> list[Bearable]:
-    """Return what an estimator bears at the next longer delay, at the next slower and the next faster rate."""
+def _neighbours(row: tuple[str, float | None], period_s: float, delay_ticks: int) -> list[DampingLimits]:
+    """Return the limits of an estimator at the next longer delay, at the next slower and the next faster rate."""
     known = [it for it in table() if (it.estimator, it.alpha) == row and it.delay_ticks >= delay_ticks]
     delay_ticks = min((entry.delay_ticks for entry in known), default=0)
     periods_s = {entry.period_s for entry in known}
@@ -121,7 +121,7 @@ def _neighbours(row: tuple[str, float | None], period_s: float, delay_ticks: int
     if not slower_s:
         return []
     beside_s = {min(slower_s), max(faster_s, default=min(slower_s))}
-    return [entry.bearable for entry in known if entry.delay_ticks == delay_ticks and entry.period_s in beside_s]
+    return [entry.limits for entry in known if entry.delay_ticks == delay_ticks and entry.period_s in beside_s]
 
 
 @cache
@@ -134,7 +134,7 @@ def table() -> tuple[Entry, ...]:
                 float(row["alpha"]) if row["alpha"] else None,
                 float(row["period_ms"]) * 1e-3,
                 int(row["delay_ticks"]),
-                Bearable(float(row["drag_nspm"]), float(row["inertia_nspm"])),
+                DampingLimits(float(row["drag_nspm"]), float(row["inertia_nspm"])),
             )
             for row in csv.DictReader(file)
         )
@@ -145,6 +145,6 @@ def refuses(rate_hz: float) -> str | None:
     if rate_hz >= SLOWEST_HZ:
         return None
     return (
-        f"the servo turns {rate_hz:g} times a second, and below {SLOWEST_HZ:g} the limits that keep it stable are felt "
-        "instead of the liquids: set device.rate_hz to 1000"
+        f"the servo runs at {rate_hz:g} Hz, and below {SLOWEST_HZ:g} Hz the stability limits are felt instead of the "
+        "liquids: set device.rate_hz to 1000"
     )

@@ -19,7 +19,7 @@ PLACES = ("t_s", "x_m", "y_m", "z_m")
 VELOCITIES = ("vx_mps", "vy_mps", "vz_mps")
 MOST_PROBLEMS = 20
 
-HEADER = "t_s,x_m,y_m,z_m, one row a tick"
+HEADER = "t_s,x_m,y_m,z_m, one row per tick"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,9 +45,9 @@ class Motion:
             shapes = ", ".join(str(values.shape) for values in (self.t_s, *vectors))
             raise StudyError(f"a motion is times (n,), positions (n, 3) and perhaps velocities (n, 3), not {shapes}")
         if not all(np.isfinite(values).all() for values in (self.t_s, *vectors)):
-            raise StudyError("a motion holds finite numbers only")
+            raise StudyError("a motion contains only finite numbers")
         if not (np.diff(self.t_s) > 0).all():
-            raise StudyError(f"time must increase, and does not at row {int(np.argmin(np.diff(self.t_s) > 0)) + 2}")
+            raise StudyError(f"time must increase, but does not at row {int(np.argmin(np.diff(self.t_s) > 0)) + 2}")
 
 
 def read(path: Path) -> Motion:
@@ -66,7 +66,7 @@ def read(path: Path) -> Motion:
     except OSError as error:
         raise StudyError(f"cannot read the motion {path}: {error.strerror}; name a CSV file of {HEADER}") from error
     except (UnicodeDecodeError, csv.Error) as error:
-        raise StudyError(f"cannot read the motion {path}: it is no CSV text; name a CSV file of {HEADER}") from error
+        raise StudyError(f"cannot read the motion {path}: it is not a CSV text; name a CSV file of {HEADER}") from error
     while lines and not lines[-1]:
         lines.pop()
     header = tuple(lines[0]) if lines else ()
@@ -99,7 +99,7 @@ def _numbers(path: Path, lines: list[list[str]], columns: int) -> Floats:
                 problems.append(Problem(f"row {number}", message, line=number + 1))
     if len(problems) > MOST_PROBLEMS:
         more = len(problems) - MOST_PROBLEMS
-        problems = [*problems[:MOST_PROBLEMS], Problem("rows", f"{more} more like these")]
+        problems = [*problems[:MOST_PROBLEMS], Problem("rows", f"{more} more such errors")]
     if problems:
         raise ProtocolError(str(path), tuple(problems))
     return np.array(rows)

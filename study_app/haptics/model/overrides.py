@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 from pydantic import ValidationError
 
 from study_app.errors import StudyError
+from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.scene import Scene
 
 Tables: TypeAlias = "dict[str, list[dict[str, Any]]]"
@@ -17,7 +18,7 @@ Tables: TypeAlias = "dict[str, list[dict[str, Any]]]"
 SHOWN = 200  # characters of a bad value that a message repeats
 
 # Where a parameter may sit; the places that a plain name means first come first.
-_OF_A_LIQUID = ("wake", "local_wake", "region", "current", "added_mass", "history")
+_OF_A_LIQUID = ("region", *(it.name for it in EFFECTS if it.model is not None and not it.with_liquid))
 _OF_THE_SCENE = ("body", "velocity", "knee", "accuracy", "motion")
 _FIXED = {"id", "liquids"}
 
@@ -54,6 +55,28 @@ def override_all(scene: Scene, values: Mapping[str, object]) -> Scene:
         raise StudyError(f"cannot set {named}: {reasons}") from error
 
 
+def value_of(scene: Scene, name: str) -> float:
+    """Return the number called ``name`` as it is in a scene; see `override_all` for names.
+
+    Raises
+    ------
+    StudyError
+        An unknown name, or no number.
+    """
+    table, field = _places(_tables(scene.model_dump()), name)[0]
+    value = table[field]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise StudyError(f"{_shown(name)} is not a number: it is {_shown(value)}")
+    return float(value)
+
+
+def number_names(scene: Scene) -> tuple[str, ...]:
+    """Return the plain names of a scene's numbers, sorted."""
+    leaves = {key: value for rows in _tables(scene.model_dump()).values() for row in rows for key, value in row.items()}
+    numbers = (name for name, value in leaves.items() if isinstance(value, int | float) and not isinstance(value, bool))
+    return tuple(sorted(numbers))
+
+
 def _shown(value: object) -> str:
     """Return a value as a message repeats it."""
     text = str(value)
@@ -77,7 +100,9 @@ def _tables(tree: dict[str, Any]) -> Tables:
         tables[name] = [liquid[name] for liquid in liquids if liquid[name] is not None]
     for name in _OF_THE_SCENE:
         tables[name] = [tree[name]]
-    tables["drag"] = [liquid["drag"] for liquid in liquids]  # after the knee, whose law a plain name means
+    for effect in EFFECTS:
+        if effect.with_liquid:  # after the knee, whose law a plain name means
+            tables[effect.name] = [liquid[effect.name] for liquid in liquids]
     return {**tables, "scene": [tree]}
 
 

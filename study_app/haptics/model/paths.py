@@ -30,7 +30,7 @@ def path(name: str, *, rate_hz: float = 1000.0, **parameters: float) -> Motion:
     if name not in _PATHS:
         near = difflib.get_close_matches(name, NAMES, n=1)
         meant = f"did you mean {near[0]!r}? " if near else ""
-        raise StudyError(f"no programmed path {name!r}: {meant}there are {', '.join(NAMES)}")
+        raise StudyError(f"unknown path {name!r}: {meant}there are {', '.join(NAMES)}")
     return _PATHS[name](rate_hz, **parameters)
 
 

@@ -1,13 +1,19 @@
-"""Ranges of numbers that a file may give, each with its reason, which the message about a number beyond it repeats."""
+"""Values that a file may give: ranges of numbers, each with its reason, which a message about it repeats."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Final, TypeAlias
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field
 
 REASON: Final = "reason"
 """Where the JSON Schema of a number keeps why its range is what it is."""
+
+
+class Frozen(BaseModel):
+    """A value: never changed once made, no unknown fields, no infinities."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 def within(least: float, most: float, why: str) -> Any:
@@ -27,5 +33,9 @@ DiameterM: TypeAlias = Annotated[float, within(1e-3, 1, "the ball is moved by a 
 DragCoefficient: TypeAlias = Annotated[float, within(0, 10, "a wing has 0.04, a sphere 0.47, a plate 1.2")]
 Alpha: TypeAlias = Annotated[float, within(0.001, 1, "at 0.001 the velocity lags the hand by 1 s; 1 does not smooth")]
 ForceLimitN: TypeAlias = Annotated[float, within(0.1, 20, "below 0.1 N a hand feels little, above 20 N it may be hurt")]
+FadeS: TypeAlias = Annotated[float, within(0.05, 2, "a faster onset is a knock, a slower one is no onset")]
 Decay: TypeAlias = Annotated[float, within(0.5, 1, "the share left after 1 ms: at 0.5 nothing is left after 10 ms")]
 Exponent: TypeAlias = Annotated[float, within(0.05, 10, "beyond, a wake is full at once, or never begins")]
+Smoothing: TypeAlias = Annotated[float, within(0, 1, "a hand moves on within a second")]
+TailLength: TypeAlias = Annotated[int, within(1, 100_000, "elements, one per millisecond: at most 100 s")]
+TailScaling: TypeAlias = Annotated[float, within(1, 1e9, "elements; at least the length")]

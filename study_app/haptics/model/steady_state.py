@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final, Literal, NamedTuple
 
-from study_app.haptics.model.bounds import lowered_mps, resistance_n
+from study_app.haptics.model.bounds import met_mps
+from study_app.haptics.model.effects.drag import resistance_n
+from study_app.haptics.model.effects.unsteady_drag import even_n
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.scene import Scene
@@ -28,15 +31,18 @@ def steady(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
     one tick of delay.
     """
     (liquid,) = resolve(scene).liquids
-    if "drag" not in liquid.effects:
+    if not {"drag", "unsteady_drag"} & set(liquid.effects):
         return Steady(0.0, 0.0, None)
-    drag_n = resistance_n(scene, liquid, lowered_mps(scene.scale * hand_mps, scene.knee), liquid.drag.law)
-    slope_n = (
-        slope_limit(1 / scene.rate_hz, 1, scene.velocity)
-        * lowered_mps(scene.scale * hand_mps, scene.knee)
-        / scene.scale
-    )
-    force_n = min(drag_n, slope_n, scene.force_limit_n)
+    speed_mps = met_mps(scene, liquid, scene.scale * hand_mps)
+    slope_n = slope_limit(1 / scene.rate_hz, 1, scene.velocity) * speed_mps / scene.scale
+    if "drag" in liquid.effects:
+        drag_n = resistance_n(scene, liquid, speed_mps, liquid.drag.law)
+        stable_n = min(drag_n, slope_n)
+    else:
+        drag_n, stokes_n = even_n(scene, liquid, speed_mps)
+        most_late_n = math.sqrt(2) * max(slope_n - stokes_n, 0.0)  # the ball moves as fast as its wake
+        stable_n = drag_n if drag_n - stokes_n <= most_late_n else min(stokes_n, slope_n) + most_late_n
+    force_n = min(stable_n, scene.force_limit_n)
     if force_n == drag_n:
         return Steady(force_n, drag_n, None)
     return Steady(force_n, drag_n, "norm" if force_n == scene.force_limit_n else "slope")

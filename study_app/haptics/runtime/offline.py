@@ -16,7 +16,7 @@ from study_app.haptics.kernels.sample_validation import clamp, place
 from study_app.haptics.kernels.tick import step_model, write_sample
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
-from study_app.haptics.model.limits import bearable
+from study_app.haptics.model.limits import damping_limits
 from study_app.haptics.model.motion import Motion, read
 from study_app.haptics.model.scene import Given, Scene
 from study_app.haptics.runtime.pack import pack
@@ -47,6 +47,16 @@ def simulate(scene: Scene, path: Motion | str | os.PathLike[str]) -> Table:
     ------
     StudyError
         The motion cannot be read, or the scene wants a given velocity and there is none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from study_app.protocol.load import load_scene
+    >>> t_s = np.arange(1000) / 1000
+    >>> position_m = np.column_stack([0.05 * np.sin(2 * np.pi * t_s), 0 * t_s, 0 * t_s])
+    >>> table = simulate(load_scene("rek2024", "honey"), Motion(t_s, position_m))
+    >>> print(f"{np.abs(table.device_fx_n).max():.2f} N")
+    0.12 N
     """
     motion = path if isinstance(path, Motion) else read(Path(path))
     return _table(motion.t_s, samples_along(scene, motion))
@@ -69,7 +79,7 @@ def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None
     elif isinstance(scene.velocity, Given):
         raise StudyError("the scene takes the velocity as given, but the motion has no vx_mps, vy_mps, vz_mps")
     if dynamics is None:
-        model = pack(scene, limits=bearable(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))
+        model = pack(scene, limits=damping_limits(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))
         safety = new_safety()
     else:
         model = pack(scene, dynamics=dynamics)
@@ -93,9 +103,9 @@ def _run(model: Any, safety: Record, samples: Any, t_s: Any) -> None:
         if parameters.estimator == ESTIMATOR_GIVEN:
             for axis in range(3):
                 state.estimate_mps[axis] = sample.velocity_mps[axis]
-        safety.turn_s = interval_s
+        safety.tick_s = interval_s
         take_force(state, safety)
-        step_model(model, interval_s)
+        step_model(model, interval_s, safety.delay_ticks)
         write_sample(state, sample)
         guard(model, safety, sample, interval_s)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,18 +11,28 @@ import numpy as np
 from study_app.errors import StudyError
 from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import MOST_DELAY, UNKNOWN, Dynamics
-from study_app.haptics.model.effects import records
+from study_app.haptics.model.effect import GRAVITY_MPS2, TAIL_RATE_HZ
+from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.estimators.response import KALMAN_LAG_S
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.limits import CUT_INERTIA_SHARE, LIGHTER, MEASURED_KG, Bearable, bearable, slew_limit_n
+from study_app.haptics.model.limits import (
+    CUT_INERTIA_SHARE,
+    LIGHTER,
+    MEASURED_KG,
+    DampingLimits,
+    damping_limits,
+    slew_limit_n,
+)
 from study_app.haptics.model.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Foaw, Given, Kalman, Line, Scene
 from study_app.haptics.runtime.scene_records import (
-    GRAVITY_MPS2,
-    WAKE_RATE_HZ,
-    Rows,
+    KINDS,
+    EffectRows,
+    count_open_ended,
     fill,
     most_rows,
-    rows_of,
-    volume_m3,
+    no_rows,
+    rows_after,
+    rows_needed,
 )
 
 _ESTIMATORS = {
@@ -36,31 +45,26 @@ _ESTIMATORS = {
 }
 _KNEES = {"none": layout.KNEE_NONE, "sqrt": layout.KNEE_SQRT, "square": layout.KNEE_SQUARE}
 
-KALMAN_LAG_S = 2e-3
-"""What the Kalman filter lags by where a motion changes abruptly; in smooth ones less."""
-
 
 class Model(NamedTuple):
-    """The memory of one scene: recarrays of the types in ``layout``; the first two constant, the others moving.
-
-    From ``elements`` on they hold what effects own, each liquid's rows in a stretch of its own.
-    """
+    """The memory of one scene: recarrays of the types in ``layout``; the first two constant, the others moving."""
 
     parameters: Any  # (1,) PARAMETERS
     liquids: Any  # (n,) LIQUID
     state: Any  # (1,) STATE
     liquid_states: Any  # (n,) LIQUID_STATE
     window: Any  # (rows,) WINDOW, the newest samples of the estimators that look back
-    elements: Any  # (rows,) ELEMENT, of wakes
-    segments: Any  # (rows,) SEGMENT, likewise
-    cells: Any  # (rows,) CELL, of local wakes
-    intervals: Any  # (rows,) INTERVAL, of histories
-    exponentials: Any  # (rows,) EXPONENTIAL, likewise
+    rows: Any  # `EffectRows`: what effects own, each liquid's rows in a stretch of its own
+
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """Every array of it, those of effects last."""
+        return (*self[:-1], *self.rows)
 
 
 def elements_needed(scene: Scene) -> int:
     """Return how many wake rows the scene owns: none where no liquid asks for a wake."""
-    return _rows_needed(resolve(scene)).elements
+    return count_open_ended(rows_needed(resolve(scene)))
 
 
 def window_needed(scene: Scene) -> int:
@@ -69,19 +73,19 @@ def window_needed(scene: Scene) -> int:
 
 
 def pack(
-    scene: Scene, *, capacity: int | None = None, limits: Bearable | None = None, dynamics: Dynamics = UNKNOWN
+    scene: Scene, *, capacity: int | None = None, limits: DampingLimits | None = None, dynamics: Dynamics = UNKNOWN
 ) -> Model:
     """Return the memory of ``scene``; where it leaves the choice of effects, ``gate`` makes it.
 
     ``capacity`` is the least number of wake rows to own, with room for any number of liquids, so that other scenes fit
     in later (`pack_into`); by default the model owns exactly what the scene calls for. ``limits`` is the greatest
-    damping at the hand; by default what a loop of the scene's rate and estimator bears at each delay. ``dynamics`` are
+    damping at the hand; by default those of the scene's rate and estimator at each delay. ``dynamics`` are
     those of the device.
     """
     scene = _for_device(scene, dynamics)
-    rows = _rows_needed(scene)
+    rows = rows_needed(scene)
     if capacity is not None:
-        rows = most_rows(MAX_LIQUIDS, max(rows.elements, capacity), scene.rate_hz)
+        rows = most_rows(MAX_LIQUIDS, max(count_open_ended(rows), capacity), scene.rate_hz)
     liquids = len(scene.liquids) if capacity is None else MAX_LIQUIDS
     model = Model(
         parameters=layout.records(layout.PARAMETERS, 1),
@@ -89,11 +93,13 @@ def pack(
         state=layout.records(layout.STATE, 1),
         liquid_states=layout.records(layout.LIQUID_STATE, liquids),
         window=layout.records(layout.WINDOW, window_needed(scene) if capacity is None else MAX_WINDOW),
-        elements=layout.records(records.ELEMENT, rows.elements),
-        segments=layout.records(records.SEGMENT, rows.elements),
-        cells=layout.records(records.CELL, rows.cells),
-        intervals=layout.records(records.INTERVAL, rows.intervals),
-        exponentials=layout.records(records.EXPONENTIAL, rows.exponentials),
+        rows=EffectRows(
+            **{
+                name: layout.records(layout.record_type(fields), rows[name])
+                for kind in KINDS
+                for name, fields in kind.arrays.items()
+            }
+        ),
     )
     _fill(model, scene, _by_delay(scene, dynamics) if limits is None else (limits,) * (MOST_DELAY + 1), dynamics)
     return model
@@ -110,22 +116,24 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
     if isinstance(scene.velocity, Given):
         raise StudyError('velocity "given" is for motions from a file; a device needs an estimator such as "ewma"')
     scene = _for_device(scene, dynamics)
-    rows = _rows_needed(scene)
-    if rows.elements > len(model.elements) or len(scene.liquids) > len(model.liquids):
+    if len(scene.liquids) > len(model.liquids):
         raise StudyError(
-            f"the scene needs {rows.elements} wake elements and {len(scene.liquids)} liquids; the servo was started "
-            f"with room for {len(model.elements)} and {len(model.liquids)}: start it with more elements"
+            f"the scene needs {len(scene.liquids)} liquids; the model was packed with room for {len(model.liquids)}: "
+            "pack it with a capacity"
         )
     if window_needed(scene) > len(model.window):
         raise StudyError(
             f'velocity "{scene.velocity.kind}" looks at {window_needed(scene)} samples; the model was packed with room '
             f"for {len(model.window)}: pack it with a capacity"
         )
-    if rows.cells > len(model.cells) or rows.intervals > len(model.intervals):
-        raise StudyError(
-            f"the scene needs {rows.cells} cells of local wakes and {rows.intervals} intervals of histories; the model "
-            f"was packed with room for {len(model.cells)} and {len(model.intervals)}: pack it with a capacity"
-        )
+    rows = rows_needed(scene)
+    for kind in KINDS:
+        for name in kind.arrays:
+            if rows[name] > len(getattr(model.rows, name)):
+                raise StudyError(
+                    f"the scene needs {rows[name]} {kind.words}; the model was packed with room for "
+                    f"{len(getattr(model.rows, name))}: pack it with a greater capacity"
+                )
     _fill(model, scene, _by_delay(scene, dynamics), dynamics)
 
 
@@ -138,11 +146,12 @@ def adjust_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> 
 def built_alike(scene: Scene, other: Scene) -> bool:
     """Return whether one scene's state means the same to the other: only numbers differ that no state was made with.
 
-    Of rows, effects, laws and kinds nothing may differ, nor how the hand is placed in the scene. A history and a local
-    wake are kept in portions that depend on their numbers.
+    Of rows, effects, laws and kinds nothing may differ, nor how the hand is placed in the scene. Some effects keep what
+    depends on their numbers, and cannot be adjusted.
     """
     mine, others = _constants(resolve(scene)), _constants(resolve(other))
-    if any(record.effects & (layout.EFFECT_HISTORY | layout.EFFECT_LOCAL_WAKE) for record in mine.liquids):
+    fixed = sum(effect.bit for effect in EFFECTS if not effect.adjustable)
+    if any(record.effects & fixed for record in mine.liquids):
         return False
     return (
         len(mine.liquids) == len(others.liquids)
@@ -174,25 +183,21 @@ def _for_device(scene: Scene, dynamics: Dynamics) -> Scene:
     return resolve(scene)
 
 
-def _rows_needed(scene: Scene) -> Rows:
-    return reduce(Rows.plus, (rows_of(liquid, scene.rate_hz) for liquid in scene.liquids), Rows())
-
-
-def _by_delay(scene: Scene, dynamics: Dynamics) -> Sequence[Bearable]:
-    """Return what a loop of the scene's rate, estimator and device bears at each delay, 0 to `MOST_DELAY` ticks."""
+def _by_delay(scene: Scene, dynamics: Dynamics) -> Sequence[DampingLimits]:
+    """Return the limits of the scene's rate, estimator and device at each delay, 0 to `MOST_DELAY` ticks."""
     lighter = min(dynamics.mass_kg / MEASURED_KG, 1.0) ** LIGHTER
-    found = (bearable(1 / scene.rate_hz, delay, scene.velocity) for delay in range(MOST_DELAY + 1))
-    return [Bearable(lighter * limit.drag_nspm, lighter * limit.inertia_nspm) for limit in found]
+    found = (damping_limits(1 / scene.rate_hz, delay, scene.velocity) for delay in range(MOST_DELAY + 1))
+    return [DampingLimits(lighter * limit.drag_nspm, lighter * limit.inertia_nspm) for limit in found]
 
 
-def _fill(model: Model, scene: Scene, limits: Sequence[Bearable], dynamics: Dynamics) -> None:
+def _fill(model: Model, scene: Scene, limits: Sequence[DampingLimits], dynamics: Dynamics) -> None:
     """Write constants and a fresh state."""
     for rows in (model.state, model.liquid_states):
         rows.view(np.uint8)[:] = 0
     _fill_constants(model, scene, limits, dynamics)
 
 
-def _fill_constants(model: Model, scene: Scene, limits: Sequence[Bearable], dynamics: Dynamics) -> None:
+def _fill_constants(model: Model, scene: Scene, limits: Sequence[DampingLimits], dynamics: Dynamics) -> None:
     for rows in (model.parameters, model.liquids):
         rows.view(np.uint8)[:] = 0
     parameters = model.parameters[0]
@@ -201,14 +206,14 @@ def _fill_constants(model: Model, scene: Scene, limits: Sequence[Bearable], dyna
     parameters.period_s = 1 / scene.rate_hz
     parameters.liquids = len(scene.liquids)
     parameters.radius_m = scene.body.diameter_m / 2
-    parameters.weight_n = scene.body.density_kg_m3 * volume_m3(scene.body) * GRAVITY_MPS2
+    parameters.weight_n = scene.body.density_kg_m3 * scene.body.volume_m3 * GRAVITY_MPS2
     parameters.estimator = _ESTIMATORS[scene.velocity.kind]
     parameters.window_samples = window_needed(scene)
     if isinstance(scene.velocity, Ewma | Kalman):
         alpha = scene.velocity.alpha if isinstance(scene.velocity, Ewma) else Ewma().alpha
         keep = 1 - alpha
-        parameters.log_keep_per_s = WAKE_RATE_HZ * math.log(keep) if keep > 0 else -math.inf
-        parameters.fallback_lag_s = keep / (alpha * WAKE_RATE_HZ)
+        parameters.log_keep_per_s = TAIL_RATE_HZ * math.log(keep) if keep > 0 else -math.inf
+        parameters.fallback_lag_s = keep / (alpha * TAIL_RATE_HZ)
         is_ewma = isinstance(scene.velocity, Ewma)
         parameters.filter_lag_s = parameters.fallback_lag_s if is_ewma else KALMAN_LAG_S
     elif isinstance(scene.velocity, Foaw):
@@ -217,28 +222,27 @@ def _fill_constants(model: Model, scene: Scene, limits: Sequence[Bearable], dyna
     parameters.knee_threshold_mps = scene.knee.threshold_mps
     parameters.slope_limit_nspm = [limit.drag_nspm / scene.scale for limit in limits]
     parameters.force_limit_n = scene.force_limit_n
+    parameters.fade_s = scene.fade_s
     parameters.slew_n = slew_limit_n(1 / scene.rate_hz, dynamics, scene.velocity)
     parameters.count_m = dynamics.count_m
     parameters.mass_kg = dynamics.mass_kg
-    first = Rows()
+    first = no_rows()
     for record, liquid in zip(model.liquids, scene.liquids, strict=False):
         fill(record, liquid, scene, first)
         record.inertia_share = [_inertia_share(record, limit, scene.scale) for limit in limits]
-        first = first.plus(rows_of(liquid, scene.rate_hz))
+        first = rows_after(first, liquid, scene.rate_hz)
         parameters.effects |= record.effects
 
 
-def _inertia_share(record: layout.Record, limits: Bearable, scale: float) -> float:
-    """Return how much of added mass and history the loop bears, as the damper that fast motion meets in them.
+def _inertia_share(record: layout.Record, limits: DampingLimits, scale: float) -> float:
+    """Return the stable share of inertial forces, taken as the dampers that fast motion meets in them.
 
-    An added mass M smoothed over τ is a damper M/τ, a history H smoothed likewise one of about 0.4 H/√τ at the
-    frequency where a loop becomes unstable. What does not fit whole is cut down to what any loop bears. [choice]
+    What does not fit whole is cut down to the share that is stable in any loop. [choice]
     """
     damping_nspm = 0.0
-    if record.effects & layout.EFFECT_ADDED_MASS and math.isfinite(record.added_mass.filter_per_s):
-        damping_nspm += record.added_mass.mass_kg * record.added_mass.filter_per_s
-    if record.effects & layout.EFFECT_HISTORY and math.isfinite(record.history.filter_per_s):
-        damping_nspm += 0.7 * record.history.factor_kg_rs * math.sqrt(record.history.filter_per_s)
+    for effect in EFFECTS:
+        if effect.damping_nspm is not None and record.effects & effect.bit:
+            damping_nspm += effect.damping_nspm(record[effect.name])
     if damping_nspm * scale <= limits.inertia_nspm:
         return 1.0
     return min(limits.inertia_nspm, CUT_INERTIA_SHARE * limits.drag_nspm) / (damping_nspm * scale)

@@ -1,7 +1,7 @@
 """Ticks taken again from what telemetry says of them, and the places at which they left a wake.
 
 A sample says when and where the device was read, whether that was new, and whether the force was stopped: all that a
-tick takes from outside. So the same tick beside the servo, with a model and a safety record of its own, answers with
+tick takes from outside. So the same tick outside the servo, with a model and a safety record of its own, answers with
 the same force to the last bit, or with that of another liquid on the same motion.
 """
 
@@ -16,9 +16,8 @@ from study_app.haptics.kernels.effects.wake import REST_MPS
 from study_app.haptics.kernels.passivity import log_acted, log_delivery
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.kernels.vector import copy, distance, square
+from study_app.haptics.model.effects import local_wake, wake
 from study_app.haptics.model.layout import (
-    EFFECT_LOCAL_WAKE,
-    EFFECT_WAKE,
     LIMITER_STOP,
     STATUS_DEVICE_LOST,
     Record,
@@ -66,7 +65,7 @@ def was_lost_at_read(sample: Record) -> bool:
 def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> None:
     """Recompute the tick of a sample from what it says of the servo's input: stop, delay, and what the device sent.
 
-    Where that was not ``delivered`` for this model's command, only the velocity estimator is told of it: the hand moved
+    Where that was not ``delivered`` for this model's command, only the velocity estimator receives it: the hand moved
     under that force.
     """
     sent_x, sent_y, sent_z = sample.device_force_n[0], sample.device_force_n[1], sample.device_force_n[2]
@@ -75,7 +74,7 @@ def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> 
     safety.delay_ticks = sample.delay_ticks
     tick(model, safety, sample)
     if not delivered:
-        log_acted(safety.account, (sent_x, sent_y, sent_z))
+        log_acted(safety.passivity, (sent_x, sent_y, sent_z))
     elif not as_asked:
         log_delivery(safety, sample, (sent_x, sent_y, sent_z))
 
@@ -101,17 +100,20 @@ def _note(model: Any, trail: Record, places: Any) -> None:
     if model.parameters[0].liquids == 0:
         return
     liquid, local, state = model.liquids[0], model.liquid_states[0], model.state[0]
-    if liquid.effects & EFFECT_WAKE:
-        wake, tracks = liquid.wake, local.wake
+    if local.ticks == 0:  # outside of the liquid, which forgets the body
+        trail.left = trail.held = trail.segments = 0
+        trail.time_s = 0.0
+    elif liquid.effects & wake.BIT:
+        tail, tracks = liquid.wake, local.wake
         if tracks.stored > 0 and tracks.stored != trail.left:
             place = places[(tracks.stored - 1) % places.shape[0]]
             copy(state.hand_m, place.hand_m)
             place.segment = tracks.last_segment
-            place.moving = model.elements[wake.row + (tracks.stored - 1) % wake.length].moving
+            place.moving = model.rows.elements[tail.row + (tracks.stored - 1) % tail.length].moving
         trail.left = tracks.stored
         trail.held = tracks.held
         trail.segments = tracks.last_segment - tracks.first_segment + 1 if tracks.speed_mps > 0.0 else 0
-    elif liquid.effects & EFFECT_LOCAL_WAKE:
+    elif liquid.effects & local_wake.BIT:
         tracks = local.local_wake
         if tracks.held == 0:
             trail.left = 0

@@ -21,13 +21,13 @@ from study_app.haptics.runtime.thread import LoopThread
 ELEMENTS = 10_000
 
 _FAULTS = {
-    STATUS_DEVICE_LOST: "stopped answering or lost its guard; switch it off if it pushes, and plug it in again",
+    STATUS_DEVICE_LOST: "stopped responding or lost its guard; turn it off if it pushes, and reconnect it",
     STATUS_STALE_FAULT: "sent nothing usable for 50 ms; check its cable",
-    STATUS_NON_FINITE: "was to be sent a force that is not a finite number; check the scene's parameters",
+    STATUS_NON_FINITE: "would have received a non-finite force (NaN or infinite); check the scene's parameters",
 }
 
 
-_STUCK = "holds the last turn up, or the computer does: no turn for 75 ms; switch it off if it pushes"
+_STUCK = "or the computer blocked the servo: no tick for 75 ms; turn it off if it pushes"
 
 
 class Servo:
@@ -38,11 +38,16 @@ class Servo:
 
     Parameters
     ----------
-    device : an opened device; it must stay open until the servo has stopped
-    clock : ``SystemClock`` (default) or ``VirtualClock``
-    rate_hz : turns a second; every scene must be made for this rate
-    elements : the most wake elements a scene may call for (``pack.elements_needed``)
-    real_time : False: the thread asks for no more than an ordinary one has
+    device : Driver
+        An opened device; it must stay open until the servo has stopped.
+    clock : Clock, optional
+        ``SystemClock`` (default) or ``VirtualClock``.
+    rate_hz : float
+        Ticks a second; every scene must be made for this rate.
+    elements : int
+        The most wake elements a scene may call for (``pack.elements_needed``).
+    real_time : bool
+        False: the thread asks for no more than an ordinary one has.
     """
 
     def __init__(
@@ -59,39 +64,39 @@ class Servo:
         self.telemetry = Telemetry()
         self._device = device
         self._scene = Scene(rate_hz=rate_hz)
-        self._serial = 0
+        self.serial = 0
         self._rests = True
         self._loading = threading.Lock()
-        self._loop = LoopThread(
+        self.loop = LoopThread(
             device, clock or SystemClock(), self._scene, elements, self.telemetry, real_time=real_time
         )
-        self._ending = weakref.finalize(self, self._loop.end)
+        self._ending = weakref.finalize(self, self.loop.end)
 
     def prepare(self) -> None:
         """Compile all that runs later, or load it from the cache; takes seconds when first used after a change."""
-        self._loop.compile()
+        self.loop.compile()
         self.telemetry.position_at(0)
         self.telemetry.reader().read()
 
     def start(self) -> None:
-        """Turn in a thread of its own from now on, at rest unless a scene is loaded; the force fades in."""
-        if not self._loop.clock.runs:
+        """Run in a thread of its own from now on, at rest unless a scene is loaded; the force fades in."""
+        if not self.loop.clock.runs:
             raise StudyError("a servo on a virtual clock does not run by itself: call advance(ticks)")
-        if self._loop.live:
+        if self.loop.live:
             raise StudyError("this servo has been started already: stop it first")
         self.prepare()
-        self._loop.start()
+        self.loop.start()
 
     def advance(self, ticks: int) -> int:
-        """Take ``ticks`` turns in this thread; return how many were taken: fewer after a fault (see `check`)."""
-        if self._loop.thread is not None:
-            raise StudyError("this servo turns in its own thread: stop it before advancing it by hand")
-        return self._loop.advance(ticks)
+        """Take ``ticks`` ticks in this thread; return how many were taken: fewer after a fault (see `check`)."""
+        if self.loop.thread is not None:
+            raise StudyError("this servo runs in its own thread: stop it before advancing it manually")
+        return self.loop.advance(ticks)
 
     def stop(self) -> None:
         """End the loop and wait for it; the last force written is zero. A stopped servo may be started again."""
         self._rests = True
-        self._loop.end()
+        self.loop.end()
 
     def load(self, scene: Scene) -> int:
         """Let the next tick present ``scene``; return the serial number by which telemetry knows it.
@@ -108,9 +113,9 @@ class Servo:
     def adjust(self, scene: Scene) -> int:
         """Let the next tick go on with the scene in force, its wake and its force kept, with the numbers of ``scene``.
 
-        The force moves by no more than the slew limit in a tick, and the energy account goes on: what the hand did not
-        put in does not come back, whatever the numbers are now. Returns the serial number that telemetry has from then
-        on.
+        The force moves by no more than the slew limit in a tick, and the passivity controller continues: what the hand
+        did not put in does not come back, whatever the numbers are now. Returns the serial number that telemetry has
+        from then on.
 
         Raises
         ------
@@ -120,7 +125,7 @@ class Servo:
             The servo has stopped itself.
         """
         if not self.may_adjust(scene):
-            raise StudyError("the scene differs from the one in force by more than numbers: load it instead")
+            raise StudyError("the scene differs from the current one by more than numbers: load it instead")
         return self._present(scene, goes_on=True)
 
     def may_adjust(self, scene: Scene) -> bool:
@@ -136,64 +141,64 @@ class Servo:
         needed = elements_needed(scene)
         if needed > self.elements:
             raise StudyError(
-                f"the scene calls for {needed} wake elements but the servo has room for {self.elements}: "
+                f"the scene needs {needed} wake elements but the servo has room for {self.elements}: "
                 "make the servo with more elements, or the wake's length shorter"
             )
         self.check()
         with self._loading:
-            self._serial += 1
+            self.serial += 1
             self._scene, self._rests = scene, False
-            self._loop.hand_over(scene, self._serial, goes_on=goes_on)
-            return self._serial
+            self.loop.hand_over(scene, self.serial, goes_on=goes_on)
+            return self.serial
 
     def rest(self) -> None:
         """Let the next tick present no liquid, scene 0: the force fades to zero."""
         with self._loading:
             self._rests = True
-            self._loop.hand_over(self._scene.model_copy(update={"liquids": ()}), 0)
+            self.loop.hand_over(self._scene.model_copy(update={"liquids": ()}), 0)
 
     def stop_force(self) -> None:
         """Send zero force from the next tick on, past all fades, until `fade_in`."""
-        self._loop.control[0].stop = 1
+        self.loop.control[0].stop = 1
 
     def fade_in(self) -> None:
         """Let the force return after `stop_force`, as slowly as at a start."""
-        self._loop.control[0].stop = 0
+        self.loop.control[0].stop = 0
 
     @property
     def force_is_on(self) -> bool:
         """Whether forces are sent: not stopped by hand, and no fault."""
-        return bool(self._loop.control[0].stop == 0) and self.fault is None
+        return bool(self.loop.control[0].stop == 0) and self.fault is None
 
     @property
     def fault(self) -> str | None:
         """Why the servo stopped itself, or hangs, in a sentence; None while it does neither."""
-        status = int(self._loop.control[0].status)
-        reason = _STUCK if status == STATUS_OK and self._loop.stuck else _FAULTS.get(status)
+        status = int(self.loop.control[0].status)
+        reason = _STUCK if status == STATUS_OK and self.loop.stuck else _FAULTS.get(status)
         return None if reason is None else f"the device '{self._device.name}' {reason}"
 
     @property
     def overruns(self) -> int:
-        """How many deadlines were passed over because a turn did not fit."""
-        return int(self._loop.control[0].overruns)
+        """How many deadlines were passed over because a tick did not fit."""
+        return int(self.loop.control[0].overruns)
 
     @property
     def worst_gap_s(self) -> float:
         """The longest time between two ticks since the newest scene was loaded, up to now [s]: a suspension counts."""
-        return self._loop.worst_gap_ns * 1e-9
+        return self.loop.worst_gap_ns * 1e-9
 
     def check(self) -> None:
         """Raise ``DeviceLost`` or ``ServoFault`` if the servo has stopped itself."""
         fault = self.fault
         if fault is not None:
-            status = int(self._loop.control[0].status)
-            if status == STATUS_OK:  # it hangs: nobody can say what the device does
+            status = int(self.loop.control[0].status)
+            if status == STATUS_OK:  # it hangs: the device's state is unknown
                 raise ServoFault(fault)
             raise (DeviceLost if status == STATUS_DEVICE_LOST else ServoFault)(f"{fault}; the force is zero")
 
     def now_ns(self) -> int:
         """Return the time on the servo's clock [ns], the clock of all samples."""
-        return self._loop.clock.now_ns()
+        return self.loop.clock.now_ns()
 
     @property
     def dynamics(self) -> Dynamics:
@@ -203,22 +208,22 @@ class Servo:
     @property
     def delay_ticks(self) -> int:
         """How many ticks late a force is believed to act at present."""
-        return self._loop.delay_ticks
+        return self.loop.delay_ticks
 
     @property
     def grant(self) -> Grant:
         """What the system granted to the servo's thread."""
-        return self._loop.grant
+        return self.loop.grant
 
     def describe(self) -> dict[str, Any]:
         """Return what a receipt should record: rate, the thread's priority, and how late a force is believed to act.
 
         Nothing that follows from the liquids: they are blinded.
         """
-        return {"rate_hz": self.rate_hz, "priority": self._loop.grant.priority, "delay_ticks": self.delay_ticks}
+        return {"rate_hz": self.rate_hz, "priority": self.loop.grant.priority, "delay_ticks": self.delay_ticks}
 
     def __enter__(self) -> Self:
-        if self._loop.clock.runs:
+        if self.loop.clock.runs:
             self.start()
         return self
 

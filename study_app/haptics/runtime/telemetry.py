@@ -25,7 +25,8 @@ class Telemetry:
 
     Parameters
     ----------
-    history : how many samples are kept
+    history : int
+        How many samples are kept.
     """
 
     def __init__(self, history: int = HISTORY) -> None:
@@ -81,7 +82,7 @@ class Reader:
 class Timing:
     """How regularly the servo ran: all zero where too little was seen to say.
 
-    ``rate_hz`` is the rate achieved, lateness how late turns began, ``worst_gap_s`` the longest time between two
+    ``rate_hz`` is the rate achieved, lateness how late ticks began, ``worst_gap_s`` the longest time between two
     readings of the device, ``overruns`` how many deadlines were passed over.
     """
 

@@ -37,21 +37,29 @@ from study_app.haptics.runtime.suspension import allow_suspension, refuse_suspen
 from study_app.haptics.runtime.telemetry import Telemetry
 
 _FOREVER = -1
-_PATIENCE_S = 2.0  # for a loop that was told to end; it takes one turn
+_PATIENCE_S = 2.0  # until the loop ends when asked; it takes one tick
 _STUCK_NS = 75_000_000  # a tick late by this may never come: seen with the next frame, it is known within 100 ms
 _SUSPENDED_NS = 100_000_000  # less is the error of two clocks that are read one after the other
 _THAW_S = 0.25  # within which a loop goes on that stood still with the whole process
 
 
 class LoopThread:
-    """What the loop needs to turn, kept apart from the servo, so that a servo nobody holds any more is collected.
+    """What the loop needs to run, kept apart from the servo, so that a servo without references is collected.
 
     Parameters
     ----------
-    driver, clock : what it reads and writes, and when
-    rest : a scene without liquids, which it begins with
-    elements : wake elements each of the two slots has room for
-    real_time : whether to ask for a thread that runs before others
+    driver : Driver
+        The device that the loop reads and writes.
+    clock : Clock
+        When a tick is due.
+    rest : Scene
+        A scene without liquids, with which the loop begins.
+    elements : int
+        Wake elements for which each of the two slots has room.
+    telemetry : Telemetry
+        Where every tick's sample goes.
+    real_time : bool
+        Whether to ask for a thread that runs before others.
     """
 
     def __init__(
@@ -75,16 +83,16 @@ class LoopThread:
         self._real_time = real_time
         self._rate_hz = rest.rate_hz
         self._suspended_ns = clock.suspended_ns()
-        self._stuck_at = -1  # the count of turns at which it was found stuck
-        self._safety = self._new_safety()
-        self._slots = (pack(rest, capacity=elements), pack(rest, capacity=elements))
+        self._stuck_at = -1  # the count of ticks at which it was found stuck
+        self.safety = self._new_safety()
+        self.slots = (pack(rest, capacity=elements), pack(rest, capacity=elements))
         self._output = Output(telemetry.ring, telemetry.written)
         self._exchanged = Records(new_reading(), new_command())
         self._device = DeviceCalls(driver.context, driver.read.address, driver.write.address)
         self._arguments = (
             self.control,
-            self._slots,
-            self._safety,
+            self.slots,
+            self.safety,
             self._exchanged,
             self._output,
             self._device,
@@ -92,7 +100,7 @@ class LoopThread:
         )
 
     def compile(self) -> None:
-        """Compile the loop for its arguments, or load it from the cache: zero force is written, no turn taken."""
+        """Compile the loop for its arguments, or load it from the cache: zero force is written, no tick taken."""
         let_go(self._exchanged.command, self._device)
         run(*self._arguments, 0)
 
@@ -102,14 +110,14 @@ class LoopThread:
 
         Where the whole process stood still, whoever asks may run before the loop: then the loop gets time to go on.
         """
-        turns = int(self.control[0].turns)
+        ticks = int(self.control[0].ticks)
         late_ns = self._late_ns
-        if late_ns <= _STUCK_NS or turns == self._stuck_at:
+        if late_ns <= _STUCK_NS or ticks == self._stuck_at:
             return late_ns > _STUCK_NS
         until_s = time.monotonic() + (_THAW_S if late_ns > 2 * _STUCK_NS else 0.0)
         while self._late_ns > _STUCK_NS:
             if time.monotonic() >= until_s:
-                self._stuck_at = turns
+                self._stuck_at = ticks
                 return True
             time.sleep(1e-3)
         return False
@@ -134,24 +142,24 @@ class LoopThread:
         return max(now_ns, kept_ns, suspended_ns if suspended_ns > _SUSPENDED_NS else 0)
 
     def start(self) -> None:
-        """Turn in a thread of its own until `end`; until then Ctrl-Z does not stop it with its force on."""
+        """Run in a thread of its own until `end`; until then Ctrl-Z does not stop it with its force on."""
         self._begin()
         refuse_suspension(self)
         ready = threading.Event()
-        self.thread = threading.Thread(target=self._turn, args=(ready,), name="servo", daemon=True)
+        self.thread = threading.Thread(target=self._tick, args=(ready,), name="servo", daemon=True)
         self.thread.start()
         ready.wait()
 
-    def advance(self, turns: int) -> int:
-        """Take ``turns`` in the calling thread; return how many were taken."""
+    def advance(self, ticks: int) -> int:
+        """Take ``ticks`` in the calling thread; return how many were taken."""
         if not self.live:
             self._begin()
-        return int(run(*self._arguments, max(turns, 0)))
+        return int(run(*self._arguments, max(ticks, 0)))
 
     def hand_over(self, scene: Scene, serial: int, *, goes_on: bool = False) -> None:
-        """Pack ``scene`` into the spare slot and let the next turn take it; first let it take the one before.
+        """Pack ``scene`` into the spare slot and let the next tick take it; first let it take the one before.
 
-        With ``goes_on`` the turn takes nothing but its numbers.
+        With ``goes_on`` the tick takes nothing but its numbers.
         """
         host = self.control[0]
         patience = time.monotonic() + _PATIENCE_S
@@ -160,7 +168,7 @@ class LoopThread:
                 raise self._silence()
             time.sleep(host.period_ns * 1e-9)
         spare = (int(host.request) + 1) % 2
-        pack_into(self._slots[spare], scene, dynamics=self._driver.dynamics)
+        pack_into(self.slots[spare], scene, dynamics=self._driver.dynamics)
         if not goes_on:
             self._suspended_ns = self.clock.suspended_ns()
         (offer_numbers if goes_on else offer_scene)(self.control, spare, serial)
@@ -168,7 +176,7 @@ class LoopThread:
     @property
     def delay_ticks(self) -> int:
         """How many ticks late a force is believed to act at present."""
-        return int(self._safety[0].delay_ticks)
+        return int(self.safety[0].delay_ticks)
 
     @property
     def _all_taken(self) -> bool:
@@ -198,12 +206,13 @@ class LoopThread:
 
     def _blocks(self) -> Blocks:
         """Return the memory that the loop works in."""
-        arrays = (self.control, *self._slots[0], *self._slots[1], self._safety, *self._exchanged, *self._output)
+        models = (array for model in self.slots for array in model.arrays)
+        arrays = (self.control, *models, self.safety, *self._exchanged, *self._output)
         return [(array.ctypes.data, array.nbytes) for array in arrays if array.nbytes]
 
     def _silence(self) -> ServoFault:
         return ServoFault(
-            f"the servo is stuck: its device '{self._driver.name}' gave no answer for {_PATIENCE_S:g} s; switch it off"
+            f"the servo is stuck: its device '{self._driver.name}' has not responded for {_PATIENCE_S:g} s; turn it off"
         )
 
     def _new_safety(self) -> Any:
@@ -219,14 +228,14 @@ class LoopThread:
         if delay_ticks > MOST_DELAY:
             raise DeviceError(
                 f"the device '{driver.name}' answers {delay_ticks} ticks late at {self._rate_hz:g} Hz, and no force is "
-                f"stable beyond {MOST_DELAY}: connect it without a hub, close what else uses the bus, start anew"
+                f"stable beyond {MOST_DELAY}: connect it without a hub, close other programs on the bus, restart"
             )
         return new_safety(driver.force_limit_n, delay_ticks)
 
     def _begin(self) -> None:
         _leave_by_the_exit()
         _live.add(self)
-        self._safety[0] = self._new_safety()[0]
+        self.safety[0] = self._new_safety()[0]
         host = self.control[0]
         host.status = STATUS_OK
         host.began_ns = self.clock.now_ns()
@@ -234,7 +243,7 @@ class LoopThread:
         host.run = 1
         self.live = True
 
-    def _turn(self, ready: threading.Event) -> None:
+    def _tick(self, ready: threading.Event) -> None:
         try:
             self.grant = raise_priority(self._blocks(), real_time=self._real_time)
             self.control[0].began_ns = self.clock.now_ns()

@@ -14,11 +14,16 @@ from pydantic import BaseModel, ConfigDict
 from study_app.haptics.model.scene import MAX_LIQUIDS, Scene
 from study_app.protocol.analysis_plan import decisions
 from study_app.protocol.checks.cross_references import alike, items, languages, references, repeats, sequence
+from study_app.protocol.checks.designs import kinds
+from study_app.protocol.checks.groups import groups
+from study_app.protocol.checks.questions import questions
 from study_app.protocol.felt import LEAST_N, force_n, numbers, within_tank
 from study_app.protocol.model import (
     Block,
     Condition,
     DeviceNeeds,
+    Follow,
+    Format,
     Named,
     PageText,
     Reach,
@@ -29,7 +34,7 @@ from study_app.protocol.model import (
 )
 from study_app.protocol.source.document import Path, names
 from study_app.protocol.source.problems import Fault
-from study_app.protocol.trials.task import Task, fastest_stroke
+from study_app.protocol.trials.task import Task
 
 _TABLES = ("liquids", "conditions", "tasks", "pages", "blocks")
 
@@ -39,6 +44,7 @@ class Draft(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
+    format: Format = 1
     device: DeviceNeeds | None = None
     scene: SceneDefaults | None = None
     liquids: Named[StudyLiquid] = {}
@@ -48,6 +54,7 @@ class Draft(BaseModel):
     blocks: Named[Block] = {}
     sequence: tuple[str, ...] = ()
     whole: bool = True
+    sessions_differ: bool = False
 
     def scene_of(self, condition: Condition) -> Scene | None:
         """Return what is felt in a condition, if all of it is sound."""
@@ -58,7 +65,7 @@ class Draft(BaseModel):
             or not 0 < len(liquids) == len(set(condition.liquid_ids)) <= MAX_LIQUIDS
         ):
             return None
-        return scene_with(self.scene, self.device, liquids)
+        return scene_with(self.scene, self.device, liquids, self.format)
 
 
 def draft(document: Mapping[str, Any], broken: Iterable[Path]) -> Draft:
@@ -72,12 +79,13 @@ def draft(document: Mapping[str, Any], broken: Iterable[Path]) -> Draft:
             sound.pop(section, None)
     sound.setdefault("scene", None if "scene" in document else {})
     whole = len(names(document, "blocks")) == len(names(sound, "blocks"))
-    return Draft.model_validate({**sound, "whole": whole}, strict=True)
+    differ = bool(document.keys() & {"groups", "sequences"})
+    return Draft.model_validate({**sound, "whole": whole, "sessions_differ": differ}, strict=True)
 
 
 def check(document: Mapping[str, Any], broken: Iterable[Path]) -> Iterator[Fault]:
     """Yield every problem between the tables of ``document``, whose ``broken`` places are known already."""
-    for of_names in (references, sequence, repeats, items, alike, languages, decisions):
+    for of_names in (references, kinds, sequence, groups, repeats, items, alike, languages, questions, decisions):
         yield from of_names(document)
     parts = draft(document, broken)
     for of_tables in (balls, targets, crowded, outside, unfelt, equal_liquids, equal_conditions):
@@ -103,6 +111,12 @@ def targets(parts: Draft) -> Iterator[Fault]:
         return
     half = tuple(size / 2 for size in parts.device.workspace_mm)
     for name, task in parts.tasks.items():
+        if isinstance(task, Follow) and task.amplitude_mm + task.radius_mm > half[0]:
+            yield Fault(
+                ("tasks", name, "amplitude_mm"),
+                f"{task.amplitude_mm:g} mm with radius {task.radius_mm:g} mm leaves the tank",
+                f"device.workspace_mm reaches to {half[0]:g} mm",
+            )
         if not isinstance(task, Reach):
             continue
         for index, target in enumerate(task.targets_mm):
@@ -141,7 +155,7 @@ def unfelt(parts: Draft) -> Iterator[Fault]:
         task = parts.tasks.get(block.task)
         if task is None or parts.device is None:
             continue
-        stroke = fastest_stroke(task, parts.device.workspace_m)
+        stroke = task.fastest_stroke(parts.device.workspace_m)
         for index, condition in enumerate(block.conditions):
             scene = parts.scene_of(parts.conditions[condition]) if condition in parts.conditions else None
             if scene is not None and (exerted_n := force_n(scene, stroke)) < LEAST_N:
@@ -166,11 +180,11 @@ def equal_conditions(parts: Draft) -> Iterator[Fault]:
     for name, block in parts.blocks.items():
         presented = {one: parts.conditions[one] for one in block.conditions if one in parts.conditions}
         delays = compared(list(presented.values())) == "delays"  # which the analysis pools
-        first: dict[tuple[tuple[str, ...], float], str] = {}
+        first: dict[tuple[tuple[str, ...], float, str], str] = {}
         for index, condition in enumerate(() if delays and block.replicates else block.conditions):
             if (one := presented.get(condition)) is None:
                 continue
-            earlier = first.setdefault((one.liquid_ids, one.delay_ms), condition)
+            earlier = first.setdefault((one.liquid_ids, one.delay_ms, one.ball), condition)
             if earlier != condition:
                 message = f'"{condition}" presents the same as "{earlier}"'
                 hint = "change it, or use repetitions" + (", or write replicates = true" if delays else "")
@@ -190,7 +204,7 @@ def compares(parts: Draft) -> Iterator[Fault]:
     """Check that the conditions of a main block differ in one thing, which is what the block says that it compares."""
     for name, block in parts.blocks.items():
         presented = [parts.conditions[one] for one in block.conditions if one in parts.conditions]
-        if block.phase != "main" or len(presented) < len(block.conditions):
+        if block.phase != "main" or block.design is not None or len(presented) < len(block.conditions):
             continue
         liquids, delays = len({one.liquid_ids for one in presented}), len({one.delay_ms for one in presented})
         if liquids > 1 and delays > 1:
@@ -211,13 +225,16 @@ def breaks(parts: Draft) -> Iterator[Fault]:
 
 
 def counted_parts(parts: Draft) -> Iterator[Fault]:
-    """Check that parts count 1, 2, … in the order of the sequence, and that something is analysed."""
+    """Check that parts count 1, 2, … in the order of the sequence, and that something is analysed.
+
+    Where sessions differ each numbers its parts anew (`own_protocol`).
+    """
     if not (parts.whole and parts.blocks):
         return
     if all(block.phase != "main" for block in parts.blocks.values()):
         yield Fault(("blocks",), "there is no main block", 'one needs phase = "main"')
     latest = 0
-    for name in dict.fromkeys(parts.sequence):
+    for name in dict.fromkeys(() if parts.sessions_differ else parts.sequence):
         part = parts.blocks[name].part if name in parts.blocks else None
         if part is None:
             continue

@@ -9,6 +9,7 @@ import unicodedata
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
+from study_app.protocol.groups.group import sequences_in
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, did_you_mean
 from study_app.protocol.wording.languages import LANGUAGES
@@ -17,10 +18,15 @@ REFERENCES = {
     "conditions.*.liquid": "liquids",
     "conditions.*.liquids.*": "liquids",
     "questionnaires.*.scale": "scales",
+    "questionnaires.*.items.*.scale": "scales",
     "blocks.*.conditions.*": "conditions",
     "blocks.*.task": "tasks",
     "blocks.*.questionnaire": "questionnaires",
     "blocks.*.break_page": "pages",
+    "blocks.*.stimulus": "stimuli",
+    "blocks.*.standard": "conditions",
+    "stimuli.*.condition": "conditions",
+    "designs.*.scale": "scales",
 }
 
 TEXTS = (
@@ -32,9 +38,14 @@ TEXTS = (
     "questionnaires.*.intro",
     "questionnaires.*.items.*.text",
     "questionnaires.*.items.*.short",
+    "questionnaires.*.items.*.low",
+    "questionnaires.*.items.*.high",
+    "questionnaires.*.items.*.unit",
+    "questionnaires.*.items.*.options.*.text",
     "pages.*.title",
     "pages.*.body",
     "pages.*.button",
+    "designs.*.question",
     "blocks.*.title",
     "blocks.*.setting_label",
 )
@@ -54,28 +65,43 @@ def references(document: Document) -> Iterator[Fault]:
     for pattern, section in REFERENCES.items():
         known = names(document, section)
         for path, name in entries(document, pattern):
-            yield from _unknown(path, name, section.removesuffix("s"), known)
+            yield from _unknown(path, name, "stimulus" if section == "stimuli" else section.removesuffix("s"), known)
 
 
 def sequence(document: Document) -> Iterator[Fault]:
-    """Check that the sequence names pages and blocks, each block once, and leaves none out but pages of breaks."""
+    """Check that each sequence names pages, blocks and forms, and that none is left out but pages of breaks.
+
+    Blocks and forms come once in a sequence. `groups` checks that no block is left out of a study with groups.
+    """
     pages, blocks = names(document, "pages"), names(document, "blocks")
+    forms = names(document, "questionnaires")
     for name in pages:
         if name in blocks:
             yield Fault(("blocks", name), "a page has this name too", "sequence could not tell them apart")
-    steps = list(entries(document, "sequence.*"))
-    if not steps:
-        return
-    seen: set[str] = set()
-    for path, name in steps:
-        yield from _unknown(path, name, "page or block", {*pages, *blocks})
-        if name in blocks and name in seen:
-            yield Fault(path, f'block "{name}" comes twice', "give the block repetitions")
-        seen.add(str(name))
+    if not document.keys() & {"sequence", "sequences", "groups"}:
+        yield Fault(("sequence",), "is missing")
     breaks = [page for _, page in entries(document, "blocks.*.break_page")]
-    for section, tables in (("pages", pages), ("blocks", blocks)):
+    used: set[str] = set()
+    for place, steps in sequences_in(document):
+        seen: set[str] = set()
+        for index, name in enumerate(steps):
+            path = (*place, index)
+            yield from _unknown(path, name, "page or block", {*pages, *blocks, *forms})
+            if name in blocks and name in seen:
+                yield Fault(path, f'block "{name}" comes twice', "give the block repetitions")
+            elif name in forms and (name in pages or name in blocks) and name not in used:
+                other = "page" if name in pages else "block"
+                where = ("questionnaires", name)
+                yield Fault(where, f"a {other} has this name too", "sequence could not tell them apart")
+            elif name in forms and name in seen:
+                yield Fault(path, f'form "{name}" comes twice', "give the second one a name of its own")
+            seen.add(str(name))
+        used |= seen
+    if not used:
+        return
+    for section, tables in (("pages", pages), ("blocks", () if "groups" in document else blocks)):
         for name in tables:
-            if name not in seen and not (section == "pages" and name in breaks):
+            if name not in used and not (section == "pages" and name in breaks):
                 yield Fault((section, name), "comes nowhere in sequence", "add it there, or take it out")
 
 

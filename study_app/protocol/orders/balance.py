@@ -13,12 +13,15 @@ from itertools import count, pairwise
 from typing import Literal, TypeAlias
 
 from study_app.errors import StudyError
-from study_app.protocol.blocks import Order
+from study_app.protocol.groups.allocation import group_of
+from study_app.protocol.groups.own_protocol import variants
 from study_app.protocol.model import Protocol
 from study_app.protocol.order_constraint import longest_run, shortest_distance
-from study_app.protocol.orders.block_orders import BlockOrder, orders_of
+from study_app.protocol.orders.block_orders import BlockOrder, CodeOrder, orders_of
 from study_app.protocol.orders.latin_squares import borders_even, enrolment, row_count
 from study_app.protocol.orders.schedule import codes_of
+from study_app.protocol.streams import stream
+from study_app.protocol.trials.keyed import draw_secret
 
 Table: TypeAlias = tuple[tuple[int, ...], ...]
 
@@ -73,7 +76,7 @@ class BlockBalance:
 
     id: str
     title: str
-    order: Order
+    order: CodeOrder
     repetitions: int
     evenness: Evenness
     unnumbered: tuple[str, ...]
@@ -81,9 +84,10 @@ class BlockBalance:
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """The blocks with more than one code, in the order of the session."""
+    """The blocks with more than one code, in the order of the session; ``session`` is whose, where sessions differ."""
 
     study: str
+    session: str
     participants: int
     seed: int
     blocks: tuple[BlockBalance, ...]
@@ -120,7 +124,7 @@ def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
     )
 
 
-def balance(protocol: Protocol, participants: Sequence[str], seed: int) -> Balance:
+def balance(protocol: Protocol, participants: Sequence[str], seed: int, session: str = "") -> Balance:
     """Return how even the orders of ``participants`` (ids) would be, all of them under ``seed``.
 
     In a study each session has a seed of its own; to orders dealt from a square the seed makes no difference.
@@ -136,17 +140,39 @@ def balance(protocol: Protocol, participants: Sequence[str], seed: int) -> Balan
     language = protocol.study.languages[0]
     return Balance(
         study=orders.study,
+        session=session,
         participants=len(participants),
         seed=seed,
         blocks=tuple(
-            _balance(orders.study, block, protocol.text(protocol.blocks[block.id].title, language), participants, seed)
+            _block_balance(
+                orders.study, block, protocol.text(protocol.blocks[block.id].title, language), participants, seed
+            )
             for block in orders.blocks
             if len(block.codes) > 1
         ),
     )
 
 
-def _balance(study: str, block: BlockOrder, title: str, participants: Sequence[str], seed: int) -> BlockBalance:
+def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iterator[Balance]:
+    """Yield the balance of each kind of session, over the participants of its group.
+
+    Participants come into the groups that a rehearsal with this seed would allocate; a group of none is left out.
+
+    Raises
+    ------
+    StudyError
+        There are no participants.
+    """
+    shares = {name: group.share for name, group in protocol.groups.items()}
+    secret = draw_secret(stream(seed, "blinding").random)
+    groups = [group_of(shares, secret, entry) if shares else None for entry in range(1, len(participants) + 1)]
+    for one in variants(protocol):
+        own = [who for who, group in zip(participants, groups, strict=True) if group == one.group]
+        if own or not shares:
+            yield balance(one.protocol, own, seed, one.name)
+
+
+def _block_balance(study: str, block: BlockOrder, title: str, participants: Sequence[str], seed: int) -> BlockBalance:
     drawn = [codes_of(study, block, participant, seed) for participant in participants]
     return BlockBalance(
         id=block.id,
@@ -165,7 +191,8 @@ def _even(counts: Iterable[int]) -> bool:
 def describe_balance(judged: Balance) -> str:
     """Return the tables of every block, and what they mean."""
     people = "1 participant" if judged.participants == 1 else f"{judged.participants} participants"
-    head = f"{judged.study}: the orders of {people}, each with seed {judged.seed}"
+    whose = f", {judged.session}" if judged.session else ""
+    head = f"{judged.study}{whose}: the orders of {people}, each with seed {judged.seed}"
     if not judged.blocks:
         return f"{head}\n\nNo block has more than one code: there is nothing to balance."
     return "\n\n".join((head, *("\n".join(_section(block)) for block in judged.blocks)))
@@ -216,7 +243,7 @@ def _advice(block: BlockBalance) -> Iterator[str]:
     codes, repetitions = len(block.evenness.codes), block.repetitions
     match block.order:
         case "fixed":
-            yield "Everyone gets the same order: what a condition does cannot be told from what its position does."
+            yield "Everyone gets the same order: effects of condition and of position cannot be separated."
         case "shuffled" | "constrained":
             yield "Drawn anew in every session: even on average only, and every seed gives other tables."
             if repetitions == 1:

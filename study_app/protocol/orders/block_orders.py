@@ -8,25 +8,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from study_app.errors import StudyError
 from study_app.protocol.blocks import Block, Order, Phase
+from study_app.protocol.groups.group import Group
+from study_app.protocol.groups.steps import every_step, numbered_parts, sessions_differ, steps_of
 from study_app.protocol.model import Protocol
 from study_app.protocol.order_constraint import Constraint
+from study_app.protocol.trials.method import TrackOrder
+from study_app.protocol.trials.tracks import method_of, tracks_of
+
+CodeOrder: TypeAlias = Literal[Order, TrackOrder]
+"""How the codes of a block are ordered: conditions, or the tracks of a design."""
 
 
 @dataclass(frozen=True, slots=True)
 class BlockOrder:
-    """A block as scheduling sees it: its codes, how they are ordered, and the ids of what is asked."""
+    """A block as scheduling sees it: its codes, how they are ordered, and the ids of what is asked.
+
+    ``slots`` says per code how long its track is; empty in a block without a design.
+    """
 
     id: str
     phase: Phase
     part: int | None
     codes: tuple[str, ...]
-    order: Order
+    order: CodeOrder
     max_repeats: int | None
     min_distance: int | None
     repetitions: int
@@ -34,11 +44,17 @@ class BlockOrder:
     break_page: str | None
     items: tuple[str, ...]
     item_order: Literal["fixed", "shuffled"]
+    slots: tuple[int, ...] = ()
 
     @property
     def trials(self) -> int:
-        """How many trials a participant does."""
-        return len(self.codes) * self.repetitions
+        """How many trials a participant does at most."""
+        return sum(self.slots) if self.slots else len(self.codes) * self.repetitions
+
+    @property
+    def breaks(self) -> int:
+        """How many breaks come between its trials."""
+        return 0 if self.break_every is None else (self.trials - 1) // self.break_every
 
     def break_after(self, index: int) -> bool:
         """Return whether a break follows trial ``index`` (from 1)."""
@@ -46,45 +62,74 @@ class BlockOrder:
 
 
 @dataclass(frozen=True, slots=True)
+class FormOrder:
+    """A form as scheduling sees it: the ids of what is asked."""
+
+    id: str
+    items: tuple[str, ...]
+    item_order: Literal["fixed", "shuffled"]
+
+
+@dataclass(frozen=True, slots=True)
 class Orders:
-    """A study as scheduling sees it: page ids and blocks in the order of the session."""
+    """A study as scheduling sees it: page ids, blocks and forms in the order of the session."""
 
     study: str
-    steps: tuple[str | BlockOrder, ...]
+    steps: tuple[str | BlockOrder | FormOrder, ...]
 
     @property
     def blocks(self) -> tuple[BlockOrder, ...]:
         """The blocks alone, in order."""
         return tuple(step for step in self.steps if isinstance(step, BlockOrder))
 
+    @property
+    def answers(self) -> int:
+        """How many answers a complete session holds at most, practice and forms included."""
+        forms = (step for step in self.steps if isinstance(step, FormOrder))
+        return sum(block.trials * len(block.items) for block in self.blocks) + sum(len(form.items) for form in forms)
 
-def block_codes(block: Block) -> tuple[str, ...]:
-    """Return the codes of a block's conditions: L1, L2, … in a main block, the phase's name elsewhere."""
-    if block.code_prefix is None:
+
+def block_codes(protocol: Protocol, block: Block) -> tuple[str, ...]:
+    """Return the codes of a block's conditions or tracks: L1, L2, … in a main block, the phase's name elsewhere."""
+    count = len(block.conditions) if block.design is None else len(tracks_of(protocol, block))
+    if block.code_prefix is None and count == 1:
         return (block.phase,)
-    return tuple(f"{block.code_prefix}{number}" for number in range(1, len(block.conditions) + 1))
+    return tuple(f"{block.code_prefix or block.phase}{number}" for number in range(1, count + 1))
 
 
 def orders_of(protocol: Protocol) -> Orders:
     """Return what scheduling needs of a protocol."""
-    blocks = {name: _of_block(protocol, block) for name, block in protocol.blocks.items()}
-    return Orders(protocol.study.name, tuple(blocks.get(step, step) for step in protocol.sequence))
+    steps: dict[str, BlockOrder | FormOrder] = {
+        name: FormOrder(name, tuple(item.id for item in form.items), form.item_order)
+        for name, form in protocol.forms.items()
+    }
+    steps |= {name: order_of(protocol, block) for name, block in protocol.blocks.items()}
+    return Orders(protocol.study.name, tuple(steps.get(step, step) for step in protocol.steps))
 
 
-def _of_block(protocol: Protocol, block: Block) -> BlockOrder:
+def order_of(protocol: Protocol, block: Block) -> BlockOrder:
+    """Return a block as scheduling sees it."""
     questionnaire = protocol.questionnaire_of(block.id)
+    codes = block_codes(protocol, block)
+    items = () if questionnaire is None else tuple(item.id for item in questionnaire.items)
+    order: CodeOrder = block.order
+    slots: tuple[int, ...] = ()
+    if block.design is not None:
+        order = "interleaved" if block.stimulus is None else method_of(protocol, block).order
+        slots = tuple(track.slots for track in tracks_of(protocol, block))
     return BlockOrder(
         id=block.id,
         phase=block.phase,
         part=block.part,
-        codes=block_codes(block),
-        order=block.order,
+        codes=codes,
+        order=order,
         max_repeats=block.max_repeats,
         min_distance=block.min_distance,
         repetitions=block.repetitions,
+        slots=slots,
         break_every=block.break_every,
         break_page=block.break_page,
-        items=() if questionnaire is None else tuple(item.id for item in questionnaire.items),
+        items=items,
         item_order="fixed" if questionnaire is None else questionnaire.item_order,
     )
 
@@ -99,8 +144,9 @@ class _KeptBlock(_Kept):
     phase: Phase
     part: int | None
     codes: tuple[str, ...] = Field(min_length=1)
-    order: Order
+    order: CodeOrder
     repetitions: int = Field(ge=1)
+    slots: tuple[Annotated[int, Field(ge=1)], ...] = ()
     questionnaire: str | None
     max_repeats: int | None = Field(default=None, ge=1)
     min_distance: int | None = Field(default=None, ge=1)
@@ -121,23 +167,59 @@ class _KeptStudy(_Kept):
     name: str
 
 
-class _KeptProtocol(_Kept):
+class _KeptSteps(_Kept):
+    sequence: tuple[str, ...] = ()
+    sequences: tuple[tuple[str, ...], ...] = ()
+    groups: dict[str, Group] = {}
+
+
+class _KeptProtocol(_KeptSteps):
     study: _KeptStudy
-    sequence: tuple[str, ...]
     blocks: dict[str, _KeptBlock]
     questionnaires: dict[str, _KeptQuestionnaire]
 
 
-def orders_of_receipt(protocol: Mapping[str, Any]) -> Orders:
+def every_step_of(protocol: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the steps of all groups and sessions of the protocol in a receipt, each once.
+
+    Raises
+    ------
+    ValueError
+        It has none.
+    """
+    return every_step(_KeptSteps.model_validate(protocol))
+
+
+def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, session: int = 1) -> Orders:
     """Return what scheduling needs of the protocol in a receipt: without conditions, blocks with their codes.
+
+    Parameters
+    ----------
+    protocol : mapping
+        The protocol as the receipt holds it.
+    group : str, optional
+        The participant's group in a study with groups.
+    session : int
+        The session's number.
 
     Raises
     ------
     StudyError
-        It does not tell the orders: it was changed, or is of a version that this one does not know.
+        It does not tell the orders: it was changed, or is of a version that this one does not know; or the participant
+        has fewer sessions.
     """
     try:
         kept = _KeptProtocol.model_validate(protocol)
+        if group is not None and group not in kept.groups:
+            raise _untold("groups", f'there is no group "{group}"')
+        shown = steps_of(kept, group, session)
+        if sessions_differ(kept):
+            numbers = numbered_parts(shown, {name: block.part for name, block in kept.blocks.items()})
+            own = {
+                name: block.model_copy(update={"part": numbers.get(name, block.part)})
+                for name, block in kept.blocks.items()
+            }
+            kept = kept.model_copy(update={"blocks": own})
         blocks = {name: _of_kept(kept, name, block) for name, block in kept.blocks.items()}
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
@@ -151,11 +233,17 @@ def orders_of_receipt(protocol: Mapping[str, Any]) -> Orders:
         if (impossible := constraint.impossible(len(block.codes), block.repetitions)) is not None:
             key, sentence = impossible
             raise _untold(f"blocks.{block.id}.{key}", sentence)
-    return Orders(kept.study.name, tuple(blocks.get(step, step) for step in kept.sequence))
+    steps: dict[str, BlockOrder | FormOrder] = {
+        name: FormOrder(name, tuple(item.id for item in form.items), form.item_order)
+        for name, form in kept.questionnaires.items()
+    }
+    steps |= blocks
+    return Orders(kept.study.name, tuple(steps.get(step, step) for step in shown))
 
 
 def _of_kept(protocol: _KeptProtocol, name: str, block: _KeptBlock) -> BlockOrder:
     questionnaire = None if block.questionnaire is None else protocol.questionnaires[block.questionnaire]
+    items = () if questionnaire is None else tuple(item.id for item in questionnaire.items)
     return BlockOrder(
         id=name,
         phase=block.phase,
@@ -165,9 +253,10 @@ def _of_kept(protocol: _KeptProtocol, name: str, block: _KeptBlock) -> BlockOrde
         max_repeats=block.max_repeats,
         min_distance=block.min_distance,
         repetitions=block.repetitions,
+        slots=block.slots,
         break_every=block.break_every,
         break_page=block.break_page,
-        items=() if questionnaire is None else tuple(item.id for item in questionnaire.items),
+        items=items,
         item_order="fixed" if questionnaire is None else questionnaire.item_order,
     )
 

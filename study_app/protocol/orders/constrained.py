@@ -58,7 +58,7 @@ def arrange(codes: Sequence[T], repetitions: int, constraint: Constraint, draw: 
 def propose(codes: int, repetitions: int, constraint: Constraint, draw: Draw) -> Proposal | None:
     """Draw an order from left to right, and return it with one over its chance; None in a dead end."""
     apart = max(constraint.min_distance or 1, 2 if constraint.max_repeats == 1 else 1)
-    left = _Left(codes, repetitions, apart, constraint.max_repeats or codes * repetitions)
+    left = Remaining(codes, repetitions, apart, constraint.max_repeats or codes * repetitions)
     steepness = _steepness(codes, repetitions, apart)
     masses = chosen_weights = 1
     for _ in range(codes * repetitions):
@@ -90,7 +90,7 @@ def _steepness(codes: int, repetitions: int, apart: int) -> int:
     return min((2 * room + codes * (codes - 1)) // (2 * room), 1 + repetitions // 2, _STEEPEST)
 
 
-class _Left:
+class Remaining:
     """What is left to come, and what of it may come next: ``apart`` trials after its like, ``run`` in a row."""
 
     def __init__(self, codes: int, repetitions: int, apart: int, run: int) -> None:

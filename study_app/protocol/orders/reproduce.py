@@ -17,7 +17,10 @@ _TOLD = ("block", "phase", "part", "index", "of", "code")
 
 @dataclass(frozen=True, slots=True)
 class RecordedTrial:
-    """One attempt at a trial as a session recorded it; ``items`` in the order shown, None if nothing was answered."""
+    """One attempt at a trial as a session recorded it; ``items`` in the order shown, None if nothing was answered.
+
+    ``may_hide`` says that answers may have hidden some of the items, which are then not recorded.
+    """
 
     number: int
     block: str
@@ -27,17 +30,20 @@ class RecordedTrial:
     of: int
     code: str
     items: tuple[str, ...] | None = None
+    may_hide: bool = False
 
 
-def recorded_trials(lines: Iterable[Mapping[str, Any]]) -> tuple[RecordedTrial, ...]:
+def recorded_trials(lines: Iterable[Mapping[str, Any]]) -> tuple[RecordedTrial | int, ...]:
     """Return what the lines of a journal say was presented: every attempt, in the order of time.
+
+    A trial that was passed over is its number alone.
 
     Raises
     ------
     KeyError
         A line lacks what lines of its event hold, or answers a trial that never started.
     """
-    attempts: list[RecordedTrial] = []
+    attempts: list[RecordedTrial | int] = []
     place: dict[tuple[int, int], int] = {}
     for line in lines:
         if line["event"] == "trial_started":
@@ -46,7 +52,12 @@ def recorded_trials(lines: Iterable[Mapping[str, Any]]) -> tuple[RecordedTrial, 
         elif line["event"] == "responses":
             rows = sorted(line["items"], key=lambda row: int(row["number"]))
             index = place[line["trial"], line["attempt"]]
-            attempts[index] = replace(attempts[index], items=tuple(row["item"] for row in rows))
+            attempt = attempts[index]
+            assert isinstance(attempt, RecordedTrial)  # noqa: S101 - only these have a place
+            items, may_hide = tuple(row["item"] for row in rows), any("kind" in row for row in rows)
+            attempts[index] = replace(attempt, items=items, may_hide=may_hide)
+        elif line["event"] == "passed_over" and "trial" in line:
+            attempts.append(line["trial"])
     return tuple(attempts)
 
 
@@ -54,9 +65,11 @@ def reproduce(
     protocol: Mapping[str, Any],
     seed: int,
     participant: str,
-    recorded: Iterable[RecordedTrial],
+    recorded: Iterable[RecordedTrial | int],
     *,
     complete: bool,
+    group: str | None = None,
+    session: int = 1,
 ) -> tuple[str, ...]:
     """Return how the trials that were run differ from those that receipt, seed and participant give.
 
@@ -64,20 +77,35 @@ def reproduce(
     ----------
     protocol : mapping
         The protocol as the receipt holds it: without conditions, blocks with their codes.
-    recorded : iterable of RecordedTrial
-        What was run, in the order of time.
+    seed : int
+        The session's seed, from its receipt.
+    participant : str
+        The participant's id.
+    recorded : iterable of RecordedTrial or int
+        What was run, in the order of time; of trials that were passed over their numbers.
     complete : bool
         Whether the session went to its end, so that no trial may be missing.
+    group : str, optional
+        The participant's group in a study with groups.
+    session : int
+        The session's number.
 
     Raises
     ------
     StudyError
         The receipt's protocol does not tell the orders.
     """
-    planned = {trial.number: trial for trial in build_schedule(orders_of_receipt(protocol), participant, seed).trials}
+    orders = orders_of_receipt(protocol, group=group, session=session)
+    planned = {trial.number: trial for trial in build_schedule(orders, participant, seed).trials}
     attempts = tuple(recorded)
-    found = [sentence for trial in attempts for sentence in _against(planned.get(trial.number), trial)]
-    found += _progress([trial.number for trial in attempts], len(planned), complete=complete)
+    found = [
+        sentence
+        for trial in attempts
+        if isinstance(trial, RecordedTrial)
+        for sentence in _against(planned.get(trial.number), trial)
+    ]
+    numbers = [trial if isinstance(trial, int) else trial.number for trial in attempts]
+    found += _progress(numbers, len(planned), complete=complete)
     return tuple(dict.fromkeys(found))
 
 
@@ -90,7 +118,10 @@ def _against(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
         ours, theirs = getattr(planned, name), getattr(run, name)
         if ours != theirs:
             yield f"trial {run.number}: {name} {_named(theirs)} recorded, the seed gives {_named(ours)}"
-    if run.items is not None and run.items != planned.items:
+    if run.items is None:
+        return
+    expected = tuple(item for item in planned.items if item in run.items) if run.may_hide else planned.items
+    if run.items != expected:
         yield f"trial {run.number}: items {_listed(run.items)} recorded, the seed gives {_listed(planned.items)}"
 
 

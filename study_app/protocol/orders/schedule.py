@@ -10,6 +10,10 @@ fixed           as written, again in each repetition
 shuffled        in a random order, another in each repetition; from stream "order/PARTICIPANT/BLOCK/REPETITION"
 constrained     all trials in one random order within max_repeats and min_distance (see ``constrained``); from stream
                 "order/PARTICIPANT/BLOCK"
+interleaved     of a block with a design: every round presents each track once, in a random order of its own, from
+                stream "order/PARTICIPANT/BLOCK/ROUND"
+blocked         of a block with a design: one track after another, in random order, from stream
+                "order/PARTICIPANT/BLOCK"
 williams latin  a row of a square, dealt by the number in the participant's id, whatever the seed (see ``squares``)
 ==============  ========================================================================================================
 """
@@ -22,12 +26,14 @@ from typing import TypeAlias
 from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
 from study_app.protocol.order_constraint import Constraint
-from study_app.protocol.orders.block_orders import BlockOrder, Orders, block_codes, orders_of
+from study_app.protocol.orders.block_orders import BlockOrder, FormOrder, Orders, block_codes, orders_of
 from study_app.protocol.orders.constrained import arrange
 from study_app.protocol.orders.latin_squares import row, row_count, row_of
 from study_app.protocol.streams import Draw, shuffle, stream
+from study_app.protocol.trials.tracks import tracks_of
 
 __all__ = [
+    "FormStep",
     "PageStep",
     "Schedule",
     "Trial",
@@ -72,7 +78,15 @@ class Trial:
         return name if self.phase != "main" and self.of == 1 else f"{name} {self.index}"
 
 
-Step: TypeAlias = PageStep | Trial
+@dataclass(frozen=True, slots=True)
+class FormStep:
+    """A questionnaire on its own; ``items`` are item ids in the order shown."""
+
+    form: str
+    items: tuple[str, ...]
+
+
+Step: TypeAlias = PageStep | FormStep | Trial
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +112,9 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int) -> 
         if isinstance(step, str):
             steps.append(PageStep(step))
             continue
+        if isinstance(step, FormOrder):
+            steps.append(FormStep(step.id, _form_items(step, participant, seed)))
+            continue
         for trial in _trials(orders.study, step, participant, seed, number):
             steps.append(trial)
             if step.break_page is not None and step.break_after(trial.index):
@@ -118,6 +135,16 @@ def codes_of(study: str, block: BlockOrder, participant: str, seed: int) -> tupl
         case "constrained":
             constraint = Constraint(block.max_repeats, block.min_distance)
             return arrange(codes, times, constraint, stream(seed, f"order/{participant}/{block.id}").random)
+        case "interleaved":
+            rounds = range(1, max(block.slots) + 1)
+            left = [tuple(code for code, slots in zip(codes, block.slots, strict=True) if slots >= n) for n in rounds]
+            drawn = [stream(seed, f"order/{participant}/{block.id}/{number}").random for number in rounds]
+            return tuple(code for some, draw in zip(left, drawn, strict=True) for code in shuffle(some, draw))
+        case "blocked":
+            tracks = shuffle(
+                zip(codes, block.slots, strict=True), stream(seed, f"order/{participant}/{block.id}").random
+            )
+            return tuple(code for code, slots in tracks for _ in range(slots))
         case "williams" | "latin" as square:
             taken = row_of(study, block.id, row_count(square, len(codes)), participant)
             return tuple(codes[number] for number in row(square, len(codes), taken, times))
@@ -145,14 +172,23 @@ def _items(block: BlockOrder, participant: str, seed: int, index: int) -> tuple[
     return shuffle(block.items, stream(seed, f"items/{participant}/{block.id}/{index}").random)
 
 
+def _form_items(form: FormOrder, participant: str, seed: int) -> tuple[str, ...]:
+    if form.item_order == "fixed":
+        return form.items
+    return shuffle(form.items, stream(seed, f"items/{participant}/form/{form.id}").random)
+
+
 def draw_key(protocol: Protocol, draw: Draw) -> Key:
-    """Return block → code → condition, drawn with ``draw`` (uniform numbers in [0, 1)).
+    """Return block → code → condition or track, drawn with ``draw`` (uniform numbers in [0, 1)).
 
     A block in fixed order keeps its order, as the protocol asks, so its codes name its conditions in the order written:
     whoever reads the protocol can tell them.
     """
     key: Key = {}
     for block in protocol.blocks_in_order:
-        conditions = block.conditions if block.order == "fixed" else shuffle(block.conditions, draw)
-        key[block.id] = dict(zip(block_codes(block), conditions, strict=True))
+        if block.design is not None:
+            presented = shuffle((track.name for track in tracks_of(protocol, block)), draw)
+        else:
+            presented = block.conditions if block.order == "fixed" else shuffle(block.conditions, draw)
+        key[block.id] = dict(zip(block_codes(protocol, block), presented, strict=True))
     return key

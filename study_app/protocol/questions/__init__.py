@@ -1,1 +1,1 @@
-"""Questionnaires, rating scales and their simulated answers."""
+"""The kinds of questions, one module each; a new kind is a new module here and its widget."""

@@ -14,7 +14,7 @@ _PACKAGE = Path(__file__).resolve().parents[2]
 
 
 def _shipped_folder() -> Path:
-    """Return the protocols inside an installed package, or beside the package in a checkout."""
+    """Return the protocols inside an installed package, or next to the package in a checkout."""
     inside = _PACKAGE / "protocols"
     return inside if inside.is_dir() else _PACKAGE.parent / "protocols"
 

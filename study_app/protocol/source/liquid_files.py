@@ -1,4 +1,4 @@
-"""Liquid files: ``[liquids.syrup] file = "syrup.toml"`` names a scene file with one liquid, beside the study's file.
+"""Liquid files: ``[liquids.syrup] file = "syrup.toml"`` names a scene file with one liquid, in the study's folder.
 
 A study's source is its file, followed by the liquid files that it names, as texts in a last table ``[liquid_files]``.
 So one piece of bytes holds all that is run, its hash covers it, and the lines of the study's own file keep their

@@ -107,10 +107,13 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
     if kind == "union_tag_invalid":
         tags = str(context["expected_tags"]).replace("'", '"')
         return Fault((*path, _tag_key(context)), f'"{context["tag"]}" is not one of {tags}')
+    if kind == "question_kind":
+        tag = str(value["kind"])
+        return Fault(path, f"{shown(tag)} {details['msg']}", did_you_mean(tag, context["permitted"].split(", ")))
     sentence, hint = _sentence(kind, value, context, details["msg"])
     if kind in _BOUNDS:
         hint = next((node[REASON] for node in _nodes_at(document, path, schema) if REASON in node), "")
-    return Fault(path, sentence, hint, counts_entries=kind == "too_short")
+    return Fault(path, sentence, context.get("hint", hint), counts_entries=kind == "too_short")
 
 
 def _sentence(kind: str, value: Any, context: Mapping[str, Any], message: str) -> tuple[str, str]:
@@ -143,7 +146,11 @@ def _path_in(document: Any, loc: tuple[str | int, ...], *, keep_last: bool) -> P
     """Return ``loc`` without what is no key or index of the document: tags of unions, names of validators."""
     path: list[str | int] = []
     node = document
+    tagged: Any = None
     for position, step in enumerate(loc):
+        if node is not tagged and isinstance(node, Mapping) and node.get("kind") == step:
+            tagged = node  # the tag of a union, even where the table has a key of this name
+            continue
         if has(node, step):
             node = node[step]
         elif not (keep_last and position == len(loc) - 1):

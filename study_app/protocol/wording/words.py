@@ -5,7 +5,7 @@ Templates in braces are filled with ``str.format``; where grammar depends on a n
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 RIGHT_TO_LEFT = frozenset({"ar", "dv", "fa", "he", "ks", "ps", "sd", "ug", "ur", "yi"})
@@ -22,6 +22,7 @@ class Words:
     # progress, at the top of every page of a part
     part: str  # {part} {parts}
     setting: str  # {label}, the trial's name with its number, and {of}
+    setting_at_most: str  # the same in a block that may end early
 
     # pages to read
     continue_: str
@@ -40,7 +41,11 @@ class Words:
     further_away: str  # of the target, where the mouse's wheel moves the hand in depth
     nearer: str
     time_is_up: str
+    follow_target: str  # where a study gives no instruction of its own
+    back_to_target: str  # in a rest that waits for it
     pause_hint: str
+
+    trial: str  # the name of a trial where the study gives none
 
     # questionnaire
     please_answer: str
@@ -51,11 +56,32 @@ class Words:
     key_move: str
     optional: str
     chosen: str
-    not_answered: str
     one_missing: str  # {list}
     many_missing: str  # {n} {list}
+    one_question_missing: str  # {list}, of a form
+    many_questions_missing: str  # {n} {list}
+    no_answer_yet: str
+    several_possible: str  # of a choice
+    whole_number: str  # as {kind} in the lines below, as any_number
+    any_number: str
+    number_between: str  # {kind} {least} {most}
+    number_from: str  # {kind} {least}
+    number_to: str  # {kind} {most}
+    number_needed: str  # {kind}
     and_: str
     small_numbers: tuple[str, ...]
+
+    # trials of intervals
+    design_questions: Mapping[str, str]  # by the kind of design; forced choices share one
+    design_answers: Mapping[str, str]  # by the answer's id
+    interval_begins: str  # {ordinal}, an answer such as "First", and {of}
+    interval_coming: tuple[str, ...]  # in the rest before the first, the second …
+    once_more: str  # a trial is presented again
+    right: str
+    not_right: str
+    number_wanted: str
+    modulus: str  # {number}, of the first trial of a magnitude estimation
+    delete_digit: str
 
     # pause and force stop
     pause_title: str
@@ -96,9 +122,16 @@ class Words:
 
     def missing(self, numbers: Sequence[int]) -> str:
         """Return the sentence that names the statements (by number, at least one) still without an answer."""
+        return self._missing(numbers, self.one_missing, self.many_missing)
+
+    def questions_missing(self, numbers: Sequence[int]) -> str:
+        """Return the sentence that names the questions of a form (by number) still without an answer."""
+        return self._missing(numbers, self.one_question_missing, self.many_questions_missing)
+
+    def _missing(self, numbers: Sequence[int], one: str, many: str) -> str:
         listed = self.joined([str(number) for number in numbers])
         count = len(numbers)
         if count == 1:
-            return self.one_missing.format(list=listed)
+            return one.format(list=listed)
         named = self.small_numbers[count - 1] if count <= len(self.small_numbers) else str(count)
-        return self.many_missing.format(n=named, list=listed)
+        return many.format(n=named, list=listed)

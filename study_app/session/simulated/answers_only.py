@@ -9,21 +9,26 @@ participant felt answers word for word as in the rehearsal.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
 from study_app.errors import SessionError
+from study_app.protocol.blocks import Block
+from study_app.protocol.forms.simulated_observer import NOTHING_FELT, Felt
 from study_app.protocol.load import parse, source_bytes
-from study_app.protocol.model import Explore, Protocol, Reach
-from study_app.protocol.orders.schedule import build_schedule, stream
-from study_app.protocol.questions.simulated_answers import Felt, rater
-from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
+from study_app.protocol.model import Explore, Follow, Protocol
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.trials.stimuli import DELAY, Stimulated
+from study_app.protocol.trials.task import AnyTask
+from study_app.session.pages import DesignPage, FeedbackPage, Interval, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
-from study_app.session.simulated.observers import Draw, filled_in, reading_s
+from study_app.session.simulated.design_observer import Comparison
+from study_app.session.simulated.observers import reading_s
+from study_app.session.simulated.participant import SimulatedParticipant
 from study_app.session.simulated.trial_features import FEELING, Feelings, feelings
 from study_app.session.transitions.commands import Command, Finish, ShowPage, StartTrial, Write
-from study_app.session.transitions.events import Begin, Chosen, Continue, Event, ItemShown, Submitted, TaskDone
+from study_app.session.transitions.events import Begin, Continue, Event, TaskDone, TimeUp
 from study_app.session.transitions.state import FINAL
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.clock import SessionClock
@@ -33,7 +38,7 @@ from study_app.workspace import workspace
 
 DEVICE = {"name": "answers-only", "measured": False}
 SAY_EVERY_S = 5.0
-REACH_S = 1.0  # from target to target, where nobody moves
+REACH_S = 1.0  # from target to target, without a hand
 
 
 def rehearse_answers(
@@ -49,12 +54,18 @@ def rehearse_answers(
 
     Parameters
     ----------
-    protocol : file or name of a protocol
-    participants : how many
-    seed : all randomness comes from it, the key's too
-    results : study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace
-    felt : what each condition feels like; by default rehearsed first
-    progress : is told a line now and then
+    protocol : str or Path
+        File or name of a protocol.
+    participants : int
+        How many.
+    seed : int
+        All randomness comes from it, the key's too.
+    results : Path, optional
+        Study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace.
+    felt : Feelings, optional
+        What each condition feels like; by default rehearsed first.
+    progress : callable, optional
+        Called with a line now and then.
 
     Raises
     ------
@@ -82,51 +93,61 @@ def rehearse_answers(
     return folder
 
 
-class _Answering:
+class _Answering(SimulatedParticipant):
     """One session that is answered without being held."""
 
     def __init__(self, study: Protocol, who: str, seed: int, kept: SimulatedStudy, felt: Feelings) -> None:
-        self._study = study
-        self._seed = seed
-        self._who = who
-        self._felt = felt
-        self._feels: Felt | None = None
-        self._page: Page | None = None
+        self._feelings = felt
+        self._feels = NOTHING_FELT
+        self._sensed_in: dict[int, list[float]] = {}  # by trial, interval by interval
         self._now_s = 0.0
         clock = SessionClock(lambda: round(self._now_s * 1e9), datetime.now().astimezone())
         self._store: SimulatedSession = kept.begin(who, clock)
-        self._person = rater(self._stream("person"))
-        schedule = build_schedule(study, who, seed)
-        self._state = open_session(study, schedule, kept.key.codes, study.study.languages[0])
-
-    def _stream(self, name: str) -> Draw:
-        return stream(self._seed, f"rehearsal/{self._who}/{name}").random
+        own = self._store.protocol
+        schedule = build_schedule(own, who, seed)
+        super().__init__(study, schedule)
+        self._state = open_session(own, schedule, kept.key.codes, study.study.languages[0], secret=kept.key.nonce)
 
     def run(self) -> None:
         """Go from the first page to the last."""
         self._post(Begin(self._now_s))
         while self._state.phase not in FINAL:
-            match self._page:
+            match self.page:
                 case TextPage() as page:
                     self._pass(reading_s(page))
                     self._post(Continue(self._now_s))
+                case TaskPage(interval=Interval(resting=True)) | FeedbackPage():
+                    self._pass(max(0.0, (self._state.until_s or 0.0) - self._now_s) + 0.001)  # time comes in whole ms
+                    self._post(TimeUp(self._now_s))
                 case TaskPage() as page:
                     self._pass(_least_s(page.task))
                     self._post(TaskDone(self._now_s, "complete", {}))
-                case QuestionnairePage() as page:
+                case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
                 case _:
-                    raise SessionError(f"the session broke at {self._page}")
+                    raise SessionError(f"the session failed at {self.page}")
 
-    def _fill_in(self, page: QuestionnairePage) -> None:
-        for item in page.items:
-            self._post(ItemShown(self._now_s, item.id))
-        assert self._feels is not None  # noqa: S101 - a trial was felt before it is asked about
-        for choice in filled_in(page, self._feels, self._person, self._stream(f"{page.trial}/answers")):
-            self._pass(choice.after_s)
-            self._post(Chosen(self._now_s, choice.item, choice.value))
-        self._pass(1.0)
-        self._post(Submitted(self._now_s))
+    def _felt(self, _trial: int | None) -> Felt:
+        return self._feels
+
+    def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
+        return {number: one for number, one in self._sensed_in.items() if self._trials[number].block == block.id}
+
+    def _sense(self, trial: int, presented: Stimulated) -> None:
+        """Take what a trial presents: a varied number exactly as it was requested, a condition as it was felt."""
+        block = self._state.trial.block
+        if presented.vary is not None:
+            sensed = presented.value / 1000 if presented.vary == DELAY else presented.value
+            self._sensed_in.setdefault(trial, []).append(sensed)
+            return
+        felt = self._feelings[block, presented.condition]
+        self._feels = felt[int(len(felt) * self._stream(f"{trial}/felt")())]
+        if self._state.due is not None:
+            attended = Comparison.of(self._study, self._study.blocks[block])
+            self._sensed_in.setdefault(trial, []).append(attended.sensed(self._feels))
+
+    def _seconds(self) -> float:
+        return self._now_s
 
     def _pass(self, seconds: float) -> None:
         """Let time pass, in whole milliseconds as a servo's clock has them."""
@@ -141,19 +162,20 @@ class _Answering:
         match command:
             case Write(event, fields):
                 self._store.append(event, t_s=at_s, **fields)
-            case StartTrial(trial=trial, condition=condition):
-                felt = self._felt[self._state.trial.block, condition]
-                self._feels = felt[int(len(felt) * self._stream(f"{trial}/felt")())]
+            case StartTrial(trial=trial, presented=presented):
+                self._sense(trial, presented)
             case ShowPage(page):
-                self._page = page
+                self.page = page
             case Finish(status, reason):
                 self._store.finish(status, reason)
             case _:
                 """What moves, measures or stops something has nothing to do here."""
 
 
-def _least_s(task: Explore | Reach) -> float:
+def _least_s(task: AnyTask) -> float:
     """Return how long a task takes at least [s]."""
+    if isinstance(task, Follow):
+        return task.limit_s
     if isinstance(task, Explore):
         return task.min_s
     if task.duration_s is not None:

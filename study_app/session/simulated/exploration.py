@@ -29,13 +29,19 @@ def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: floa
 
     Parameters
     ----------
-    draw : uniform numbers in [0, 1)
-    half_m : half extents of the tank, hand frame [m]
+    draw : Draw
+        Uniform numbers in [0, 1).
+    half_m : tuple of float
+        Half extents of the tank, hand frame [m].
+    duration_s : float
+        The least duration [s].
 
     Returns
     -------
-    t_s : (n,) array [s]
-    position_m : (n, 3) array [m], hand frame
+    t_s : (n,) array
+        Times [s].
+    position_m : (n, 3) array
+        Positions, hand frame [m].
     """
     reach_m = 0.7 * np.asarray(half_m)
     pieces = [np.zeros((1, 3))]

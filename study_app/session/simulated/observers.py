@@ -7,16 +7,18 @@ and the force on the hand. Nothing here knows a condition.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from study_app.devices.simulated.hand_commands import HandOrders
-from study_app.protocol.model import Explore, Reach
-from study_app.protocol.questions.simulated_answers import Felt, Rater, rate
-from study_app.session.pages import QuestionnairePage, TextPage
+from study_app.protocol.forms.show_if import Value, shown
+from study_app.protocol.forms.simulated_observer import Felt, Rater, judgements
+from study_app.protocol.model import Explore, Follow, Reach
+from study_app.protocol.trials.task import AnyTask
+from study_app.session.pages import DesignPage, ItemView, QuestionnairePage, TextPage
 from study_app.session.simulated.exploration import exploration
 from study_app.session.trial import TankView
 
@@ -27,6 +29,7 @@ REACTION_S = (0.2, 0.35)  # from seeing a target lit to moving
 ANSWER_S = (0.8, 2.6)
 CHANGES_MIND = 0.08
 AIM_ERROR = 0.3  # of a target's radius, at most, along each axis
+FOLLOWED_HZ = 200.0
 CORRECTION_S = 0.35  # the hand was still for so long outside the target before it tries again
 
 
@@ -127,29 +130,78 @@ class Reacher:
         self._device.reach_to(x, y, z)
 
 
+class Follower:
+    """Moves with the target, whose even swing it anticipates, with the error of an aim."""
+
+    def __init__(self, task: Follow, device: HandOrders, draw: Draw) -> None:
+        t_s = np.arange(round(task.limit_s * FOLLOWED_HZ) + 1) / FOLLOWED_HZ
+        error_m = AIM_ERROR * task.radius_m
+        path_m = np.array([task.target_m(float(t)) for t in t_s])
+        path_m += np.array([error_m * _between(draw, -1, 1) for _ in range(3)]) * np.minimum(t_s, 1.0)[:, np.newaxis]
+        device.follow(t_s, path_m)
+
+    def act(self, _now_s: float, _view: TankView) -> bool:
+        """Return that the space bar is not pressed: time ends the task."""
+        return False
+
+
+Hand: TypeAlias = Explorer | Reacher | Follower
+
+
+def hand_for(task: AnyTask, device: HandOrders, draw: Draw, now_s: float) -> Hand:
+    """Return who does a task with a simulated hand, from ``now_s`` on [s]."""
+    match task:
+        case Explore():
+            return Explorer(task, device, draw, now_s)
+        case Reach():
+            return Reacher(task, device, draw)
+        case Follow():
+            return Follower(task, device, draw)
+
+
+def rest(task: AnyTask, device: HandOrders) -> None:
+    """Let a simulated hand rest after a task: where its next interval begins, if that begins at a place."""
+    if task.start_m is None:
+        device.rest()
+    else:
+        device.reach_to(*task.start_m)
+
+
 @dataclass(frozen=True, slots=True)
 class Choice:
     """``value`` for ``item``, ``after_s`` after the choice before."""
 
     item: str
-    value: int
+    value: Value
     after_s: float
 
 
 def filled_in(page: QuestionnairePage, felt: Felt, person: Rater, draw: Draw) -> list[Choice]:
     """Return how a page is answered by what was felt."""
-    return choices(rate([item.id for item in page.items], felt, person, draw), draw, len(page.labels))
+    judged = judgements([item.id for item in page.items], felt, person, draw)
+    answers = {item.id: item.simulated(judged[item.id], draw) for item in page.items}
+    asked = shown(page.items, answers)
+    return choices([item for item in page.items if item.id in asked], answers, draw)
 
 
-def choices(answers: dict[str, int], draw: Draw, points: int) -> list[Choice]:
-    """Return how answers are given: one after the other, sometimes first the point beside."""
+def choices(
+    items: Iterable[ItemView], answers: Mapping[str, Value], draw: Draw, *, changes_mind: bool = True
+) -> list[Choice]:
+    """Return how answers are given: one after the other, sometimes first one nearby."""
     given: list[Choice] = []
-    for item, value in answers.items():
-        if draw() < CHANGES_MIND:
-            beside = value - 1 if value == points else value + 1
-            given.append(Choice(item, beside, _between(draw, *ANSWER_S)))
-        given.append(Choice(item, value, _between(draw, *ANSWER_S)))
+    for item in items:
+        value = answers[item.id]
+        if changes_mind and draw() < CHANGES_MIND and (nearby := item.nearby(value)) != value:
+            given.append(Choice(item.id, nearby, _between(draw, *ANSWER_S)))
+        given.append(Choice(item.id, value, _between(draw, *ANSWER_S)))
     return given
+
+
+def newly_shown(
+    page: QuestionnairePage | DesignPage, answers: Mapping[str, Value], seen: Collection[str]
+) -> tuple[str, ...]:
+    """Return which questions of a page appear by the answers so far."""
+    return tuple(item for item in shown(page.items, answers) if item not in seen)
 
 
 def _between(draw: Draw, low: float, high: float) -> float:

@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final, TypeAlias
 
+from study_app.protocol.forms.simulated_observer import Felt
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
-from study_app.protocol.questions.simulated_answers import Felt
-from study_app.session.simulated.rehearsal import Machine, Rehearsal
+from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
+from study_app.protocol.trials.due import next_level
+from study_app.protocol.trials.keyed import Key
+from study_app.session.simulated.rehearsed_session import RehearsedSession, rehearsal_rig
 from study_app.session.unkept import Unkept
 
 Where: TypeAlias = tuple[str, str]
@@ -39,17 +41,28 @@ def feelings(
         A session broke.
     """
     codes = draw_key(protocol, stream(seed, "blinding").random)
+    key = Key(codes, b"what each condition feels like")
     found: dict[Where, list[Felt]] = {}
     for number in range(1, people + 1):
         person = f"P{number:03d}"
         schedule = build_schedule(protocol, person, seed)
-        places = {trial.number: (trial.block, codes[trial.block][trial.code]) for trial in schedule.trials}
+        places = {trial.number: _presented(protocol, key, schedule, trial) for trial in schedule.trials}
 
-        def feel(trial: int, felt: Felt, places: Mapping[int, Where] = places) -> None:
-            found.setdefault(places[trial], []).append(felt)
+        def feel(trial: int, felt: tuple[Felt, ...], places: Mapping[int, tuple[Where, ...]] = places) -> None:
+            found.setdefault(places[trial][len(felt) - 1], []).append(felt[-1])
 
-        with Machine(protocol, person, seed, "scripted") as machine:
-            Rehearsal(protocol, schedule, machine, Unkept(machine.servo.now_ns, codes), felt=feel).run()
+        with rehearsal_rig(protocol, person, seed, "scripted") as machine:
+            RehearsedSession(
+                protocol, schedule, machine, Unkept(machine.servo.now_ns, codes, key.secret), felt=feel
+            ).run()
         if progress is not None:
-            progress(f"{number} of {people} sessions felt")
+            progress(f"{number} of {people} sessions simulated")
     return {where: tuple(felt) for where, felt in found.items()}
+
+
+def _presented(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial) -> tuple[Where, ...]:
+    """Return what a trial presents, interval by interval; nothing where it is passed over whatever is answered."""
+    if protocol.blocks[trial.block].design is None:
+        return ((trial.block, key.codes[trial.block][trial.code]),)
+    due = next_level(protocol, key, schedule, trial, ())
+    return () if due is None else tuple((trial.block, one.condition) for one in due.intervals)

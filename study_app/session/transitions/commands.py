@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
-from study_app.protocol.model import Explore, Reach
+from study_app.protocol.trials.stimuli import Stimulated
+from study_app.protocol.trials.task import AnyTask
 from study_app.session.pages import Page
 
 Status: TypeAlias = Literal["completed", "withdrawn", "aborted", "broken"]
@@ -25,19 +26,25 @@ class ShowPage:
 
 @dataclass(frozen=True, slots=True)
 class StartTrial:
-    """Prepare a trial: the scene of ``condition`` is loaded, and the task begins, with its tank's first painted frame.
+    """Prepare a trial, or one of its intervals: what is ``presented`` is loaded with its tank's first painted frame.
 
     The tank stays for ``linger_s`` after the task, so that its end is seen. That goes by the longest delay of the
     block, the same for all its trials: neither the participant nor any time on the disk can tell the delay from it.
-    Condition and delays are never printed or logged.
+    ``interval`` counts from 1, None in a trial without a design. What is presented and delays are never printed.
     """
 
     trial: int
     attempt: int
-    task: Explore | Reach
-    condition: str = field(repr=False)
+    task: AnyTask
+    presented: Stimulated = field(repr=False)
     delay_s: float = field(repr=False)
     linger_s: float = field(repr=False)
+    interval: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LeaveTask:
+    """End the task because the participant wants to go on, if it may end so already."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +83,7 @@ class Write:
 
 @dataclass(frozen=True, slots=True)
 class CheckFlushed:
-    """Go no further while lines of the journal that nobody waited for could not be flushed."""
+    """Stop here while journal lines that were written without waiting could not be flushed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,5 +100,15 @@ class Finish:
 
 
 Command: TypeAlias = (
-    ShowPage | StartTrial | StopTrial | Rest | StopForce | FadeIn | Write | CheckFlushed | WriteTables | Finish
+    ShowPage
+    | StartTrial
+    | LeaveTask
+    | StopTrial
+    | Rest
+    | StopForce
+    | FadeIn
+    | Write
+    | CheckFlushed
+    | WriteTables
+    | Finish
 )

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 from study_app.errors import DeviceError, ServoFault, StudyError
+from study_app.protocol.forms.show_if import Value
+from study_app.session.transitions.commands import Command
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +37,15 @@ class LanguageChosen:
 
 @dataclass(frozen=True, slots=True)
 class TaskDone:
-    """The task of the running trial is over; ``summary`` is what its row records (see ``store.tables.columns``)."""
+    """The task of the running trial is over; ``summary`` is what its row records (see ``store.tables.columns``).
+
+    ``invalid`` names the limits that an interval breaks, so that it was not delivered as requested.
+    """
 
     at_s: float
     outcome: Literal["complete", "timeout"]
     summary: dict[str, Any]
+    invalid: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,16 +58,31 @@ class ItemShown:
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The participant chose ``value`` (1 to 7, or None for "cannot judge") for ``item``; may come again."""
+    """The participant answered ``item`` with ``value``, None for "cannot judge"; may come again."""
 
     at_s: float
     item: str
-    value: int | None
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
+class Retracted:
+    """The participant took the answer to ``item`` back: an entry was emptied."""
+
+    at_s: float
+    item: str
 
 
 @dataclass(frozen=True, slots=True)
 class Submitted:
     """The participant confirms the questionnaire."""
+
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class TimeUp:
+    """A rest between two intervals, or a feedback, has lasted long enough; only the clock says so."""
 
     at_s: float
 
@@ -136,6 +157,29 @@ class Reconnected:
     described: dict[str, Any]
 
 
+@dataclass(frozen=True, slots=True)
+class WriteFailed:
+    """The disk did not take a command, for a reason; it and those after it, of moment ``at_s``, are ``left``."""
+
+    at_s: float
+    reason: str
+    left: tuple[Command, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class WriteRetried:
+    """What the disk did not take is tried again."""
+
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class WriteCompleted:
+    """The disk took all that was left."""
+
+    at_s: float
+
+
 Event: TypeAlias = (
     Begin
     | Continue
@@ -143,7 +187,9 @@ Event: TypeAlias = (
     | TaskDone
     | ItemShown
     | Chosen
+    | Retracted
     | Submitted
+    | TimeUp
     | PauseAsked
     | ResumeAsked
     | ForceStopped
@@ -152,6 +198,9 @@ Event: TypeAlias = (
     | EndAsked
     | Broke
     | Reconnected
+    | WriteFailed
+    | WriteRetried
+    | WriteCompleted
 )
 
 

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, TypeAlias
 
 from study_app.errors import SessionError
 from study_app.protocol.orders.schedule import Trial
 from study_app.session.resume import FIRST
-from study_app.session.transitions import page_builder
 from study_app.session.transitions.commands import (
-    Command,
     FadeIn,
     Finish,
+    LeaveTask,
     Rest,
-    ShowPage,
-    StartTrial,
     StopForce,
     StopTrial,
     Write,
@@ -24,35 +20,51 @@ from study_app.session.transitions.commands import (
 from study_app.session.transitions.events import (
     Begin,
     Broke,
-    Chosen,
     Continue,
     EndAsked,
     ForceStopped,
-    ItemShown,
     LanguageChosen,
     Note,
     PauseAsked,
     Reconnected,
     RepeatAsked,
     ResumeAsked,
-    Submitted,
     TaskDone,
+    TimeUp,
+    WriteCompleted,
+    WriteFailed,
+    WriteRetried,
 )
-from study_app.session.transitions.state import Answer, Hold, Phase, SessionState
+from study_app.session.transitions.state import Hold, Phase, SessionState, Stall
+from study_app.session.transitions.steps import (
+    FADE_OUT_S,
+    Commands,
+    Result,
+    before_end,
+    break_off,
+    enter,
+    enter_reached,
+    present_again,
+    reach,
+    rest,
+    show,
+    start_interval,
+    start_trial,
+    which,
+)
+from study_app.store.tables.delivered import missed
 
-END_SHOWN_S = 0.1  # a closed ring is seen for so long before the next page
-
-Commands: TypeAlias = tuple[Command, ...]
-Result: TypeAlias = tuple[SessionState, Commands]
+STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK, Phase.PAUSED}
 
 
 def begin(state: SessionState, event: Begin) -> Result:
     """Go to the first step, or to where an interrupted session goes on; a trial waits there until somebody is ready."""
-    entered, done = _enter(state, state.plan.start.step, at_s=event.at_s)
-    if state.plan.start == FIRST or entered.phase is not Phase.TASK:
-        return entered, done
-    waiting = replace(entered, phase=Phase.PAUSED, interrupted=Phase.TASK, attempt=entered.attempt - 1)
-    return waiting, (Write("paused", {"by": "program"}), WriteTables(), _show(waiting))
+    start = state.plan.start
+    reached, done = reach(replace(state, heard=start.heard), start.step, at_s=event.at_s)
+    if start == FIRST or reached.phase is Phase.ENDED or not isinstance(reached.step, Trial):
+        return enter_reached(reached, done)
+    waiting = replace(reached, phase=Phase.PAUSED, interrupted=Phase.TASK, attempt=reached.attempt - 1)
+    return waiting, (*done, Write("paused", {"by": "program"}), WriteTables(), show(waiting))
 
 
 def read_on(state: SessionState, event: Continue) -> Result:
@@ -61,7 +73,7 @@ def read_on(state: SessionState, event: Continue) -> Result:
         return state, ()
     consents = state.plan.protocol.pages[state.page_id].kind == "consent"
     left = Write("page_left", {"page": state.page_id}, waits=consents)
-    return _enter(state, state.index + 1, (left,), at_s=event.at_s)
+    return enter(state, state.index + 1, (left,), at_s=event.at_s)
 
 
 def choose_language(state: SessionState, event: LanguageChosen) -> Result:
@@ -72,56 +84,54 @@ def choose_language(state: SessionState, event: LanguageChosen) -> Result:
         offered = f"choose {' or '.join(state.languages)}" if state.languages else "it is chosen before the consent"
         raise SessionError(f"language {event.language!r} cannot be chosen now: {offered}")
     chosen = replace(state, plan=replace(state.plan, language=event.language))
-    return chosen, (Write("language_chosen", {"language": event.language}), WriteTables(), _show(chosen))
+    return chosen, (Write("language_chosen", {"language": event.language}), WriteTables(), show(chosen))
+
+
+def leave_task(state: SessionState, _event: Continue) -> Result:
+    """Let the participant end an exploration that has lasted long enough; its end is a `TaskDone`."""
+    return state, (LeaveTask(),)
 
 
 def end_task(state: SessionState, event: TaskDone) -> Result:
-    """Take the liquid away, keep what was measured, and ask or go on."""
-    ended = Write("trial_ended", {**_which(state), "outcome": event.outcome, **event.summary})
-    done: Commands = (StopTrial(), Rest(), ended)
+    """Take the liquid away, keep what was measured, and ask or go on; between two intervals rest.
+
+    A trial that was not delivered as requested is not asked about, but presented again.
+    """
+    done: Commands = (StopTrial(), Rest())
+    measured = {"outcome": event.outcome, **event.summary}
+    if (due := state.due) is not None and (design := state.design) is not None:
+        state = replace(state, errors_ms=(*state.errors_ms, event.summary.get("delay_error_mean_ms")))
+        holds = design.arrangements[due.arrangement]
+        reasons = (*event.invalid, *missed(state.plan.protocol.limits, due, holds, state.errors_ms))
+        invalid = {"invalid": reasons} if reasons else {}
+        done = (*done, Write("interval_ended", {**which(state), "interval": state.interval, **measured, **invalid}))
+        if reasons:
+            return present_again(state, done, event.at_s)
+        measured = {"outcome": event.outcome}  # the numbers are those of the intervals
+        if state.interval < design.intervals:
+            return rest(replace(state, interval=state.interval + 1), done, event.at_s + FADE_OUT_S + design.pause_s)
+    done = (*done, Write("trial_ended", {**which(state), **measured}))
     if not state.asks:
-        return _enter(state, state.index + 1, done, at_s=event.at_s)
+        return enter(state, state.index + 1, done, at_s=event.at_s)
     asking = replace(state, phase=Phase.ANSWERING, answers={})
-    return asking, (*done, WriteTables(), _show(asking))
+    return asking, (*done, WriteTables(), show(asking))
 
 
-def show_item(state: SessionState, event: ItemShown) -> Result:
-    """Keep when a statement was first shown."""
-    _check_item(state, event.item)
-    answer = state.answers.get(event.item, Answer())
-    if answer.onset_s is None:
-        answer = replace(answer, onset_s=event.at_s)
-    written = Write("item_shown", {"trial": state.trial.number, "item": event.item})
-    return _with_answer(state, event.item, answer), (written,)
+def end_rest(state: SessionState, event: TimeUp) -> Result:
+    """Present the next interval, once the rest before it has lasted long enough."""
+    return (state, ()) if before_end(state, event.at_s) else start_interval(state, ())
 
 
-def choose(state: SessionState, event: Chosen) -> Result:
-    """Keep a choice; the last one counts."""
-    _check_item(state, event.item)
-    _check_value(state, event.value)
-    answer = state.answers.get(event.item, Answer())
-    if not answer.given:
-        answer = replace(answer, first_s=event.at_s, last_s=event.at_s, value=event.value)
-    elif answer.value != event.value:
-        answer = replace(answer, last_s=event.at_s, value=event.value, changes=answer.changes + 1)
-    written = Write("choice", {"trial": state.trial.number, "item": event.item, "value": event.value}, waits=True)
-    return _with_answer(state, event.item, answer), (written,)
-
-
-def submit(state: SessionState, event: Submitted) -> Result:
-    """Keep the responses and go on, if every required statement has its answer."""
-    if missing := _missing(state):
-        listed = ", ".join(map(str, missing))
-        raise SessionError(f"not every required statement is answered: answer {listed} first")
-    written = Write("responses", {**_which(state), "items": _responses(state)}, waits=True)
-    return _enter(state, state.index + 1, (written,), at_s=event.at_s)
+def end_feedback(state: SessionState, event: TimeUp) -> Result:
+    """Go on, once the feedback was shown long enough."""
+    return (state, ()) if before_end(state, event.at_s) else enter(state, state.index + 1, at_s=event.at_s)
 
 
 def pause(state: SessionState, event: PauseAsked) -> Result:
     """Show the pause; a task under way is over as an attempt."""
     held: Hold | None = "pause" if event.by == "operator" else None
     paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, held=held)
-    return paused, (*_break_off(state), Write("paused", {"by": event.by}), WriteTables(), _show(paused))
+    return paused, (*break_off(state), Write("paused", {"by": event.by}), WriteTables(), show(paused))
 
 
 def pause_again(state: SessionState, event: PauseAsked) -> Result:
@@ -129,7 +139,7 @@ def pause_again(state: SessionState, event: PauseAsked) -> Result:
     if event.by != "operator" or state.held is not None:
         return state, ()
     paused = replace(state, held="pause")
-    return paused, (Write("paused", {"by": event.by}), WriteTables(), _show(paused))
+    return paused, (Write("paused", {"by": event.by}), WriteTables(), show(paused))
 
 
 def resume(state: SessionState, event: ResumeAsked) -> Result:
@@ -141,9 +151,11 @@ def resume(state: SessionState, event: ResumeAsked) -> Result:
     if state.force_off:
         back = (*back, Write("force_restored", {"by": event.by}), FadeIn())
     state = replace(state, phase=state.interrupted or Phase.READING, interrupted=None, force_off=False, held=None)
-    if state.phase is Phase.TASK:
-        return _start_trial(replace(state, attempt=state.attempt + 1), back)
-    return state, (*back, _show(state))
+    if state.phase in {Phase.TASK, Phase.RESTING}:
+        return start_trial(replace(state, attempt=state.attempt + 1), back)
+    if state.phase is Phase.FEEDBACK:
+        return enter(state, state.index + 1, back, at_s=event.at_s)
+    return state, (*back, show(state))
 
 
 def stop_force(state: SessionState, event: ForceStopped) -> Result:
@@ -152,10 +164,10 @@ def stop_force(state: SessionState, event: ForceStopped) -> Result:
     held: Hold | None = "force" if event.by == "operator" else state.held
     if state.phase is Phase.PAUSED:
         paused = replace(state, force_off=True, held=held)
-        return paused, (StopForce(), stopped, _show(paused))
+        return paused, (StopForce(), stopped, show(paused))
     paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, force_off=True, held=held)
-    pausing = (Write("paused", {"by": event.by}), WriteTables(), _show(paused))
-    return paused, (StopForce(), *_break_off(state), stopped, *pausing)
+    pausing = (Write("paused", {"by": event.by}), WriteTables(), show(paused))
+    return paused, (StopForce(), *break_off(state), stopped, *pausing)
 
 
 def stop_force_again(state: SessionState, event: ForceStopped) -> Result:
@@ -171,9 +183,9 @@ def stop_force_after_end(state: SessionState, _event: ForceStopped) -> Result:
 def repeat(state: SessionState, event: RepeatAsked) -> Result:
     """Present the trial again, keeping the attempt that was."""
     if not event.reason.strip():
-        raise SessionError("a trial is repeated for a reason: write one")
+        raise SessionError("repeating a trial needs a reason: enter one")
     asked = Write("repeat", {"trial": state.trial.number, "reason": event.reason}, waits=True)
-    return _start_trial(replace(state, attempt=state.attempt + 1), (*_break_off(state), asked))
+    return start_trial(replace(state, attempt=state.attempt + 1), (*break_off(state), asked))
 
 
 def note(state: SessionState, event: Note) -> Result:
@@ -183,11 +195,11 @@ def note(state: SessionState, event: Note) -> Result:
 
 
 def end(state: SessionState, event: EndAsked) -> Result:
-    """End early; a session in trouble that nobody withdrew from counts as broken."""
+    """End early; a session in trouble from which the participant did not withdraw counts as broken."""
     broken = state.phase is Phase.TROUBLE and event.status == "aborted"
     ended = replace(state, phase=Phase.ENDED, interrupted=None)
     finish = Finish("broken" if broken else event.status, event.reason)
-    return ended, (*_break_off(state), finish, _show(ended))
+    return ended, (*break_off(state), finish, show(ended))
 
 
 def call_operator(state: SessionState, event: Broke) -> Result:
@@ -200,98 +212,56 @@ def call_operator(state: SessionState, event: Broke) -> Result:
     interrupted = before if event.by == "device" else None
     trouble = replace(state, phase=Phase.TROUBLE, interrupted=interrupted, force_off=True)
     written = (Write("broke", {"what": event.what}), WriteTables())
-    return trouble, (StopForce(), *_break_off(state), *written, _show(trouble))
+    return trouble, (StopForce(), *break_off(state), *written, show(trouble))
 
 
 def reconnect(state: SessionState, event: Reconnected) -> Result:
     """Pause at zero force until the operator resumes; a trial that the failure interrupted is then presented again."""
     if not state.lost_device:
-        raise SessionError("the session did not stop because of its device: end it now, and resume it later")
+        raise SessionError("the session was not stopped by its device: end it now and resume it later")
     paused = replace(state, phase=Phase.PAUSED, held="force")
     facts = {"device": event.described.get("name"), "described": event.described}
-    told = Write("device_reconnected", facts, waits=True)
-    return paused, (StopForce(), told, Write("paused", {"by": "program"}), WriteTables(), _show(paused))
+    reconnected = Write("device_reconnected", facts, waits=True)
+    return paused, (StopForce(), reconnected, Write("paused", {"by": "program"}), WriteTables(), show(paused))
 
 
-def _enter(state: SessionState, index: int, done: Commands = (), *, at_s: float) -> Result:
-    """Go to the step at ``index`` at a moment; ``done`` comes first and finishes the step before."""
-    state = replace(state, index=index, attempt=1, answers={}, since_s=at_s)
-    if state.step is None:
-        state = replace(state, phase=Phase.COMPLETE)
-        return state, (*done, Finish("completed"), _show(state))
-    if isinstance(state.step, Trial):
-        before = state.plan.start.presented.get(state.step.number, 0)
-        return _start_trial(replace(state, attempt=before + 1), done)
-    state = replace(state, phase=Phase.READING)
-    return state, (*done, Write("page_shown", {"page": state.page_id}), WriteTables(), _show(state))
+def stall(state: SessionState, event: WriteFailed) -> Result:
+    """Stop the force and show a calm page until the disk takes what is left."""
+    first = Stall(event.reason, event.left, event.at_s, state.phase)
+    again = first if state.stall is None else replace(first, before=state.stall.before, by=state.stall.by)
+    stalled = replace(state, phase=Phase.STALLED, stall=again)
+    return stalled, (StopForce(), StopTrial(), Rest(), show(stalled))
 
 
-def _start_trial(state: SessionState, done: Commands) -> Result:
-    state = replace(state, phase=Phase.TASK, answers={})
-    trial, protocol = state.trial, state.plan.protocol
-    block = protocol.blocks[trial.block]
-    condition = state.plan.condition(trial)
-    told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
-    start = StartTrial(
-        trial=trial.number,
-        attempt=state.attempt,
-        task=protocol.tasks[block.task],
-        condition=condition,
-        delay_s=protocol.delay_s(condition),
-        linger_s=max(protocol.delay_s(name) for name in block.conditions) + END_SHOWN_S,
-    )
-    written = Write("trial_started", {**_which(state), **told})
-    return state, (*done, written, WriteTables(), start, _show(state))
+def retry(state: SessionState, _event: WriteRetried) -> Result:
+    """Carry out what is left, in order and once; whether the disk took it is another event."""
+    return state, _stall(state).left
 
 
-def _break_off(state: SessionState) -> Commands:
-    """End a task that is under way, with what was measured of it until now."""
-    if state.phase is not Phase.TASK:
-        return ()
-    return (StopTrial(), Rest(), Write("trial_ended", {**_which(state), "outcome": "interrupted"}, measured=True))
+def recover(state: SessionState, event: WriteCompleted) -> Result:
+    """Go back to what the disk interrupted, paused at zero force until somebody resumes."""
+    stalled = _stall(state)
+    back = replace(state, phase=stalled.before, stall=None)
+    if back.phase in STOPPABLE:
+        return stop_force(back, ForceStopped(event.at_s, stalled.by))
+    return back, ()
 
 
-def _which(state: SessionState) -> dict[str, Any]:
-    return {"trial": state.trial.number, "attempt": state.attempt}
+def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
+    """Switch off a force that is off already; what the operator stopped is the operator's to resume afterwards."""
+    if event.by == "operator":
+        state = replace(state, stall=replace(_stall(state), by="operator"))
+    return state, (StopForce(),)
 
 
-def _show(state: SessionState) -> ShowPage:
-    return ShowPage(page_builder.page(state))
+def end_unwritten(state: SessionState, _event: EndAsked) -> Result:
+    """End without a line in the journal: the session stays unfinished, and what is left is still tried."""
+    if state.over:
+        raise SessionError("the session is over: its last lines wait for the disk")
+    ended = replace(state, stall=replace(_stall(state), before=Phase.ENDED))
+    return ended, (show(ended),)
 
 
-def _with_answer(state: SessionState, item: str, answer: Answer) -> SessionState:
-    return replace(state, answers={**state.answers, item: answer})
-
-
-def _check_item(state: SessionState, item: str) -> None:
-    if item not in state.trial.items:
-        listed = ", ".join(state.trial.items)
-        raise SessionError(f"item {item!r} is not on this page: its items are {listed}")
-
-
-def _check_value(state: SessionState, value: int | None) -> None:
-    scale = state.plan.protocol.scales[state.questionnaire.scale]
-    points = len(scale.labels[state.plan.language])
-    if value is None and scale.cannot_judge is None:
-        raise SessionError("this questionnaire has no answer off the scale: choose one of its points")
-    if value is not None and not 1 <= value <= points:
-        raise SessionError(f"answer {value} is not on the scale: choose 1 to {points}")
-
-
-def _missing(state: SessionState) -> list[int]:
-    """Return the numbers of the required statements without an answer."""
-    return [
-        number
-        for number, item in enumerate(state.trial.items, start=1)
-        if state.questionnaire.item(item).required and not state.answers.get(item, Answer()).given
-    ]
-
-
-def _responses(state: SessionState) -> list[dict[str, Any]]:
-    """Return every statement in the order shown; one that was left out has no ``first_s``."""
-    rows = []
-    for number, item in enumerate(state.trial.items, start=1):
-        answer = state.answers.get(item, Answer())
-        times = {"onset_s": answer.onset_s, "first_s": answer.first_s, "last_s": answer.last_s}
-        rows.append({"item": item, "number": number, "value": answer.value, **times, "changes": answer.changes})
-    return rows
+def _stall(state: SessionState) -> Stall:
+    assert state.stall is not None  # noqa: S101 - the phase says so
+    return state.stall

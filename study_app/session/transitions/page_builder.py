@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from study_app.protocol.orders.schedule import Trial
+from dataclasses import replace
+
+from study_app.protocol.orders.schedule import FormStep, Trial
+from study_app.protocol.questions.choice import ChoiceView
+from study_app.protocol.questions.number import NumberView
+from study_app.protocol.trials.design import ORDINALS
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import (
+    ChoicePage,
     EndPage,
-    ItemView,
+    FeedbackPage,
+    Interval,
+    NumberPage,
     Page,
     PausePage,
     Progress,
@@ -21,14 +29,18 @@ from study_app.session.transitions.state import Phase, SessionState
 def page(state: SessionState) -> Page:
     """Return what the participant sees in any phase but the one before the first page."""
     match state.phase:
-        case Phase.TASK:
-            return _task_page(state, state.trial)
+        case Phase.TASK | Phase.RESTING:
+            return replace(_task_page(state, state.trial), interval=_interval(state))
         case Phase.ANSWERING:
-            return _questionnaire_page(state)
+            return _answer_page(state)
+        case Phase.FEEDBACK:
+            return FeedbackPage(right=state.heard[-1].correct is True)
         case Phase.PAUSED:
             paused = _task_page(state, state.step) if isinstance(state.step, Trial) else None
             return PausePage(force_off=state.force_off, held=state.held, coming=paused)
-        case Phase.TROUBLE:
+        case Phase.STALLED if state.stall is not None and state.over:
+            return page(replace(state, phase=state.stall.before, stall=None))
+        case Phase.TROUBLE | Phase.STALLED:
             return TroublePage(_words(state).trouble_title, _words(state).trouble_body)
         case Phase.COMPLETE:
             return EndPage(_words(state).end_title, _words(state).end_body)
@@ -65,47 +77,88 @@ def _text_page(state: SessionState) -> TextPage:
 
 def _task_page(state: SessionState, trial: Trial) -> TaskPage:
     protocol = state.plan.protocol
-    task = protocol.tasks[protocol.blocks[trial.block].task]
+    block = protocol.blocks[trial.block]
+    task = protocol.tasks[block.task]
+    drawn = state.plan.condition(trial) if block.design is None else protocol.conditions_in(block.id)[0]
     return TaskPage(
         trial=trial.number,
-        instruction=_text(state, task.instruction),
+        instruction=_words(state).follow_target if task.instruction is None else _text(state, task.instruction),
         task=task,
         workspace_m=protocol.device.workspace_m,
-        body_radius_m=protocol.scene_for(state.plan.condition(trial)).body.diameter_m / 2 / protocol.scene.scale,
+        body_radius_m=protocol.scene_for(drawn).body.diameter_m / 2 / protocol.scene.scale,
         progress=_progress(state, trial),
     )
+
+
+def _interval(state: SessionState) -> Interval | None:
+    """Return where the trial under way is among its intervals; None without a design."""
+    design, said = state.design, _words(state)
+    if design is None:
+        return None
+    number, resting = state.interval, state.phase is Phase.RESTING
+    ordinal = said.design_answers[ORDINALS[number - 1]]
+    named = said.interval_begins.format(ordinal=ordinal, of=design.intervals)
+    coming = said.once_more if number == 1 and state.invalid else said.interval_coming[number - 1]
+    announced = coming if resting else named
+    return Interval(number, design.intervals, resting, announced)
+
+
+def _answer_page(state: SessionState) -> Page:
+    """Return the one question of a design, or a questionnaire."""
+    design = state.design if isinstance(state.step, Trial) else None
+    if design is None or design.reply == "rating":
+        return _questionnaire_page(state)
+    view, progress = state.questions[0].view(1, state.context), _progress(state, state.trial)
+    if isinstance(view, ChoiceView):
+        return ChoicePage(state.trial.number, view, progress)
+    assert isinstance(view, NumberView)  # noqa: S101 - the only other reply
+    if design.first is not None and state.trial.index == 1:
+        named = _words(state).modulus.format(number=f"{design.first.number:g}")
+        view = replace(view, text=f"{named} {view.text}")
+    return NumberPage(state.trial.number, view, progress)
 
 
 def _questionnaire_page(state: SessionState) -> QuestionnairePage:
-    protocol, language, trial = state.plan.protocol, state.plan.language, state.trial
-    questionnaire = state.questionnaire
-    scale = protocol.scales[questionnaire.scale]
-    items = [questionnaire.item(item) for item in trial.items]
-    label = trial.label(protocol, language)
+    questionnaire, context, step = state.questionnaire, state.context, state.step
+    trial = step if isinstance(step, Trial) else None
+    form = step.form if isinstance(step, FormStep) else None
+    label = (form or "").replace("_", " ").capitalize() if trial is None else _label(state, trial)
+    statements = len(questionnaire.statements) == len(questionnaire.items)
+    scale = state.plan.protocol.scales[questionnaire.scale or ""] if statements else None
+    off_scale = None if scale is None else scale.cannot_judge
     return QuestionnairePage(
-        trial=trial.number,
+        trial=None if trial is None else trial.number,
         title=label if questionnaire.title is None else _text(state, questionnaire.title),
-        intro=_text(state, questionnaire.intro),
-        items=tuple(
-            ItemView(item.id, number, _text(state, item.text), item.required) for number, item in enumerate(items, 1)
-        ),
-        labels=scale.labels[language],
-        cannot_judge=None if scale.cannot_judge is None else _text(state, scale.cannot_judge),
-        progress=_progress(state, trial),
+        intro="" if trial is not None and state.design is not None else _text(state, questionnaire.intro),
+        items=tuple(item.view(number, context) for number, item in enumerate(state.questions, 1)),
+        labels=() if scale is None else scale.labels[context.language],
+        cannot_judge=None if off_scale is None else _text(state, off_scale),
+        progress=None if trial is None else _progress(state, trial),
         chosen=tuple((item, answer.value) for item, answer in state.answers.items() if answer.given),
+        form=form,
     )
+
+
+def _label(state: SessionState, trial: Trial) -> str:
+    return trial.label(state.plan.protocol, state.plan.language)
 
 
 def _progress(state: SessionState, trial: Trial) -> Progress:
     """Return where a trial is among its block's."""
-    return _among(state, trial, trial.label(state.plan.protocol, state.plan.language), trial.index)
+    return _among(state, trial, _label(state, trial), trial.index)
 
 
 def _progress_between(state: SessionState) -> Progress | None:
-    """Return where a page to read is: before the first trial of its part, or after so many; None outside the parts."""
+    """Return where a page to read is: before the first trial of its part, or after so many.
+
+    None outside the parts, but for a break among trials of intervals, which names the last one.
+    """
     steps, coming = state.plan.schedule.steps, _coming(state)
     done = next((step for step in reversed(steps[: state.index]) if isinstance(step, Trial)), None)
     if done is not None and (coming is None or state.plan.protocol.pages[state.page_id].kind == "break"):
+        designed = state.plan.protocol.blocks[done.block].design is not None
+        if designed and coming is not None:
+            return _among(state, done, _label(state, done), done.index + 1)
         return None if done.part is None else _among(state, done, "", done.index + 1)
     if coming is None or coming.part is None:
         return None
@@ -118,4 +171,7 @@ def _coming(state: SessionState) -> Trial | None:
 
 
 def _among(state: SessionState, trial: Trial, label: str, index: int) -> Progress:
-    return Progress(part=trial.part, parts=state.plan.protocol.parts, label=label, index=index, of=trial.of)
+    """Return where trial ``index`` of a trial's block is; a block with a criterion may end early."""
+    protocol = state.plan.protocol
+    at_most = protocol.blocks[trial.block].until is not None
+    return Progress(trial.part, protocol.parts, label, index, trial.of, at_most)

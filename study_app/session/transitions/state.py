@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal, TypeAlias
 
 from study_app.errors import SessionError
+from study_app.protocol.forms.show_if import Value, shown
 from study_app.protocol.model import Protocol, Questionnaire
-from study_app.protocol.orders.schedule import PageStep, Schedule, Step, Trial
+from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial
+from study_app.protocol.questions.question import Context, Question
+from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.due import Due, next_level
+from study_app.protocol.trials.keyed import Key
+from study_app.protocol.trials.method import Heard
+from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tracks import design_of
 from study_app.session.resume import FIRST, Start
+from study_app.session.transitions.commands import Command
 
 
 class Phase(Enum):
@@ -19,9 +28,12 @@ class Phase(Enum):
     OPENING = "opening"
     READING = "reading"
     TASK = "task"
+    RESTING = "resting"
     ANSWERING = "answering"
+    FEEDBACK = "feedback"
     PAUSED = "paused"
     TROUBLE = "trouble"
+    STALLED = "stalled"
     COMPLETE = "complete"
     ENDED = "ended"
 
@@ -35,8 +47,8 @@ FINAL = frozenset({Phase.COMPLETE, Phase.ENDED})
 class Plan:
     """What stays the same through a session, but for the language, which a participant may choose at its beginning.
 
-    ``key`` (block → code → condition) is blinded and never printed.
-    ``start`` is where it begins: not at the first step where it was interrupted before.
+    ``key`` (block → code → condition or track) and ``secret``, from which levels are drawn, are blinded and never
+    printed. ``start`` is where it begins: not at the first step where it was interrupted before.
     """
 
     protocol: Protocol = field(repr=False)
@@ -44,6 +56,11 @@ class Plan:
     key: Mapping[str, Mapping[str, str]] = field(repr=False)
     language: str
     start: Start = FIRST
+    secret: bytes = field(default=b"", repr=False)
+
+    def due(self, trial: Trial, heard: Sequence[Heard]) -> Due | None:
+        """Return what a trial of a block with a design presents; None where it is passed over."""
+        return next_level(self.protocol, Key(self.key, self.secret), self.schedule, trial, heard)
 
     def condition(self, trial: Trial) -> str:
         """Return the condition behind a trial's code."""
@@ -62,12 +79,26 @@ class Answer:
     first_s: float | None = None
     last_s: float | None = None
     changes: int = 0
-    value: int | None = None
+    value: Value = None
 
     @property
     def given(self) -> bool:
         """Whether anything was chosen."""
         return self.first_s is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Stall:
+    """What the disk did not take: why, and the commands of moment ``at_s`` that are still to be carried out.
+
+    ``before`` is the phase that the session goes back to, ``by`` who stops its force then.
+    """
+
+    reason: str
+    left: tuple[Command, ...] = field(repr=False)
+    at_s: float
+    before: Phase
+    by: Literal["operator", "program"] = "program"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +109,12 @@ class SessionState:
     presentations of the present trial from 1. ``answers`` holds the statements of the present questionnaire that were
     shown or answered. ``interrupted`` is the phase that a pause, or the failure of a device, goes back to.
     ``force_off`` says that the force was stopped and has not been faded in again, ``held`` what the operator stopped,
-    so that the operator alone resumes. ``since_s`` is when the present step was entered [s, session's clock].
+    so that the operator alone resumes. ``stall`` is set while the disk takes nothing.
+    ``since_s`` is when the present step was entered [s, session's clock].
+    Of trials with a design ``heard`` holds those answered so far, ``due`` what the present one presents, ``interval``
+    which interval it is at (from 1), and ``until_s`` when a rest or a feedback is over [s, session's clock].
+    ``errors_ms`` is the mean error of the visual delay in each of its intervals so far, ``invalid`` how many of its
+    attempts were not delivered as requested.
     """
 
     plan: Plan = field(repr=False)
@@ -89,13 +125,25 @@ class SessionState:
     interrupted: Phase | None = None
     force_off: bool = False
     held: Hold | None = None
+    stall: Stall | None = None
     since_s: float = 0.0
+    heard: tuple[Heard, ...] = field(default=(), repr=False)
+    due: Due | None = field(default=None, repr=False)
+    interval: int = 1
+    until_s: float | None = None
+    errors_ms: tuple[float | None, ...] = ()
+    invalid: int = 0
 
     @property
     def step(self) -> Step | None:
         """The step under way; None before the first and after the last."""
         steps = self.plan.schedule.steps
         return steps[self.index] if 0 <= self.index < len(steps) else None
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing follows but what is still to be written."""
+        return (self.phase if self.stall is None else self.stall.before) in FINAL
 
     @property
     def lost_device(self) -> bool:
@@ -143,19 +191,52 @@ class SessionState:
         raise SessionError("no trial is under way: wait for the next one")
 
     @property
+    def task(self) -> AnyTask:
+        """The task of the trial under way."""
+        return self.plan.protocol.tasks[self.plan.protocol.blocks[self.trial.block].task]
+
+    @property
     def asks(self) -> bool:
-        """Whether the trial under way has a questionnaire."""
-        return self.plan.protocol.blocks[self.trial.block].questionnaire is not None
+        """Whether something is asked after the trial under way."""
+        return self.plan.protocol.questionnaire_of(self.trial.block) is not None
+
+    @property
+    def design(self) -> Design | None:
+        """How the trial under way is built; None where it is a single task."""
+        block = self.plan.protocol.blocks[self.trial.block]
+        return None if block.design is None else design_of(self.plan.protocol, block)
+
+    @property
+    def items(self) -> tuple[str, ...]:
+        """The ids of the questions of the present page, in the order shown; of a trial those after its task."""
+        return self.step.items if isinstance(self.step, FormStep) else self.trial.items
+
+    @property
+    def questions(self) -> tuple[Question, ...]:
+        """The questions of the present page, in the order shown."""
+        return tuple(map(self.questionnaire.item, self.items))
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """The ids of those questions that the answers so far leave shown."""
+        return shown(self.questions, {item: answer.value for item, answer in self.answers.items() if answer.given})
+
+    @property
+    def context(self) -> Context:
+        """What the questions of the present page are asked with."""
+        return self.questionnaire.context(self.plan.protocol.scales, self.plan.language)
 
     @property
     def questionnaire(self) -> Questionnaire:
-        """What is answered after the trial under way.
+        """What is answered after the trial under way, or the form.
 
         Raises
         ------
         SessionError
             Nothing is.
         """
+        if isinstance(self.step, FormStep):
+            return self.plan.protocol.questionnaires[self.step.form]
         if (questionnaire := self.plan.protocol.questionnaire_of(self.trial.block)) is None:
             raise SessionError(f"block {self.trial.block!r} has no questionnaire: there is nothing to answer")
         return questionnaire

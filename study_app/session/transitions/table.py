@@ -10,11 +10,15 @@ Rules of this file:
    disk.
 4. The safety of the hand comes before everything: ``StopForce``, ``StopTrial`` and ``Rest`` lead every list.
 
-A session is the steps of its schedule: pages to read, and trials. A trial is a task, then a questionnaire if its block
-has one. A pause during a task (asked for, or after a force stop) ends the attempt, and the trial starts again as the
-next attempt; a pause while reading or answering goes back to the same page with every choice kept. Whatever breaks
-leaves the force off and all answers on the disk, and waits for the operator: to end the session, or, where the device
-failed, to connect it again. Then the session is paused, and the operator resumes it.
+A session is the steps of its schedule: pages to read, forms to fill in, and trials. A trial is a task, then a
+questionnaire if its block has one. Where its block has a design it is several intervals with rests between them, then
+one question, then feedback where that is due; what it presents is known when it is entered, and a trial that is not due
+is passed over. A rest belongs to the trial's attempt. A pause during a task or a rest (asked for, or after a force
+stop) ends the attempt, and the trial starts again as the next attempt; a pause while reading or answering goes back to
+the same page with every choice kept, one in a feedback goes on. Whatever breaks leaves the force off and all answers on
+the disk, and waits for the operator: to end the session, or, where the device failed, to connect it again. Then the
+session is paused, and the operator resumes it. A disk that takes nothing stalls the session until it does; then the
+session is paused.
 """
 
 from __future__ import annotations
@@ -26,7 +30,7 @@ from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule
 from study_app.session.resume import FIRST, Start
-from study_app.session.transitions import moves
+from study_app.session.transitions import answers, moves
 from study_app.session.transitions.commands import Command
 from study_app.session.transitions.events import (
     Begin,
@@ -43,8 +47,13 @@ from study_app.session.transitions.events import (
     Reconnected,
     RepeatAsked,
     ResumeAsked,
+    Retracted,
     Submitted,
     TaskDone,
+    TimeUp,
+    WriteCompleted,
+    WriteFailed,
+    WriteRetried,
 )
 from study_app.session.transitions.state import Phase, Plan, SessionState
 
@@ -53,48 +62,73 @@ Move: TypeAlias = Callable[[SessionState, Any], tuple[SessionState, tuple[Comman
 TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     # phase           event           what happens              next phase
     (Phase.OPENING, Begin): moves.begin,  # → reading, task; paused before a trial of a session that goes on
-    (Phase.READING, Continue): moves.read_on,  # → reading, task, complete
+    (Phase.READING, Continue): moves.read_on,  # → reading, task, answering (a form), complete
     (Phase.READING, LanguageChosen): moves.choose_language,  # stays
-    (Phase.TASK, TaskDone): moves.end_task,  # → answering; reading, task, complete without a questionnaire
-    (Phase.ANSWERING, ItemShown): moves.show_item,  # stays
-    (Phase.ANSWERING, Chosen): moves.choose,  # stays
-    (Phase.ANSWERING, Submitted): moves.submit,  # → reading, task, complete
+    (Phase.TASK, Continue): moves.leave_task,  # stays until the task is done
+    (Phase.TASK, TaskDone): moves.end_task,  # → answering; resting; reading, task, complete without a questionnaire
+    # Trials of intervals: rests and feedback end by time alone.
+    (Phase.RESTING, TimeUp): moves.end_rest,  # → task of the next interval
+    (Phase.FEEDBACK, TimeUp): moves.end_feedback,  # → reading, task, resting, answering (a form), complete, ended
+    (Phase.ANSWERING, ItemShown): answers.show_item,  # stays
+    (Phase.ANSWERING, Chosen): answers.choose,  # stays
+    (Phase.ANSWERING, Retracted): answers.retract,  # stays
+    (Phase.ANSWERING, Submitted): answers.submit,  # → reading, task, resting, feedback, complete, ended
     # Pausing: esc, the operator, or a force stop.
     (Phase.READING, PauseAsked): moves.pause,  # → paused
     (Phase.TASK, PauseAsked): moves.pause,  # → paused; the attempt is over
+    (Phase.RESTING, PauseAsked): moves.pause,  # → paused; the attempt is over
     (Phase.ANSWERING, PauseAsked): moves.pause,  # → paused
+    (Phase.FEEDBACK, PauseAsked): moves.pause,  # → paused
     (Phase.PAUSED, PauseAsked): moves.pause_again,  # stays
-    (Phase.PAUSED, ResumeAsked): moves.resume,  # → reading, answering; task as the next attempt
+    (
+        Phase.PAUSED,
+        ResumeAsked,
+    ): moves.resume,  # → reading, answering; task as the next attempt; after feedback the next step
     # The force: off at once, wherever we are.
     (Phase.READING, ForceStopped): moves.stop_force,  # → paused
     (Phase.TASK, ForceStopped): moves.stop_force,  # → paused; the attempt is over
+    (Phase.RESTING, ForceStopped): moves.stop_force,  # → paused; the attempt is over
     (Phase.ANSWERING, ForceStopped): moves.stop_force,  # → paused
+    (Phase.FEEDBACK, ForceStopped): moves.stop_force,  # → paused
     (Phase.PAUSED, ForceStopped): moves.stop_force,  # stays
     (Phase.TROUBLE, ForceStopped): moves.stop_force_again,  # stays
     (Phase.COMPLETE, ForceStopped): moves.stop_force_after_end,  # stays
     (Phase.ENDED, ForceStopped): moves.stop_force_after_end,  # stays
     # The operator.
     (Phase.TASK, RepeatAsked): moves.repeat,  # → task, as the next attempt
+    (Phase.RESTING, RepeatAsked): moves.repeat,  # → task, as the next attempt
     (Phase.ANSWERING, RepeatAsked): moves.repeat,  # → task, as the next attempt
     (Phase.READING, Note): moves.note,  # stays
     (Phase.TASK, Note): moves.note,
+    (Phase.RESTING, Note): moves.note,
     (Phase.ANSWERING, Note): moves.note,
+    (Phase.FEEDBACK, Note): moves.note,
     (Phase.PAUSED, Note): moves.note,
     (Phase.TROUBLE, Note): moves.note,
     (Phase.OPENING, EndAsked): moves.end,  # → ended
     (Phase.READING, EndAsked): moves.end,
     (Phase.TASK, EndAsked): moves.end,
+    (Phase.RESTING, EndAsked): moves.end,
     (Phase.ANSWERING, EndAsked): moves.end,
+    (Phase.FEEDBACK, EndAsked): moves.end,
     (Phase.PAUSED, EndAsked): moves.end,
     (Phase.TROUBLE, EndAsked): moves.end,
     # What breaks.
     (Phase.OPENING, Broke): moves.call_operator,  # → trouble
     (Phase.READING, Broke): moves.call_operator,
     (Phase.TASK, Broke): moves.call_operator,
+    (Phase.RESTING, Broke): moves.call_operator,
     (Phase.ANSWERING, Broke): moves.call_operator,
+    (Phase.FEEDBACK, Broke): moves.call_operator,
     (Phase.PAUSED, Broke): moves.call_operator,
     (Phase.TROUBLE, Broke): moves.call_operator,
     (Phase.TROUBLE, Reconnected): moves.reconnect,  # → paused, without force; only after a failure of the device
+    # The disk takes nothing: whatever else happens is refused until it does.
+    **{(phase, WriteFailed): moves.stall for phase in Phase},  # → stalled
+    (Phase.STALLED, WriteRetried): moves.retry,  # stays
+    (Phase.STALLED, WriteCompleted): moves.recover,  # → paused; what it was in trouble and at the end
+    (Phase.STALLED, ForceStopped): moves.stop_force_of_stalled,  # stays
+    (Phase.STALLED, EndAsked): moves.end_unwritten,  # stays, over
 }
 
 
@@ -104,18 +138,23 @@ def open_session(
     key: Mapping[str, Mapping[str, str]],
     language: str,
     start: Start = FIRST,
+    secret: bytes = b"",
 ) -> SessionState:
     """Return the state before ``Begin``; ``key`` is block → code → condition, ``start`` where a resumed one goes on.
+
+    ``secret`` is the sealed key's nonce, from which levels are drawn: only a study without designs needs none.
 
     Raises
     ------
     SessionError
-        The study has no texts in that language.
+        The study has no texts in that language, or its levels cannot be drawn.
     """
     if language not in protocol.study.languages:
         known = ", ".join(protocol.study.languages)
         raise SessionError(f"language {language!r}: {protocol.study.name} is written in {known}; choose one of these")
-    return SessionState(Plan(protocol, schedule, key, language, start))
+    if not secret and any(block.design is not None for block in protocol.blocks.values()):
+        raise SessionError("the levels of this study are drawn from the sealed key: give its secret")
+    return SessionState(Plan(protocol, schedule, key, language, start, secret))
 
 
 def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Command, ...]]:
@@ -128,6 +167,9 @@ def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Comm
     """
     move = TRANSITIONS.get((state.phase, type(event)))
     if move is None:
+        if state.stall is not None:
+            waits = f"{state.stall.reason}; the session waits until then"
+            raise SessionError(f"{type(event).__name__} cannot happen while {state.phase.value}: {waits}")
         taken = ", ".join(sorted(kind.__name__ for phase, kind in TRANSITIONS if phase is state.phase))
         raise SessionError(f"{type(event).__name__} cannot happen while {state.phase.value}: possible are {taken}")
     return move(state, event)

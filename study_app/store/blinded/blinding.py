@@ -24,6 +24,7 @@ from typing import Any, Final, Literal, TypeAlias
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import block_codes, draw_key
+from study_app.protocol.trials.keyed import draw_secret
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, read_own
 from study_app.store.folders import SessionFolder, StudyFolder
@@ -34,18 +35,20 @@ from study_app.store.journals.parsing import parse_json
 Codes: TypeAlias = dict[str, dict[str, str]]
 
 NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})
-_FORMAT = 1
-_NONCE_BYTES = 32
+_FORMATS: Final = (1, 2)
+"""Keys of studies with designs are of format 2: they also hold what is varied and how levels are chosen."""
+_OF_DESIGNS: Final = ("conditions", "standard", "stimulus", "standards", "method")
 
 
 @dataclass(frozen=True, slots=True)
 class Key:
     """The opened key. Never print, log or show what it holds before it was revealed.
 
-    ``codes`` is block → code → condition id; ``tables`` holds the protocol's tables ``conditions`` and ``liquids``,
-    ``files`` the texts of its liquid files by their names;
-    ``drawn`` says where its randomness came from; ``hash`` is the SHA-256 of the sealed file; ``nonce`` is as secret as
-    the codes.
+    ``codes`` is block → code → condition id, or track of a block with a design; ``tables`` holds the protocol's tables
+    ``conditions`` and ``liquids``, of a study with designs also ``stimuli``, ``designs``, ``methods`` and
+    what ``blocks`` present, ``files`` the texts of its liquid files by their names;
+    ``groups`` is group → share, if there are groups; ``drawn`` says where its randomness came from; ``hash`` is the
+    SHA-256 of the sealed file; ``nonce`` is as secret as the codes.
     """
 
     hash: str
@@ -55,6 +58,7 @@ class Key:
     tables_hash: str = field(repr=False)
     nonce: bytes = field(repr=False)
     files: dict[str, str] = field(repr=False, default_factory=dict)
+    groups: dict[str, int] = field(repr=False, default_factory=dict)
 
     def condition(self, block: str, code: str) -> str:
         """Return the id of the condition that ``code`` of ``block`` stands for."""
@@ -62,7 +66,7 @@ class Key:
             return self.codes[block][code]
         except KeyError:
             raise StoreError(
-                f"the sealed key knows no code {code!r} of block {block!r}: it is of another study"
+                f"the sealed key has no code {code!r} of block {block!r}: it belongs to another study"
             ) from None
 
     def delay_ms(self, block: str, code: str) -> float:
@@ -97,6 +101,8 @@ def open_or_draw_key(
     ----------
     folder : Path
         The study folder.
+    protocol : Protocol
+        Its conditions are drawn and must be the key's.
     random : callable, optional
         Uniform numbers in [0, 1): a seeded stream's for a rehearsal. By default the operating system's randomness.
     files : mapping of str to str
@@ -118,18 +124,36 @@ def open_or_draw_key(
     if key.drawn != drawn:
         kinds = {"system": "real sessions", "seed": "a rehearsal"}
         raise StoreError(
-            f"{folder} holds {kinds[key.drawn]}: {kinds[drawn]} would mix with it; use another results folder"
+            f"{folder} holds {kinds[key.drawn]}: they must not be mixed with {kinds[drawn]}; use another results folder"
         )
-    if key.tables_hash != _tables_hash(protocol):
-        raise StoreError(
-            f"{study.key} was sealed for other conditions than this protocol's: run the changed protocol into another "
-            "results folder"
-        )
+    _refuse_other_conditions(study, key, protocol)
     return key
 
 
+def check_conditions(folder: Path, protocol: Protocol) -> None:
+    """Refuse a protocol with other conditions than those that the study's key was sealed for; nothing is written.
+
+    Raises
+    ------
+    StoreError
+        It has others, or there is a key that cannot be used.
+    """
+    study = StudyFolder(folder)
+    if is_there(study.key):
+        _refuse_other_conditions(study, _verified_key(study), protocol)
+
+
+def _refuse_other_conditions(study: StudyFolder, key: Key, protocol: Protocol) -> None:
+    if key.tables_hash != _tables_hash(protocol):
+        raise StoreError(
+            f"{study.key} was sealed for other conditions than those of this protocol (its liquids, conditions, "
+            "stimuli or blocks were changed): undo that change to continue the study, or give the changed protocol "
+            "another study.name or results folder"
+        )
+
+
 def same_conditions(folder: Path, protocol: Protocol) -> bool:
-    """Return whether ``protocol`` has the liquids, conditions and blocks of conditions that the key was sealed for.
+    """Return whether ``protocol`` has the liquids, conditions, stimuli and blocks that the key was sealed for.
 
     Raises
     ------
@@ -153,7 +177,7 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
     study = StudyFolder(folder)
     if not is_there(study.key) and not study.sessions():
         raise StoreError(
-            f"{folder} is no study's folder (it has no {study.key.name}): name one such as results/rek2024"
+            f"{folder} is not a study folder (it has no {study.key.name}): name one such as results/rek2024"
         )
     key = _verified_key(study)
     record = {
@@ -223,25 +247,49 @@ def _is_reveal(record: object) -> bool:
 
 def _seal(protocol: Protocol, drawn: str, random: Callable[[], float], files: Mapping[str, str]) -> bytes:
     content: dict[str, Any] = {
-        "format": _FORMAT,
+        "format": max(_FORMATS) if protocol.design_questions else min(_FORMATS),
         "drawn": drawn,
-        "nonce": bytes(int(random() * 256) for _ in range(_NONCE_BYTES)).hex(),
+        "nonce": draw_secret(random).hex(),
         "codes": draw_key(protocol, random),
-        "tables": protocol.model_dump(mode="json", include={"conditions", "liquids"}),
+        "tables": _tables(protocol),
         "tables_hash": _tables_hash(protocol),
     }
     if files:
         content["files"] = dict(files)
+    if protocol.groups:
+        content["groups"] = _shares(protocol)
     return base64.encodebytes(json.dumps(content, ensure_ascii=False).encode())
+
+
+def _tables(protocol: Protocol) -> dict[str, Any]:
+    """Return the tables that a receipt lacks; ``blocks`` has of each block with a design what it presents."""
+    tables = protocol.model_dump(mode="json", include={"conditions", "liquids", "stimuli", "designs", "methods"})
+    if protocol.design_questions:
+        named = {name: protocol.blocks[name] for name in protocol.design_questions}
+        tables["blocks"] = {
+            name: {key: value for key, value in block.model_dump(mode="json").items() if key in _OF_DESIGNS}
+            for name, block in named.items()
+        }
+    return tables
 
 
 def _tables_hash(protocol: Protocol) -> str:
     """Return the hash of the conditions as their author wrote them (a later version's new defaults change nothing)."""
     written = {
-        **protocol.model_dump(mode="json", include={"conditions", "liquids"}, exclude_unset=True),
-        "blocks": {name: [block_codes(block), block.conditions] for name, block in protocol.blocks.items()},
+        **protocol.model_dump(
+            mode="json", include={"conditions", "liquids", "stimuli", "designs", "methods"}, exclude_unset=True
+        ),
+        "blocks": {name: [block_codes(protocol, block), block.conditions] for name, block in protocol.blocks.items()},
     }
+    if protocol.design_questions:
+        written["designs"] = _tables(protocol)["blocks"]
+    if protocol.groups:
+        written["groups"] = _shares(protocol)
     return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
+
+
+def _shares(protocol: Protocol) -> dict[str, int]:
+    return {name: group.share for name, group in protocol.groups.items()}
 
 
 def _verified_key(study: StudyFolder) -> Key:
@@ -282,9 +330,9 @@ def read_key(folder: Path) -> Key:
     sealed = read_own(path, folder)
     try:
         content = parse_json(base64.b64decode(sealed, validate=False))
-        if content["format"] != _FORMAT:
+        if content["format"] not in _FORMATS:
             raise StoreError(
-                f"{path} has format {content['format']!r}, this version reads {_FORMAT}: use a newer version"
+                f"{path} has format {content['format']!r}, this version reads 1 and 2: use a newer version"
             )
         _check_content(content)
         return Key(
@@ -295,9 +343,10 @@ def read_key(folder: Path) -> Key:
             tables_hash=content["tables_hash"],
             nonce=bytes.fromhex(content["nonce"]),
             files=content.get("files", {}),
+            groups=content.get("groups", {}),
         )
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise StoreError(f"{path} is no sealed key any more: restore it from a copy") from error
+        raise StoreError(f"{path} is no longer a sealed key: restore it from a copy") from error
 
 
 def _check_content(content: dict[str, Any]) -> None:
@@ -308,9 +357,10 @@ def _check_content(content: dict[str, Any]) -> None:
         or not all(map(_is_texts, content["codes"].values()))
         or not isinstance(content["tables"]["liquids"], dict)
         or not _is_texts(content.get("files", {}))
+        or not all(type(share) is int and share > 0 for share in content.get("groups", {}).values())
         or not all(isinstance(condition["delay_ms"], int | float) for condition in conditions)
     ):
-        raise ValueError("its codes or conditions are none")
+        raise ValueError("its codes or conditions are invalid")
 
 
 def _is_texts(value: object) -> bool:

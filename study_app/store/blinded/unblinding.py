@@ -20,10 +20,11 @@ from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.tables.columns import LATER, SEALED, TABLES
+from study_app.store.tables.columns import LATER, SEALED
 from study_app.store.tables.csv_files import in_columns_of
 from study_app.store.tables.participants import write_participants
-from study_app.store.tables.study_description import described_study, write_description
+from study_app.store.tables.session_tables import table_columns
+from study_app.store.tables.study_description import described_study, has_intervals, write_description
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +79,13 @@ def _rewrite(place: Place, lines: list[Line], key: Key) -> list[str]:
     left: list[str] = []
     ours: dict[str, tuple[bytes, bytes]] = {}
     before, after = (dict(table_files(place, lines, one)) for one in (None, key))
-    for path, columns in zip(after, (TABLES["responses"], TABLES["trials"]), strict=True):
+    for path, columns in zip(after, table_columns(lines, opened=True).values(), strict=True):
         held = path.read_bytes() if is_there(path) else b""
         sealed, content = (in_columns_of(held, whole[path], columns, LATER - SEALED)[0] for whole in (before, after))
         if held not in (sealed, content):
             left.append(
-                f"{path} is not what the journal gives, so it was left as it is: "
-                f"liquid-study rebuild {place.folder.path} makes it again"
+                f"{path} differs from the journal, so it was not changed: "
+                f"rebuild it with liquid-study rebuild {place.folder.path}"
             )
             continue
         if held != content:
@@ -99,9 +100,10 @@ def _open_study(study: StudyFolder) -> None:
     """Bring the table of participants and the description up to date."""
     name = described_study(study)
     if name is not None:
-        write_participants(study, name)
+        write_participants(study, name, whole=True)
     for session in study.sessions():
         with contextlib.suppress(StoreError, KeyError, TypeError, ValueError):  # another receipt will do
-            head = StudyHead.model_validate(receipt.read(session.receipt)["protocol"]["study"])
-            write_description(study, head)
+            protocol = receipt.read(session.receipt)["protocol"]
+            head, number = StudyHead.model_validate(protocol["study"]), protocol.get("format", 1)
+            write_description(study, head, number, intervals=has_intervals(protocol))
             return

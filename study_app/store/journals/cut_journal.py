@@ -14,7 +14,7 @@ from study_app.store.folders import SessionFolder
 from study_app.store.journals.journal import Line
 from study_app.store.journals.journal_events import unknown_events
 from study_app.store.journals.parsing import RECORDING_NAME
-from study_app.store.progress import attempts
+from study_app.store.progress import recordable
 from study_app.store.recorder import recording_files
 from study_app.store.sessions.open_session import Place
 from study_app.store.tables import session_tables
@@ -44,7 +44,7 @@ def beyond(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
     """Yield each of receipt, checksums and tables that tells more than the journal, and what.
 
     A session that has ended has a whole journal. After a power cut the trials table may tell of one trial more, since
-    nobody waits until the disk has the line of a trial's start; answers are waited for.
+    nothing waits until the disk has the line of a trial's start; answers are waited for.
 
     Raises
     ------
@@ -57,14 +57,15 @@ def beyond(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
     if not ended and (status := held.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
         yield folder.receipt, f"its status is {status!r}, the journal's {receipt.UNFINISHED!r}"
     if len(held.get("resumed", ())) > sum(line["event"] == "session_resumed" for line in lines):
-        yield folder.receipt, "tells that the session was resumed more often than the journal does"
+        yield folder.receipt, "says that the session was resumed more often than the journal does"
     if ended:
         return
     if is_there(folder.checksums):
-        yield folder.checksums, "was made when the session had ended, though the journal has no end"
+        yield folder.checksums, "was written after the session ended, but the journal has no end"
     for name, rows, spare in (
         ("responses", session_tables.responses(lines), 0),
         ("trials", session_tables.trials(lines), 1),
+        ("intervals", session_tables.SessionRows(lines).intervals, 1),
     ):
         path = folder.table(place.study, name)
         if (there := _rows(path, place.study_folder.path)) > len(rows) + spare:
@@ -77,8 +78,8 @@ def _ended_or_recorded(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Pa
     if lines[-1]["event"] == "session_ended":
         return
     if place_of(study, folder) in {session for _, session in listed(study.fingerprints)}:
-        yield study.fingerprints, f"lists {place_of(study, folder)} as ended, though its journal has no end"
-    of_trials = {path for which in attempts(lines) for path in recording_files(folder.recordings, *which)}
+        yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but its journal has no end"
+    of_trials = {path for which in recordable(lines) for path in recording_files(folder.recordings, *which)}
     for path in sorted(set(_recordings(folder)) - of_trials):
         yield path, "is of a trial that the journal never started"
 

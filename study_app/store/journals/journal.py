@@ -5,8 +5,8 @@ seconds since the session's clock origin, ``at`` the same moment for people, ``p
 the file before the line. All tables are derived from these lines alone. Journals of format 1 have no ``previous``;
 where one was resumed by a later version, its lines have it from ``session_resumed`` on. A line is whole when its
 newline is on the disk; a program killed while writing leaves at most one torn tail without a newline, which readers
-leave out and count; anything else that is no line is damage. Lines that nobody waits for are flushed in the background,
-in order: a power cut may take the last of them, but none that was waited for and none before it.
+leave out and count; anything else that is no line is damage. Lines that are not waited for are flushed in the
+background, in order: a power cut may take the last of them, but none that was waited for and none before it.
 """
 
 from __future__ import annotations
@@ -50,6 +50,15 @@ class Contents:
     torn_bytes: int = 0
     damage: str | None = None
     hash: Any = field(default_factory=hashlib.sha256, compare=False, repr=False)
+
+
+def count_events(path: Path, *kinds: str) -> tuple[int, ...]:
+    """Return how many lines of a journal have each kind of event, without parsing it; 0 where it cannot be read."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return (0,) * len(kinds)
+    return tuple(content.count(b'"event":"%s",' % kind.encode()) for kind in kinds)
 
 
 def read(path: Path) -> list[Line]:
@@ -98,7 +107,7 @@ def scan(path: Path) -> Contents:
             return Contents(lines, whole_bytes, damage=f"{path}, line {number}: damaged; restore it from a copy")
         if line.get("n") != number:
             shown = shortened(line.get("n"))
-            damage = f"{path}, line {number}: its n is {shown}: lines are missing or doubled; restore a copy"
+            damage = f"{path}, line {number}: its n is {shown}: lines are missing or duplicated; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
         version = line.get("version", version)
         if (wrong := problem(line) or _unknown(line, version)) is not None:
@@ -126,13 +135,13 @@ def _break(line: Line, before: str, *, chained: bool) -> str | None:
     ``chained`` says whether the line before has ``previous``: then this one must have it. The first line of a journal
     has it since format 2; a journal of format 1 gets it where it was resumed by a later version.
     """
-    first, told = line["n"] == 1, line.get("previous")
+    first, hash_before = line["n"] == 1, line.get("previous")
     if first and line.get("format", 1) > FORMAT:
         return f"has format {line['format']}, this version reads {FORMAT}: use a newer version"
-    if told is None:
+    if hash_before is None:
         needed = chained or (first and line.get("format", 1) > 1)
         return "lacks previous: it was changed; restore it from a copy" if needed else None
-    if told != before:
+    if hash_before != before:
         return "was written after another line than the one before it, which was changed: restore a copy"
     if not (chained or first or line["event"] == "session_resumed"):
         return "has previous, and the lines before it lack it: they were changed; restore a copy"

@@ -1,4 +1,4 @@
-"""The journal's dictionary: every event, what it says, and its fields beside ``n``, ``event``, ``t_s`` and ``at``."""
+"""The journal's dictionary: every event, what it says, and its fields besides ``n``, ``event``, ``t_s`` and ``at``."""
 
 from __future__ import annotations
 
@@ -9,23 +9,25 @@ from datetime import datetime
 from typing import Any
 
 from study_app.store.journals.parsing import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
-from study_app.store.tables.columns import TRIALS
+from study_app.store.tables.columns import DELIVERED, TRIALS
 
 SHOWN = 200  # characters of a bad value that a message repeats
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One kind of line: its name, its meaning, and the fields that every one of its lines has."""
+    """One kind of line: its name, its meaning, the fields that every one of its lines has, and of ``one_of`` one."""
 
     name: str
     description: str
     fields: tuple[str, ...] = ()
+    one_of: tuple[str, ...] = ()
 
 
 _SESSION = ("participant", "session", "study", "seed", "language", "operator", "simulated", "pilot", "recordings")
 _HASHES = ("key_hash", "protocol_hash", "version")
 _WHICH = ("trial", "attempt")
+_PAGE = ("trial", "form")
 
 EVENTS: tuple[Event, ...] = (
     Event(
@@ -35,23 +37,41 @@ EVENTS: tuple[Event, ...] = (
     ),
     Event(
         "session_resumed",
-        "It was taken up again after its program had ended, so long after the line before.",
+        "It was resumed after its program had ended; `gap_s` is the time since the line before.",
         ("gap_s", "torn_bytes", "operator", "device", "version"),
     ),
-    Event("preflight", "What was found before the first page, and accepted by going on.", ("checks",)),
+    Event(
+        "allocated",
+        "The participant has this entry in the allocation to groups; `sealed` holds the group. Once per participant.",
+        ("entry", "sealed"),
+    ),
+    Event("preflight", "The checks before the first page, as accepted by the operator.", ("checks",)),
     Event("page_shown", "A page of text was shown.", ("page",)),
-    Event("page_left", "The participant went on from it.", ("page",)),
-    Event("language_chosen", "The participant reads in another of the study's languages from here on.", ("language",)),
-    Event("trial_started", "A trial was presented.", (*_WHICH, "block", "phase", "part", "index", "of", "code")),
+    Event("page_left", "The participant left it.", ("page",)),
+    Event("language_chosen", "The participant chose another language of the study.", ("language",)),
+    Event(
+        "trial_started",
+        "A trial was presented; with a design `sealed` contains level, standard and arrangement, encrypted.",
+        (*_WHICH, "block", "phase", "part", "index", "of", "code"),
+    ),
+    Event("interval_started", "An interval of a trial was presented.", (*_WHICH, "interval")),
+    Event(
+        "interval_ended",
+        "The interval's task ended, with its measures; `sealed` contains the sealed columns, encrypted. `invalid` "
+        "names the limits that it breaks: the trial is then presented again.",
+        (*_WHICH, "interval", "outcome"),
+    ),
+    Event("feedback_shown", "The participant saw whether the answer was correct.", _WHICH),
+    Event("passed_over", "A trial, or the break after it, was not due.", ("reason",), ("trial", "page")),
     Event("target_reached", "A target was reached, on the task's clock.", ("trial", "target", "t_task_s")),
     Event(
         "trial_ended",
-        "The trial's task was over, and what was measured of it; `sealed` holds the sealed columns, encrypted.",
+        "The trial's task ended, with its measures; `sealed` contains the sealed columns, encrypted.",
         (*_WHICH, "outcome"),
     ),
     Event(
         "recorded",
-        "The trial's recording is whole on the disk, under these names and checksums.",
+        "The trial's recording is complete on the disk, with these names and checksums.",
         (
             *_WHICH,
             "recording",
@@ -63,23 +83,26 @@ EVENTS: tuple[Event, ...] = (
             "frames_sha256",
         ),
     ),
-    Event("recording_lost", "The trial's recording could not be kept.", (*_WHICH, "reason")),
-    Event("item_shown", "A statement was shown.", ("trial", "item")),
-    Event("choice", "An answer was chosen; the last one counts.", ("trial", "item", "value")),
-    Event("responses", "The page of statements was confirmed: every answer.", (*_WHICH, "items")),
+    Event("recording_lost", "The trial's recording could not be stored.", (*_WHICH, "reason")),
+    Event("form_shown", "A questionnaire was shown on its own.", ("form",)),
+    Event("item_shown", "A question was shown, of a trial or a form.", ("item",), _PAGE),
+    Event("choice", "An answer was chosen; the last one counts.", ("item", "value"), _PAGE),
+    Event("answer_removed", "An answer was taken back, or an earlier one hid its question.", ("item",), _PAGE),
+    Event("responses", "The page of questions was confirmed: every answer.", (*_WHICH, "items")),
+    Event("form_answered", "The form was confirmed: every answer.", ("form", "items")),
     Event("paused", "The session was paused.", ("by",)),
-    Event("resumed", "The pause was over.", ("by",)),
+    Event("resumed", "The pause ended.", ("by",)),
     Event("force_stopped", "The force was stopped.", ("by",)),
-    Event("force_restored", "The force came back.", ("by",)),
+    Event("force_restored", "The force was turned on again.", ("by",)),
     Event("note", "The operator wrote a note, or marked the trial.", ("kind", "text")),
-    Event("repeat", "The operator had the trial presented again.", ("trial", "reason")),
+    Event("repeat", "The operator repeated the trial.", ("trial", "reason")),
     Event("broke", "Device, servo or program failed.", ("what",)),
     Event(
         "device_reconnected",
-        "The device that had failed was open and homed again, as `described`; the force stayed off until `resumed`.",
+        "The failed device was opened and homed again, as `described`; the force stayed off until `resumed`.",
         ("device", "described"),
     ),
-    Event("session_ended", "The session was over: always the last line.", ("status", "reason")),
+    Event("session_ended", "The session ended: always the last line.", ("status", "reason")),
 )
 
 _OF_ALL = ("n", "event", "t_s", "at")
@@ -140,9 +163,18 @@ def _are_limits(value: object) -> bool:
     return isinstance(value, dict) and all(map(_is_number, value.values()))
 
 
+def _is_answer(value: object) -> bool:
+    return _is_number(value) or _is_text(value) or _are_texts(value)
+
+
+def _are_texts(value: object) -> bool:
+    return isinstance(value, list) and all(map(_is_text, value))
+
+
 def _are_answers(value: object) -> bool:
     return isinstance(value, list) and all(
-        isinstance(answer, dict) and all(name in answer and holds(name, answer[name]) for name in _ANSWER)
+        isinstance(answer, dict)
+        and all(name in answer and holds(_field(answer, name), answer[name]) for name in _ANSWER)
         for answer in value
     )
 
@@ -160,26 +192,42 @@ _KINDS: Mapping[str, Callable[[object], bool]] = {
     "object": _is_object,
     "list of objects": _are_objects,
     "table of numbers": _are_limits,
+    "answer": _is_answer,
     "list of answers": _are_answers,
+    "list of texts": _are_texts,
 }
-_MAY_BE_NULL = ("part", "value", "onset_s", "first_s", "last_s", "gap_s", "device", "t_task_s")
-_KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for column in TRIALS} | {
+_MAY_BE_NULL = (
+    "level",
+    "standard",
+    "part",
+    "value",
+    "answer",
+    "onset_s",
+    "first_s",
+    "last_s",
+    "gap_s",
+    "device",
+    "t_task_s",
+)
+_KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for column in (*TRIALS, *DELIVERED)} | {
     name: (kind, name in _MAY_BE_NULL)
     for kind, names in {
         "text": "language operator key_hash protocol_hash version device page block phase code item "
-        "outcome sealed sha256 frames_sha256 reason by kind text what status previous",
+        "outcome form group sealed arrangement sha256 frames_sha256 reason by kind text what status previous",
         "study's name": "study",
         "participant's id": "participant",
         "recording's name": "recording recording_frames",
-        "flag": "simulated pilot recordings measures_sealed",
-        "integer": "n format session seed torn_bytes trial attempt part index of target samples_recorded "
-        "samples_unrecorded frames_recorded number value changes",
-        "number": "t_s gap_s t_task_s onset_s first_s last_s",
+        "flag": "simulated pilot recordings measures_sealed intervals",
+        "integer": "n format session entry seed torn_bytes trial attempt interval part index of target "
+        "samples_recorded samples_unrecorded frames_recorded number value changes protocol_format",
+        "answer": "answer",
+        "number": "level standard t_s gap_s t_task_s onset_s first_s last_s",
         "time": "at",
         "object": "described",
         "list of objects": "checks",
         "table of numbers": "limits",
         "list of answers": "items",
+        "list of texts": "invalid",
     }.items()
     for name in names.split()
 }
@@ -198,10 +246,17 @@ def problem(line: Mapping[str, Any]) -> str | None:
     known = _BY_NAME.get(event)
     if lacking := [name for name in (*_OF_ALL, *(known.fields if known else ())) if name not in line]:
         return f"({event}) lacks {', '.join(lacking)}"
+    if known is not None and known.one_of and sum(name in line for name in known.one_of) != 1:
+        return f"({event}) is not about one of {', '.join(known.one_of)}"
     for name in line:
-        if not holds(name, line[name]):
-            return f"({event}) holds {name} {shortened(line[name])}, expected: {_KIND_OF[name][0]}"
+        if not holds(field := _field(line, name), line[name]):
+            return f"({event}) holds {name} {shortened(line[name])}, expected: {_KIND_OF[field][0]}"
     return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has t_s {line['t_s']:g}"
+
+
+def _field(held: Mapping[str, Any], name: str) -> str:
+    """Return whose entry says what a name holds: without a kind of question an answer is a whole number."""
+    return "answer" if name == "value" and "kind" in held else name
 
 
 def shortened(value: object) -> str:

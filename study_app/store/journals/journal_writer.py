@@ -1,4 +1,4 @@
-"""Writing a journal: one thread appends lines, and another flushes those that nobody waits for."""
+"""Writing a journal: one thread appends lines, and another flushes those that are not waited for."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RETRY_S = 1.0
 
 
 class Journal:
-    """An open journal: one thread appends, and another flushes the lines that nobody waits for.
+    """An open journal: one thread appends, and another flushes the lines that are not waited for.
 
     After a failed write or flush the lines that are not known to be on the disk are written again before the next line,
     which waits for the disk: the system may have dropped what it could not flush. The background thread repeats a
@@ -32,13 +32,13 @@ class Journal:
     def __init__(self, path: Path, file: BinaryIO, clock: SessionClock) -> None:
         self.path = path
         self.clock = clock
-        self._file = file
+        self.file = file
         self._lines = 0
         self._size = 0
         self._hash = hashlib.sha256()  # of all lines
         self._unflushed = bytearray()  # the last bytes of the file, not known to be on the disk
         self._torn = False
-        self._flushing = threading.RLock()  # one flush at a time: the system reports a failure to one of two alone
+        self.flushing = threading.RLock()  # one flush at a time: the system reports a failure to one of two alone
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
         self._due = False
@@ -58,7 +58,7 @@ class Journal:
             file = path.open("xb", buffering=0)
             sync_folder(path.parent)
         except FileExistsError as error:
-            raise StoreError(f"{path} exists already: a journal is never written over; use a new session") from error
+            raise StoreError(f"{path} exists already: a journal is never overwritten; use a new session") from error
         except OSError as error:
             raise cannot_write(path, error) from error
         return cls(path, file, clock if clock is not None else SessionClock())
@@ -67,7 +67,7 @@ class Journal:
     def reopen(cls, path: Path, contents: Contents, clock: SessionClock) -> Journal:
         """Open the file to go on after the last whole line of ``contents``, which `scan` has just read.
 
-        A torn tail is cut off by writing the whole lines anew, in one step, and kept beside the journal.
+        A torn tail is cut off by writing the whole lines anew, in one step, and kept next to the journal.
 
         Raises
         ------
@@ -104,11 +104,13 @@ class Journal:
             it was waited for, or a line before it could not be flushed; the journal ends with the line before it and
             can be appended to again.
         """
-        if self._file.closed:
+        if self.file.closed:
             raise StoreError(f"{self.path} is closed: {event!r} came after the session's end and was not recorded")
         line = line_of(self._lines + 1, event, self.clock, t_s, fields, previous=self._hash.hexdigest())
         if (wrong := problem(line)) is not None:
-            raise StoreError(f"{self.path}, line {line['n']} {wrong}: it was not written; tell the developers")
+            raise StoreError(
+                f"{self.path}, line {line['n']} {wrong}: it was not written; report this to the developers"
+            )
         content = line_bytes(line)
         self._refuse_if_replaced()
         try:
@@ -124,7 +126,7 @@ class Journal:
         return line
 
     def check_flushed(self) -> None:
-        """Raise if lines that nobody waited for could not be flushed, and still are not on the disk.
+        """Raise if lines that were not waited for could not be flushed, and still are not on the disk.
 
         Raises
         ------
@@ -137,7 +139,7 @@ class Journal:
     @property
     def closed(self) -> bool:
         """Whether it takes no more lines."""
-        return self._file.closed
+        return self.file.closed
 
     def close(self) -> None:
         """Flush what is not on the disk yet, and close the file.
@@ -152,14 +154,14 @@ class Journal:
             self._changed.notify_all()
         if self._thread is not None:
             self._thread.join()
-        if self._file.closed:
+        if self.file.closed:
             return
         try:
             self._flush()
         except OSError as error:
             raise cannot_write(self.path, error) from error
         finally:
-            self._file.close()
+            self.file.close()
 
     def __enter__(self) -> Journal:
         return self
@@ -172,7 +174,7 @@ class Journal:
     def _refuse_if_replaced(self) -> None:
         """Refuse to write into a file that is no longer found under the journal's name."""
         try:
-            there = os.path.samestat(self.path.stat(), os.fstat(self._file.fileno()))
+            there = os.path.samestat(self.path.stat(), os.fstat(self.file.fileno()))
         except FileNotFoundError:
             there = False
         except OSError as error:
@@ -188,7 +190,7 @@ class Journal:
                 if self._torn:
                     self._take_back()
                 self._torn = True
-                write_whole(self._file, content)
+                write_whole(self.file, content)
             except OSError:
                 with contextlib.suppress(OSError):  # tried again before the next line
                     self._take_back()
@@ -200,7 +202,7 @@ class Journal:
 
     def _flush_or_take_back(self, content: bytes) -> None:
         """Wait until the line just written is on the disk; where it cannot be, take it back."""
-        with self._flushing:
+        with self.flushing:
             try:
                 self._flush()
             except OSError:
@@ -214,14 +216,14 @@ class Journal:
 
     def _flush(self) -> None:
         """Wait until every line written so far is on the disk; called from both threads."""
-        with self._flushing:
+        with self.flushing:
             with self._changed:
                 if self._torn:
                     self._take_back()
                 waiting = len(self._unflushed)
             if waiting:
                 try:
-                    os.fsync(self._file.fileno())
+                    os.fsync(self.file.fileno())
                 except OSError:
                     with self._changed:
                         self._torn = True
@@ -239,7 +241,7 @@ class Journal:
             self._changed.notify_all()
 
     def _flush_behind(self) -> None:
-        """Flush whenever a line was written that nobody waits for, and after a failure: the journal's own thread."""
+        """Flush whenever a line was written that is not waited for, and after a failure: the journal's own thread."""
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._due or self._closing, RETRY_S if self._failed else None)
@@ -253,9 +255,9 @@ class Journal:
 
     def _take_back(self) -> None:
         """Cut off what an interrupted write may have left, and write again what may not be on the disk."""
-        self._file.truncate(self._size)
-        self._file.seek(self._size - len(self._unflushed))
-        write_whole(self._file, bytes(self._unflushed))
+        self.file.truncate(self._size)
+        self.file.seek(self._size - len(self._unflushed))
+        write_whole(self.file, bytes(self._unflushed))
         self._torn = False
 
 

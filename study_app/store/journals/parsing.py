@@ -9,7 +9,7 @@ from typing import Any
 
 STUDY_NAME = re.compile(r"[a-z][a-z0-9]{0,39}")  # as in a protocol
 PARTICIPANT_ID = re.compile(r"[A-Za-z0-9]{1,32}")
-RECORDING_NAME = re.compile(r"recordings/trial-[0-9]{3,}(_attempt-[0-9]+)?(_frames)?\.parquet")
+RECORDING_NAME = re.compile(r"recordings/trial-[0-9]{3,}(_attempt-[0-9]+)?(_interval-[0-9]+)?(_frames)?\.parquet")
 
 _MOST_LEVELS = 64  # whoever walks through a value may do so recursively
 _TOO_DEEP = "it is nested too deeply"
@@ -24,7 +24,7 @@ def check_study_name(name: object) -> str:
         No protocol has such a name, and no file may be called by it.
     """
     if not isinstance(name, str) or not STUDY_NAME.fullmatch(name):
-        raise ValueError("no study has such a name")
+        raise ValueError("no study has this name")
     return name
 
 
@@ -53,4 +53,4 @@ def _within(value: dict[str, Any] | list[Any]) -> Iterable[Any]:
 
 
 def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is no JSON")
+    raise ValueError(f"{constant} is not JSON")

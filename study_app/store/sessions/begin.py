@@ -5,20 +5,24 @@ from __future__ import annotations
 import contextlib
 import shutil
 from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
 import study_app
 from study_app.errors import StoreError
+from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.liquid_files import unbundled
 from study_app.store import receipt
-from study_app.store.atomic import beside, cannot_write, is_there, sweep_old, sync_folder
+from study_app.store.atomic import cannot_write, is_there, sweep_old, sync_folder, temporary_path
+from study_app.store.blinded.allocation import Allocation, allocate, check_session
 from study_app.store.blinded.blinding import Key, open_or_draw_key, reveals
 from study_app.store.clock import SessionClock
 from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
 from study_app.store.journals.journal import FORMAT
 from study_app.store.journals.journal_writer import Journal
 from study_app.store.recorder import Recorder
@@ -29,25 +33,55 @@ from study_app.store.sessions.unstarted_sessions import sweep_claims, take_over
 from study_app.store.tables.participants import write_participants
 from study_app.store.tables.study_description import check_study, write_description
 
-__all__ = ["Place", "SessionStore", "begin"]
+__all__ = ["Place", "SessionStart", "SessionStore", "begin"]
+
+
+@dataclass(frozen=True, slots=True)
+class SessionStart:
+    """What a session begins with, as its first line and its receipt keep it.
+
+    Parameters
+    ----------
+    participant : str
+        The participant's id.
+    seed : int
+        What all its randomness comes from.
+    operator : str
+        Name or initials of the operator.
+    language : str
+        The language of the participant's pages.
+    device : mapping
+        Description for the receipt; ``device["name"]`` names the device in the participants table.
+    screens : mapping
+        Description for the receipt.
+    simulated : bool
+        Whether the participant, or the hand, is simulated.
+    session : int
+        Its number among the participant's, from 1.
+    pilot : bool
+        Whether the session only tries the study out.
+    recordings : bool
+        Whether the trials' samples and frames are kept, through the ``recorder`` of the store.
+    motors_masked : mapping, optional
+        How the motors of the device are masked, for the receipt; None where that was not asked.
+    """
+
+    participant: str
+    _: KW_ONLY
+    seed: int
+    operator: str
+    language: str
+    device: Mapping[str, Any]
+    screens: Mapping[str, Any]
+    simulated: bool
+    session: int = 1
+    pilot: bool = False
+    recordings: bool = False
+    motors_masked: Mapping[str, Any] | None = None
 
 
 def begin(
-    results: Path,
-    protocol: Protocol,
-    source: bytes,
-    participant: str,
-    *,
-    session: int = 1,
-    seed: int,
-    operator: str,
-    language: str,
-    device: Mapping[str, Any],
-    screens: Mapping[str, Any],
-    simulated: bool,
-    pilot: bool = False,
-    recordings: bool = False,
-    clock: SessionClock | None = None,
+    results: Path, protocol: Protocol, source: bytes, start: SessionStart, *, clock: SessionClock | None = None
 ) -> SessionStore:
     """Claim a session in the study folder ``results`` and write everything that must be there before the first trial.
 
@@ -56,12 +90,14 @@ def begin(
 
     Parameters
     ----------
+    results : Path
+        The study folder.
+    protocol : Protocol
+        What is run.
     source : bytes
         The protocol's file as it is, hashed into the receipt.
-    device, screens : mapping
-        Descriptions for the receipt; ``device["name"]`` names the device in the participants table.
-    recordings : bool
-        Whether the trials' samples and frames are kept, through the ``recorder`` of the store.
+    start : SessionStart
+        Whose session it is, and with what.
     clock : SessionClock, optional
         Its origin is the session's; by default the system's monotonic clock from now.
 
@@ -72,34 +108,24 @@ def begin(
         order.
     """
     study_folder = StudyFolder(Path(results))
-    check_participant(participant, pilot=pilot)
+    check_participant(start.participant, pilot=start.pilot)
     check_study(study_folder, protocol.study.name)
-    check_unused(study_folder, participant, session)
+    check_unused(study_folder, start.participant, start.session)
+    check_session(study_folder, protocol, start.participant, start.session)
     clock = clock if clock is not None else SessionClock()
     make_folder(study_folder.path)
-    key = open_or_draw_key(
-        study_folder.path, protocol, stream(seed, "blinding").random if simulated else None, unbundled(source)[1]
-    )
-    place = Place(study_folder, study_folder.session(participant, session), protocol.study.name)
-    started, first_receipt = first_words(
-        protocol,
-        source,
-        participant,
-        session=session,
-        seed=seed,
-        operator=operator,
-        language=language,
-        device=device,
-        screens=screens,
-        simulated=simulated,
-        pilot=pilot,
-        recordings=recordings,
-        key_hash=key.hash,
-        measures_sealed=not reveals(study_folder.path),
-        clock=clock,
-    )
+    draw = stream(start.seed, "blinding").random if start.simulated else None
+    key = open_or_draw_key(study_folder.path, protocol, draw, unbundled(source)[1])
+    place = Place(study_folder, study_folder.session(start.participant, start.session), protocol.study.name)
+    sealed = not reveals(study_folder.path)
     opening = _claim(place)
     try:
+        allocation = allocate(study_folder, key, start.participant)
+        group = None if allocation is None else allocation.group
+        own_protocol(protocol, group, start.session)  # refuses a session that the group does not have
+        started, first_receipt = first_words(
+            protocol, source, start, key_hash=key.hash, measures_sealed=sealed, clock=clock, allocation=allocation
+        )
         return _open(place, opening, clock, key, first_receipt, started, protocol)
     except BaseException:
         _unclaim(place, opening)
@@ -109,39 +135,37 @@ def begin(
 def first_words(
     protocol: Protocol,
     source: bytes,
-    participant: str,
+    start: SessionStart,
     *,
-    session: int,
-    seed: int,
-    operator: str,
-    language: str,
-    device: Mapping[str, Any],
-    screens: Mapping[str, Any],
-    simulated: bool,
-    pilot: bool,
-    recordings: bool,
     key_hash: str,
     measures_sealed: bool,
     clock: SessionClock,
+    allocation: Allocation | None = None,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the fields of a session's first line, and its receipt as it is before the first trial."""
     facts = {
-        "participant": participant,
-        "session": session,
+        "participant": start.participant,
+        "session": start.session,
         "study": protocol.study.name,
-        "seed": seed,
-        "language": language,
-        "operator": operator,
-        "simulated": simulated,
-        "pilot": pilot,
-        "recordings": recordings,
+        "seed": start.seed,
+        "language": start.language,
+        "operator": start.operator,
+        "simulated": start.simulated,
+        "pilot": start.pilot,
+        "recordings": start.recordings,
         "key_hash": key_hash,
         "protocol_hash": protocol_hash(source),
         "version": study_app.__version__,
     }
     limits = protocol.limits.model_dump(mode="json")
-    started = {"format": FORMAT, **facts, "device": device.get("name"), "limits": limits}
+    started = {"format": FORMAT, **facts, "device": start.device.get("name"), "limits": limits}
     started["measures_sealed"] = measures_sealed
+    if protocol.format > 1:
+        started["protocol_format"] = protocol.format
+    if any(block.design is not None for block in protocol.blocks.values()):
+        started["intervals"] = True
+    if allocation is not None:
+        started["entry"] = allocation.entry
     first_receipt = {
         "format": FORMAT,
         "status": receipt.UNFINISHED,
@@ -151,10 +175,24 @@ def first_words(
         "resumed": [],
         **facts,
         "generator": receipt.GENERATOR,
-        **surroundings(device, screens, clock),
+        **surroundings(start.device, start.screens, clock, start.motors_masked),
         "protocol": receipt.without_conditions(protocol),
     }
     return started, first_receipt
+
+
+def note_allocation(store: SessionStore) -> None:
+    """Journal the allocation of the session's participant, unless a session of the participant has done so."""
+    study, folder = store.place.study_folder, store.place.folder
+    if "entry" not in store.lines[0]:
+        return
+    sessions = [one for one in study.sessions() if one.participant == folder.participant]
+    known = [line for one in sessions if is_there(one.journal) for line in journal.scan(one.journal).lines]
+    if any(line["event"] == "allocated" for line in known):
+        return
+    allocation = allocate(study, store.key, folder.participant)
+    if allocation is not None:
+        store.append("allocated", entry=allocation.entry, sealed=allocation.sealed)
 
 
 def make_recorder(place: Place, start: Mapping[str, Any], clock: SessionClock) -> Recorder | None:
@@ -165,13 +203,20 @@ def make_recorder(place: Place, start: Mapping[str, Any], clock: SessionClock) -
     return Recorder(place.folder.recordings, {**facts, "origin_ns": clock.origin_ns}, waits=start["simulated"])
 
 
-def surroundings(device: Mapping[str, Any], screens: Mapping[str, Any], clock: SessionClock) -> dict[str, Any]:
+def surroundings(
+    device: Mapping[str, Any],
+    screens: Mapping[str, Any],
+    clock: SessionClock,
+    motors_masked: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
     """Return the receipt's part about what the session runs with, from its beginning or since it was resumed."""
+    asked = {} if motors_masked is None else {"motors_masked": dict(motors_masked)}
     return {
         "versions": receipt.versions(),
         "device": dict(device),
         "screens": dict(screens),
         "clock": {"origin_ns": clock.origin_ns, "origin_at": clock.at(0)},
+        **asked,
     }
 
 
@@ -216,7 +261,7 @@ def _sync_above(path: Path) -> None:
 def _unclaim(place: Place, opening: Opening) -> None:
     """Take the claimed folder away again in one step, and the participant's if it holds nothing else."""
     path = place.folder.path
-    away = beside(path)
+    away = temporary_path(path)
     with contextlib.suppress(OSError):
         path.rename(away)
     shutil.rmtree(away if is_there(away) else path, ignore_errors=True)
@@ -247,11 +292,14 @@ def _open(
     with contextlib.ExitStack() as failing:
         failing.callback(journal.close)
         store.append("session_started", t_s=0.0, **started)
+        note_allocation(store)
         store.write_tables()
         if store.behind is not None:
             raise store.behind
         write_participants(place.study_folder, place.study)
-        write_description(place.study_folder, protocol.study)
+        write_description(
+            place.study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions)
+        )
         for folder in (place.study_folder.path, place.study_folder.data):
             sweep_old(folder)
         failing.pop_all()

@@ -1,31 +1,31 @@
 """Who has a folder open: a marker in it while a program writes there, so that no second one does.
 
 Every opening has a marker of its own name, which says machine, process and when that process began; so a marker that a
-killed program left is told from a living one's, and can be taken away without meeting a newer one. A program puts its
+killed program left differs from a living one's, and can be removed without touching a newer one. A program puts its
 marker first and then looks for others: of two that come at once none or one goes on, never both.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import json
 import os
 import platform
 import re
 import secrets
-import sys
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
+
+import psutil
 
 from study_app.errors import StoreError
 from study_app.store.atomic import cannot_write, create_folder, is_there, sync_folder, write_file
 from study_app.store.journals.parsing import parse_json
 
 _MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")
-_BOOT = Path("/proc/sys/kernel/random/boot_id")
+SAME_S = 0.05  # processes of one number that began within this are the same one
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,56 +147,36 @@ def _lives(holder: dict[str, Any]) -> bool:
         return False
     if holder.get("host") != platform.node() or not isinstance(holder.get("pid"), int):
         return True
-    began = process_began(holder["pid"])
-    return began is not None and began == holder.get("began")
+    try:
+        began = process_began(holder["pid"])
+        return began is not None and abs(began - float(holder["began"])) < SAME_S
+    except (psutil.AccessDenied, KeyError, TypeError, ValueError):  # it runs; whether it is the same is not known
+        return True
 
 
-def process_began(process: int) -> str | None:
-    """Return what tells the running process of that number from all others that ever had it; None if none runs.
+def process_began(process: int) -> float | None:
+    """Return when the running process of that number began; None if none runs.
 
-    On Linux the boot and the time within it, on Windows the time; elsewhere there is no such word, and a process of the
-    same number passes for the same.
+    Parameters
+    ----------
+    process : int
+        Its number.
+
+    Returns
+    -------
+    float or None
+        [s], since the computer was started on Linux, where setting the clock moves the wall time of every process;
+        elsewhere since the epoch.
+
+    Raises
+    ------
+    psutil.AccessDenied
+        It runs, and belongs to somebody of whom this account may know nothing.
     """
-    if sys.platform == "win32":
-        return _began_on_windows(process)
-    else:
-        return _began_on_linux(process) if _BOOT.exists() else _began_elsewhere(process)
-
-
-def _began_on_linux(process: int) -> str | None:
     try:
-        after_name = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2]
-        boot = _BOOT.read_text(encoding="ascii").strip()
-    except OSError:
-        return None
-    state, *numbers = after_name.split()
-    return None if state in {"Z", "X"} else f"{boot} {numbers[18]}"
-
-
-def _began_elsewhere(process: int) -> str | None:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return None
-    except PermissionError:  # it runs, and is another user's
-        pass
-    return "unknown"
-
-
-if sys.platform == "win32":
-
-    def _began_on_windows(process: int) -> str | None:
-        kernel = ctypes.WinDLL("kernel32", use_last_error=True)
-        kernel.OpenProcess.restype = ctypes.c_void_p
-        query_limited_information, still_active = 0x1000, 259
-        handle = ctypes.c_void_p(kernel.OpenProcess(query_limited_information, False, process))
-        if not handle:
+        running = psutil.Process(process)
+        if running.status() in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD):
             return None
-        try:
-            code = ctypes.c_ulong()
-            times = [ctypes.c_ulonglong() for _ in range(4)]
-            running = kernel.GetExitCodeProcess(handle, ctypes.byref(code)) and code.value == still_active
-            known = kernel.GetProcessTimes(handle, *(ctypes.byref(moment) for moment in times))
-            return str(times[0].value) if running and known else None
-        finally:
-            kernel.CloseHandle(handle)
+        return running.create_time() - (psutil.boot_time() if psutil.LINUX else 0.0)
+    except psutil.NoSuchProcess:
+        return None

@@ -20,10 +20,9 @@ from study_app.store.checksums import write_checksums
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals.journal import Line
 from study_app.store.journals.journal_writer import Journal
-from study_app.store.recorder import Kept, Recorder, event_of, hashes_of
+from study_app.store.recorder import LEAVING_S, Kept, Recorder, event_of, hashes_of
 from study_app.store.sessions.folder_lock import Opening
 from study_app.store.tables import csv_files, session_tables
-from study_app.store.tables.columns import RESPONSES
 from study_app.store.tables.growing_tables import GrowingTables
 from study_app.store.tables.participants import write_participants
 from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
@@ -41,6 +40,7 @@ class Place:
 class SessionStore:
     """The open session: ``append`` adds to its journal, tables follow the journal, ``finish`` says how it ended.
 
+    ``journal`` is where events go, ``opening`` what keeps other programs out until it is released;
     ``key`` translates codes while the session runs; ``clock`` is the one the journal is stamped from; ``recorder``
     takes the trials' samples and frames, or is None in a session without recordings; ``behind`` is why the tables on
     disk are older than the journal, or None; ``fingerprint`` is empty until the session has ended. Made by `begin`; by
@@ -64,11 +64,11 @@ class SessionStore:
         self.recorder = recorder
         self.behind: StoreError | None = None
         self.fingerprint = ""
-        self._journal = journal
+        self.journal = journal
         self._receipt = session_receipt
-        self._opening = opening
+        self.opening = opening
         self._lines: list[Line] = list(lines)
-        self._tables = GrowingTables(*(place.folder.table(place.study, name) for name in ("responses", "trials")))
+        self._tables = GrowingTables(lambda name: place.folder.table(place.study, name))
         self._kept: list[Kept] = []
         self._over = False
 
@@ -94,22 +94,22 @@ class SessionStore:
         """
         if self._lines:
             fields = sealed(self._lines[0], event, fields, self.key)
-        self._lines.append(self._journal.append(event, t_s=t_s, waits=waits, **fields))
+        self._lines.append(self.journal.append(event, t_s=t_s, waits=waits, **fields))
 
     def check_flushed(self) -> None:
-        """Raise if lines that nobody waited for could not be flushed, and still are not on the disk.
+        """Raise if lines that were not waited for could not be flushed, and still are not on the disk.
 
         Raises
         ------
         StoreError
             Says why.
         """
-        self._journal.check_flushed()
+        self.journal.check_flushed()
 
     def write_tables(self) -> None:
         """Bring the session's tables up to date with its journal.
 
-        While the session runs only rows that changed are written, and nobody waits until the disk has them, for the
+        While the session runs only rows that changed are written, and nothing waits until the disk has them, for the
         participant waits for the next page; at its end the tables are written as wholes and flushed. A table that
         cannot be written now (open in another program, no space) stops no session: nothing is lost, since tables are
         made from the journal. ``behind`` says why, and the next call tries again. What became of recordings since the
@@ -117,7 +117,7 @@ class SessionStore:
         """
         try:
             self._keep_recordings()
-            self._tables.write(self._lines, opened_key(self.place.study_folder), whole=self._journal.closed)
+            self._tables.write(self._lines, opened_key(self.place.study_folder), whole=self.journal.closed)
         except StoreError as error:
             self.behind = error
         else:
@@ -131,12 +131,12 @@ class SessionStore:
         StoreError
             One of them could not be written; what was journalled before is safe. Called again, it goes on from there.
         """
-        if self._over or not self._journal.closed:
+        if self._over or not self.journal.closed:
             if self.recorder is not None:
                 self.recorder.close()
             self._keep_recordings()
             self.append("session_ended", status=status, reason=reason)
-            self._journal.close()
+            self.journal.close()
             self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1]["at"]}
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
@@ -145,7 +145,7 @@ class SessionStore:
                 write()
             except StoreError as error:
                 failures.append(error)
-        self._opening.release()
+        self.opening.release()
         if failures:
             raise failures[0]
         self._over = True
@@ -160,14 +160,14 @@ class SessionStore:
         """
         self._over = True
         if self.recorder is not None:
-            self.recorder.close()
-        if not self._journal.closed:
+            self.recorder.close(LEAVING_S)
+        if not self.journal.closed:
             with contextlib.suppress(StoreError):  # `reopen` finds the files that no line tells of
                 self._keep_recordings()
         try:
-            self._journal.close()
+            self.journal.close()
         finally:
-            self._opening.release()
+            self.opening.release()
 
     def note_resumed(self, what: Mapping[str, Any]) -> None:
         """Add to the receipt what the session goes on with.
@@ -222,8 +222,8 @@ def table_files(place: Place, lines: Sequence[Line], key: Key | None) -> tuple[t
     """
     lines = opened(lines, key)
     rows = session_tables.SessionRows(lines)
-    columns = session_tables.trial_columns(lines, opened=key is not None)
-    return (
-        (place.folder.table(place.study, "responses"), csv_files.csv_bytes(RESPONSES, rows.responses)),
-        (place.folder.table(place.study, "trials"), csv_files.csv_bytes(columns, rows.trials)),
+    columns = session_tables.table_columns(lines, opened=key is not None)
+    return tuple(
+        (place.folder.table(place.study, name), csv_files.csv_bytes(held, rows.table(name)))
+        for name, held in columns.items()
     )

@@ -31,8 +31,8 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
         )
     if not pilot and participant.lower() in RESERVED_IDS:
         raise StoreError(
-            f"participant id {participant!r} is kept for pilot sessions, so that no trial run lands among the data: "
-            "use an id such as P007"
+            f"participant id {participant!r} is reserved for pilot sessions, which are stored separately: use an id "
+            "such as P007"
         )
 
 
@@ -72,7 +72,8 @@ class UsedIds:
         for used in self.ids:
             if used != participant and used.lower() == participant.lower():
                 raise StoreError(
-                    f"participant id {participant!r} differs from the used {used!r} in capitals alone: use {used!r} "
+                    f"participant id {participant!r} differs from the used {used!r} only in capitalisation: use "
+                    f"{used!r} "
                     "with a new session number, or another id"
                 )
         if (participant, number) in self.held:
@@ -109,16 +110,11 @@ def refuse_never_begun(session: SessionFolder) -> None:
     """
     if abandoned(session.path):
         raise StoreError(
-            f"{session.path} was claimed, and its program was ended before the session began, so that nothing can go "
-            f"on: begin it as a new session of participant {session.participant}, number {session.number} (run)"
+            f"{session.path} was created, but the program ended before the session began, so it cannot be resumed: "
+            f"begin a new session of participant {session.participant}, number {session.number} (run)"
         )
 
 
 def used_id(folder: StudyFolder, participant: str, number: int) -> StoreError:
     """Return the refusal of a used id, with the three ways to go on."""
     return used_ids(folder).refusal(participant, number)
-
-
-def suggest_id(folder: StudyFolder) -> str:
-    """Return the next free id (see `UsedIds.suggested`)."""
-    return used_ids(folder).suggested()

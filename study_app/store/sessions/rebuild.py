@@ -44,7 +44,7 @@ def rebuild(session_folder: Path) -> Rebuilt:
     Raises
     ------
     StoreError
-        It is no session's folder, open in another program, or its journal is empty, damaged or tells less than the
+        It is not a session folder, open in another program, or its journal is empty, damaged or tells less than the
         session's other files; or a file cannot be written.
     """
     study_folder, folder = locate(session_folder)
@@ -59,7 +59,7 @@ def rebuild(session_folder: Path) -> Rebuilt:
         tables = table_files(place, contents.lines, opened_key(study_folder))
         rewritten = [path for path, content in tables if _renew(path, content)]
         rewritten += _renew_receipt(folder, contents.lines)
-        write_participants(study_folder, place.study)
+        write_participants(study_folder, place.study, whole=True)
         rewritten += [table] if _content(table) != before else []
         ended = contents.lines[-1]["event"] == "session_ended"
         if ended:

@@ -28,9 +28,9 @@ from study_app.store.journals import journal
 from study_app.store.journals.cut_journal import refuse_if_cut
 from study_app.store.journals.journal import Contents, Line
 from study_app.store.journals.journal_writer import Journal
-from study_app.store.progress import attempts, progress_of
+from study_app.store.progress import progress_of, recordable
 from study_app.store.recorder import Lost, Recorded, event_of, recording_files
-from study_app.store.sessions.begin import make_recorder, surroundings
+from study_app.store.sessions.begin import make_recorder, note_allocation, surroundings
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
 from study_app.store.sessions.open_session import Place, SessionStore
 from study_app.store.sessions.participant_ids import refuse_never_begun
@@ -50,6 +50,7 @@ def reopen(
     operator: str,
     device: Mapping[str, Any],
     screens: Mapping[str, Any],
+    motors_masked: Mapping[str, Any] | None = None,
     now_ns: Callable[[], int] = time.monotonic_ns,
     now: datetime | None = None,
 ) -> SessionStore:
@@ -57,12 +58,24 @@ def reopen(
 
     A torn tail of the journal is moved to a file of its own, half-written files are taken away, and
     ``session_resumed`` is journalled with the gap since the last line (null where the wall clock was set back or
-    is wrong by years, so that nobody knows). The session's clock goes on from there, so that its times never go back.
+    is wrong by years). The session's clock goes on from there, so that its times never go back.
 
     Parameters
     ----------
+    session_folder : Path
+        The session's ``ses-NN`` folder.
+    protocol : Protocol
+        What is run.
     source : bytes
         The protocol's file as it is; its hash must be the one the session began with.
+    operator : str
+        Who goes on with the session.
+    device : mapping
+        Description for the receipt.
+    screens : mapping
+        Description for the receipt.
+    motors_masked : mapping, optional
+        How the motors of the device are masked, for the receipt; None where that was not asked.
     now_ns : callable
         The monotonic clock [ns] to go on with: the servo's.
     now : datetime, optional
@@ -71,7 +84,7 @@ def reopen(
     Raises
     ------
     StoreError
-        It is no session's folder, open in another program, finished, damaged, with a journal that tells less than the
+        It is not a session folder, open in another program, finished, damaged, with a journal that tells less than the
         other files, or of another protocol (the differences are named where they are not blinded); the key is not
         in order; or the folder cannot be written. But for the torn tail nothing has changed then.
     """
@@ -88,7 +101,7 @@ def reopen(
         opening.release()
         raise
     store = SessionStore(left.place, opened, left.key, left.receipt, opening, lines=contents.lines, recorder=recorder)
-    told: dict[str, Any] = {"gap_s": gap_s, "operator": operator}
+    gap: dict[str, Any] = {"gap_s": gap_s, "operator": operator}
     with contextlib.ExitStack() as failing:
         failing.callback(store.close)
         at_s = round(clock.seconds(), 6)
@@ -97,13 +110,14 @@ def reopen(
             "device": device.get("name"),
             "version": study_app.__version__,
         }
-        store.append("session_resumed", t_s=at_s, **told, **facts)
+        store.append("session_resumed", t_s=at_s, **gap, **facts)
+        note_allocation(store)
         _sweep(folder)
         for event, fields in _recordings_found(folder, contents.lines) if left.start.get("recordings") else ():
             store.append(event, **fields)
-        store.note_resumed({"at": clock.at(at_s), **told, **surroundings(device, screens, clock)})
+        store.note_resumed({"at": clock.at(at_s), **gap, **surroundings(device, screens, clock, motors_masked)})
         store.write_tables()
-        write_description(study_folder, protocol.study)
+        write_description(study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions))
         write_participants(study_folder, left.place.study)
         failing.pop_all()
     return store
@@ -129,7 +143,7 @@ def sealed_source(session_folder: Path, source: bytes) -> bytes:
     Raises
     ------
     StoreError
-        It is no session's folder.
+        It is not a session folder.
     """
     study_folder, _ = locate(session_folder)
     try:
@@ -157,7 +171,7 @@ def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, 
     place = Place(study_folder, folder, start["study"])
     first = receipt.read(folder.receipt)
     if receipt.other_format(first, start):
-        raise StoreError(f"{folder.journal} has another format than its receipt says: restore it from a copy")
+        raise StoreError(f"{folder.journal} has another format than its receipt states: restore it from a copy")
     refuse_if_cut(place, contents.lines)
     _same_protocol(place, first, start, protocol, source)
     draw = stream(start["seed"], "blinding").random if start["simulated"] else None
@@ -168,12 +182,13 @@ def _unfinished(folder: SessionFolder, lines: list[Line]) -> Line:
     """Return the first line of a session that can go on."""
     if not lines:
         raise StoreError(
-            f"{folder.journal} holds no line: the program ended before the session had begun; use a new session number"
+            f"{folder.journal} has no line: the program ended before the session began; use a new session number"
         )
     done = progress_of(lines)
     if done.ended is not None:
         raise StoreError(
-            f"{folder.path} is finished ({done.ended}): it cannot go on; use a new session number for another visit"
+            f"{folder.path} is finished ({done.ended}) and cannot be resumed; use a new session number for another "
+            "visit"
         )
     return done.start
 
@@ -186,12 +201,12 @@ def _same_protocol(place: Place, first: Mapping[str, Any], start: Line, protocol
     if not same_conditions(place.study_folder.path, protocol):
         found.append(CONDITIONS_DIFFER)
     if not found:
-        found.append("comments, order or notation, nothing that is run")
+        found.append("only comments, order or notation")
     listed = "; ".join(found[:SHOWN_DIFFERENCES])
     more = f"; and {len(found) - SHOWN_DIFFERENCES} more" if len(found) > SHOWN_DIFFERENCES else ""
     raise StoreError(
-        f"{place.folder.path} began with another protocol file and goes on with that one only: put it back, or use a "
-        f"new session number. What differs: {listed}{more}"
+        f"{place.folder.path} began with another protocol file and can be resumed only with that one: restore it, "
+        f"or use a new session number. Differences: {listed}{more}"
     )
 
 
@@ -217,18 +232,19 @@ def _recordings_found(folder: SessionFolder, lines: list[Line]) -> Iterator[tupl
         recording_files as recording,
     )
 
-    told = {(line["trial"], line["attempt"]) for line in lines if line["event"] in ("recorded", "recording_lost")}
-    for trial, attempt in attempts(lines):
-        if (trial, attempt) in told:
+    events = ("recorded", "recording_lost")
+    known = {(line["trial"], line["attempt"], line.get("interval")) for line in lines if line["event"] in events}
+    for trial, attempt, interval in recordable(lines):
+        if (trial, attempt, interval) in known:
             continue
-        samples, frames = recording_files(folder.recordings, trial, attempt)
+        samples, frames = recording_files(folder.recordings, trial, attempt, interval)
         try:
             facts = recording.read_facts(samples)
             shown = recording.Written(frames, recording.read_facts(frames)["rows"], sha256(frames))
             felt = recording.Written(samples, facts["rows"], sha256(samples))
-            yield event_of(Recorded(trial, attempt, felt, shown, facts["dropped"]))
+            yield event_of(Recorded(trial, attempt, felt, shown, facts["dropped"], interval))
         except StoreError:
             if not is_there(samples):  # frames are put in their place first, and are no recording alone
                 with contextlib.suppress(OSError):
                     frames.unlink(missing_ok=True)
-            yield event_of(Lost(trial, attempt, "the program ended before it was whole"))
+            yield event_of(Lost(trial, attempt, "the program ended before it was complete", interval))

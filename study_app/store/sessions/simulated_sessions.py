@@ -14,17 +14,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.liquid_files import unbundled
 from study_app.store.atomic import cannot_write, create_folder
+from study_app.store.blinded.allocation import allocate
 from study_app.store.blinded.blinding import open_or_draw_key, reveals
 from study_app.store.blinded.sealing import opened, opened_key, sealed
 from study_app.store.checksums import checksum_bytes
 from study_app.store.clock import SessionClock
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import Line, line_bytes, line_of, plain
-from study_app.store.sessions.begin import first_words, make_folder
+from study_app.store.sessions.begin import SessionStart, first_words, make_folder
 from study_app.store.sessions.folder_lock import Opening, open_alone
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.sessions.participant_ids import check_participant, check_unused, used_id
@@ -41,11 +43,20 @@ class SimulatedStudy:
 
     Parameters
     ----------
-    results : study folder
-    source : the protocol's file as it is, hashed into the receipts
-    participants : ids of all that are to come; none may be used
-    seed : of the sessions and of the key
-    device, screens : descriptions for the receipts
+    results : Path
+        The study folder.
+    protocol : Protocol
+        What is answered.
+    source : bytes
+        The protocol's file as it is, hashed into the receipts.
+    participants : tuple of str
+        Ids of all that are to come; none may be used.
+    seed : int
+        Of the sessions and of the key.
+    device : mapping
+        Description for the receipts.
+    screens : mapping
+        Description for the receipts.
 
     Raises
     ------
@@ -76,21 +87,20 @@ class SimulatedStudy:
         self.protocol = protocol
         self._rows: dict[Path, csv_files.Row] = {}
         self._opening: Opening | None = None
-        self._told: dict[str, Any] = {
-            "session": 1,
-            "seed": seed,
-            "operator": "",
-            "language": protocol.study.languages[0],
-            "device": dict(device),
-            "screens": dict(screens),
-            "simulated": True,
-            "pilot": False,
-            "recordings": False,
-            "key_hash": self.key.hash,
-            "measures_sealed": not reveals(self.folder.path),
-        }
-        started, receipt = first_words(protocol, source, "", **self._told, clock=SessionClock())
-        self.started, self._receipt = started, plain(receipt)
+        start = SessionStart(
+            "",
+            seed=seed,
+            operator="",
+            language=protocol.study.languages[0],
+            device=device,
+            screens=screens,
+            simulated=True,
+        )
+        sealed_measures = not reveals(self.folder.path)
+        self.started, receipt = first_words(
+            protocol, source, start, key_hash=self.key.hash, measures_sealed=sealed_measures, clock=SessionClock()
+        )
+        self._receipt = plain(receipt)
 
     def begin(self, participant: str, clock: SessionClock) -> SimulatedSession:
         """Return the session of a participant, of which nothing is on the disk before it is finished."""
@@ -105,10 +115,10 @@ class SimulatedStudy:
             Another program was first, or it cannot be written.
         """
         place, lines, key = session.place, session.lines, opened_key(self.folder)
-        told = {"participant": place.folder.participant, "started_at": session.clock.at(0)}
+        identity = {"participant": place.folder.participant, "started_at": session.clock.at(0)}
         ended = {"status": lines[-1]["status"], "reason": lines[-1]["reason"], "ended_at": lines[-1]["at"]}
         clock = {"origin_ns": session.clock.origin_ns, "origin_at": session.clock.at(0)}
-        text = json.dumps({**self._receipt, **told, **ended, "clock": clock}, indent=2, ensure_ascii=False)
+        text = json.dumps({**self._receipt, **identity, **ended, "clock": clock}, indent=2, ensure_ascii=False)
         files = {
             place.folder.journal.name: bytes(session.content),
             place.folder.receipt.name: f"{text}\n".encode("utf-8", "backslashreplace"),
@@ -128,7 +138,12 @@ class SimulatedStudy:
     def __enter__(self) -> Self:
         """Describe the study, so that its folder is known for what it is from the first session on."""
         self._opening = open_alone(self.folder.path)
-        write_description(self.folder, self.protocol.study)
+        write_description(
+            self.folder,
+            self.protocol.study,
+            self.protocol.format,
+            intervals=bool(self.protocol.design_questions),
+        )
         return self
 
     def __exit__(
@@ -143,7 +158,10 @@ class SimulatedStudy:
 
 
 class SimulatedSession:
-    """One session while it is simulated: takes what ``open_session.SessionStore`` takes, and keeps it until its end."""
+    """One session while it is simulated: takes what ``open_session.SessionStore`` takes, and keeps it until its end.
+
+    ``protocol`` is that of the session: in a study with groups, with the steps of the participant's group.
+    """
 
     def __init__(self, study: SimulatedStudy, participant: str, clock: SessionClock) -> None:
         name = study.protocol.study.name
@@ -153,7 +171,12 @@ class SimulatedSession:
         self.content = bytearray()  # of the journal
         self._hash = hashlib.sha256()
         self._study = study
-        self.append("session_started", t_s=0.0, **{**study.started, "participant": participant})
+        allocation = allocate(study.folder, study.key, participant, waits=False)
+        self.protocol = own_protocol(study.protocol, None if allocation is None else allocation.group, 1)
+        entry = {} if allocation is None else {"entry": allocation.entry}
+        self.append("session_started", t_s=0.0, **{**study.started, "participant": participant, **entry})
+        if allocation is not None:
+            self.append("allocated", entry=allocation.entry, sealed=allocation.sealed)
 
     def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
         """Keep a line of the journal; ``t_s`` is when it happened, by default now."""

@@ -1,7 +1,7 @@
 """Sessions that were claimed and never begun: their program was ended before the journal's first line.
 
 Nothing happened in them, so their number is free again. Who takes one over has it open first, as every other folder.
-A program that is ended while it claims a session, or lets go of it, leaves a hidden folder beside it.
+A program that is ended while it claims a session, or lets go of it, leaves a hidden folder next to it.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def take_over(path: Path) -> Opening | None:
 def sweep_claims(participant: Path) -> None:
     """Take away what programs that are gone left in a participant's folder as they claimed a session or let go of it.
 
-    Without a program's marker nobody knows whose it is; then only what is older than any such moment.
+    Without a program's marker its owner is unknown; then only what is older than any such moment.
     """
     for half in temporaries(participant):
         with contextlib.suppress(OSError):  # it has just become a session, or is gone

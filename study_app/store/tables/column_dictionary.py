@@ -9,16 +9,35 @@ import sys
 from collections.abc import Sequence
 
 from study_app.store.journals.journal_events import EVENTS
-from study_app.store.tables.columns import EXCLUSIONS, MISSING, PARTICIPANTS, RESPONSES, TRIALS, Column
+from study_app.store.tables.column import MISSING, Column
+from study_app.store.tables.columns import EXCLUSIONS, INTERVALS, PARTICIPANTS, RESPONSES, RESPONSES_2, TRIALS, TRIALS_2
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
 
 SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
-    ("Responses", "subject-…_description-responses_data.csv", "a row a response", RESPONSES),
-    ("Trials", "subject-…_description-trials_data.csv", "a row a presentation of a trial", TRIALS),
-    ("Participants", "study-…_description-participants_data.csv", "a row a session", PARTICIPANTS),
-    ("Exclusions", "exclusions.csv", "a row a session or trial that the analysis leaves out", EXCLUSIONS),
-    ("Samples", "recordings/trial-….parquet", "a row a turn of the servo", SAMPLES),
-    ("Frames", "recordings/trial-…_frames.parquet", "a row a frame shown", FRAMES),
+    ("Responses", "subject-…_description-responses_data.csv", "one row per response", RESPONSES),
+    (
+        "Responses, format 2",
+        "subject-…_description-responses_data.csv",
+        "one row per response, if the protocol has format 2",
+        RESPONSES_2,
+    ),
+    ("Trials", "subject-…_description-trials_data.csv", "one row per presentation of a trial", TRIALS),
+    (
+        "Intervals",
+        "subject-…_description-intervals_data.csv",
+        "one row per interval, in a study with designs",
+        INTERVALS,
+    ),
+    ("Participants", "study-…_description-participants_data.csv", "one row per session", PARTICIPANTS),
+    (
+        "Trials and participants, format 2",
+        "…_description-trials_data.csv, …_description-participants_data.csv",
+        "what differs in trials if the protocol has format 2; participants have the group, too",
+        tuple(column for column in TRIALS_2 if column not in TRIALS),
+    ),
+    ("Exclusions", "exclusions.csv", "one row per excluded session or trial", EXCLUSIONS),
+    ("Samples", "recordings/trial-….parquet", "one row per tick of the servo", SAMPLES),
+    ("Frames", "recordings/trial-…_frames.parquet", "one row per frame shown", FRAMES),
 )
 """Title, file, what a row of it is, and its columns."""
 
@@ -52,7 +71,7 @@ def _journal() -> str:
     rows = [
         f"| `{event.name}` | {listed} | {event.description} |" for event, listed in zip(EVENTS, fields, strict=True)
     ]
-    return _folded("Journal", "journal.jsonl", "a line an event", (*head, *rows))
+    return _folded("Journal", "journal.jsonl", "one line per event", (*head, *rows))
 
 
 def _kind(column: Column) -> str:

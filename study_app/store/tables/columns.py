@@ -7,75 +7,57 @@ name mean the same in every table.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias
+from dataclasses import replace
 
 from study_app.haptics.model.layout import LIMITER_NAMES
-
-Kind: TypeAlias = Literal["text", "integer", "number", "flag", "time"]
-
-MISSING = "n/a"
-
-
-@dataclass(frozen=True, slots=True)
-class Column:
-    """One column: its name, what its cells are, and what they mean.
-
-    ``kind``: flags are ``true`` or ``false``, times ISO 8601 with zone. ``levels`` are all permitted values where
-    these are few, each with its meaning. Where ``may_miss``, a cell can be ``n/a``. A ``sealed`` column can tell the
-    condition: no table has it before the study's key was opened.
-    """
-
-    name: str
-    kind: Kind
-    description: str
-    unit: str = ""
-    levels: tuple[tuple[str, str], ...] = ()
-    minimum: float | None = None
-    maximum: float | None = None
-    may_miss: bool = False
-    sealed: bool = False
-
-
-_STUDY = Column("study", "text", "Short name of the study, from its protocol.")
-_PARTICIPANT = Column("participant", "text", "The participant's id: letters and digits, no name.")
-_SESSION = Column("session", "integer", "Number of the participant's session.", minimum=1, maximum=99)
-_SIMULATED = Column("simulated", "flag", "true where participant and device were simulated (a rehearsal).")
-_PILOT = Column("pilot", "flag", "true where the session was a pilot.")
-_TRIAL = Column("trial", "integer", "Number of the trial in the session, in the order of presentation.", minimum=1)
-_ATTEMPT = Column(
-    "attempt", "integer", "1, or higher where the trial was presented again; the highest counts.", minimum=1
+from study_app.store.tables.column import Column
+from study_app.store.tables.identity_columns import (
+    ATTEMPT,
+    BLOCK,
+    CODE,
+    INDEX,
+    PART,
+    PARTICIPANT,
+    PHASE,
+    PILOT,
+    SESSION,
+    SIMULATED,
+    STUDY,
+    TRIAL,
 )
-_BLOCK = Column("block", "text", "Id of the block of trials.")
-_PHASE = Column(
-    "phase",
-    "text",
-    "What the trial is for; only main trials are analysed.",
-    levels=(
-        ("main", "counts"),
-        ("practice", "learning the task"),
-        ("baseline", "the undisturbed task that later statements compare with"),
-    ),
-)
-_PART = Column("part", "integer", "Part of the study as the participant is told it.", minimum=1, may_miss=True)
-_INDEX = Column("index", "integer", "Place of the trial in its block, from 1.", minimum=1)
-_CODE = Column("code", "text", "What was presented, as a code (L1, D3 ...) that the sealed key translates.")
+
+
+def _measure(name: str, description: str, unit: str = "", *, sealed: bool = False) -> Column:
+    return Column(name, "number", description, unit, minimum=0, may_miss=True, sealed=sealed)
+
+
+def _signed(name: str, description: str, unit: str = "") -> Column:
+    return Column(name, "number", description, unit, may_miss=True, sealed=True)
+
+
+def _count(name: str, description: str, *, sealed: bool = False) -> Column:
+    return Column(name, "integer", description, minimum=0, may_miss=True, sealed=sealed)
+
+
+def _delay_error(name: str, which: str) -> Column:
+    return Column(name, "number", f"Visual delay, achieved minus requested: {which}.", "ms", may_miss=True, sealed=True)
+
 
 RESPONSES: tuple[Column, ...] = (
-    _STUDY,
-    _PARTICIPANT,
-    _SESSION,
-    _SIMULATED,
-    _PILOT,
-    _TRIAL,
-    _ATTEMPT,
-    _BLOCK,
-    _PHASE,
-    _PART,
-    _INDEX,
-    _CODE,
-    Column("item", "text", "Id of the statement; its words are in the session's receipt."),
-    Column("number", "integer", "Place of the statement on its page, from 1, as shown.", minimum=1),
+    STUDY,
+    PARTICIPANT,
+    SESSION,
+    SIMULATED,
+    PILOT,
+    TRIAL,
+    ATTEMPT,
+    BLOCK,
+    PHASE,
+    PART,
+    INDEX,
+    CODE,
+    Column("item", "text", "Id of the statement; its text is in the session's receipt."),
+    Column("number", "integer", "Position of the statement on its page, from 1.", minimum=1),
     Column(
         "response",
         "integer",
@@ -84,39 +66,39 @@ RESPONSES: tuple[Column, ...] = (
         maximum=7,
         may_miss=True,
     ),
-    Column("cannot_judge", "flag", "true where the participant chose the answer off the scale."),
-    Column("onset_s", "number", "When the statement was shown, on the session's clock.", "s", minimum=0, may_miss=True),
-    Column(
-        "first_choice_s",
-        "number",
-        "When an answer was first chosen, on the session's clock.",
-        "s",
-        minimum=0,
-        may_miss=True,
-    ),
-    Column(
-        "last_change_s",
-        "number",
-        "When the final answer was chosen, on the session's clock.",
-        "s",
-        minimum=0,
-        may_miss=True,
-    ),
-    Column("changes", "integer", "How often an answer already chosen was changed.", minimum=0),
-    Column("answered_at", "time", "When the page of statements was confirmed."),
+    Column("cannot_judge", "flag", "true if the participant chose the answer off the scale."),
+    _measure("onset_s", "Time when the statement was shown, on the session's clock.", "s"),
+    _measure("first_choice_s", "Time when an answer was first chosen, on the session's clock.", "s"),
+    _measure("last_change_s", "Time when the final answer was chosen, on the session's clock.", "s"),
+    Column("changes", "integer", "How often the answer was changed.", minimum=0),
+    Column("answered_at", "time", "Time when the page of statements was confirmed."),
 )
 
 
-def _measure(name: str, description: str, unit: str = "", *, sealed: bool = False) -> Column:
-    return Column(name, "number", description, unit, minimum=0, may_miss=True, sealed=sealed)
+_RESPONSES_BY_NAME = {column.name: column for column in RESPONSES}
 
-
-def _count(name: str, description: str, *, sealed: bool = False) -> Column:
-    return Column(name, "integer", description, minimum=0, may_miss=True, sealed=sealed)
-
-
-def _delay_error(name: str, which: str) -> Column:
-    return Column(name, "number", f"Visual delay, achieved less requested: {which}.", "ms", may_miss=True, sealed=True)
+RESPONSES_2: tuple[Column, ...] = (
+    STUDY,
+    PARTICIPANT,
+    SESSION,
+    SIMULATED,
+    PILOT,
+    Column("form", "text", "Id of the questionnaire that was presented on its own; n/a after a trial.", may_miss=True),
+    *(replace(column, may_miss=True) for column in (TRIAL, ATTEMPT, BLOCK, PHASE, PART, INDEX, CODE)),
+    replace(_RESPONSES_BY_NAME["item"], description="Id of the question; its words are in the session's receipt."),
+    Column("kind", "text", "Kind of the question: statement, rating, slider, number, choice, text."),
+    replace(_RESPONSES_BY_NAME["number"], description="Place of the question on its page, from 1, as shown."),
+    Column(
+        "response",
+        "text",
+        "The answer: a point of the scale, a number, the id of an option (of several, with spaces between), or a text.",
+        may_miss=True,
+    ),
+    Column("value", "number", "The answer as a number, where it is one.", may_miss=True),
+    *(_RESPONSES_BY_NAME[name] for name in ("cannot_judge", "onset_s", "first_choice_s", "last_change_s", "changes")),
+    _RESPONSES_BY_NAME["answered_at"],
+)
+"""Responses of a study of format 2."""
 
 
 _LIMITERS = {
@@ -127,27 +109,27 @@ _LIMITERS = {
     "slew": "the change of force was slowed",
     "fade": "the force was fading in or out",
     "stale": "the device had no new sample in time",
-    "glitch": "a sample was refused as impossible",
+    "glitch": "a sample was rejected as implausible",
     "stop": "the force was stopped",
     "estimator": "EWMA gave the velocity, because the Kalman filter's innovations were too large or the delay changed",
 }
 
 TRIALS: tuple[Column, ...] = (
-    _STUDY,
-    _PARTICIPANT,
-    _SESSION,
-    _SIMULATED,
-    _PILOT,
-    _TRIAL,
-    _ATTEMPT,
-    _BLOCK,
-    _PHASE,
-    _PART,
-    _INDEX,
+    STUDY,
+    PARTICIPANT,
+    SESSION,
+    SIMULATED,
+    PILOT,
+    TRIAL,
+    ATTEMPT,
+    BLOCK,
+    PHASE,
+    PART,
+    INDEX,
     Column("of", "integer", "Number of trials in the block.", minimum=1),
-    _CODE,
-    Column("trial_started_at", "time", "When the trial began."),
-    Column("trial_started_s", "number", "When the trial began, on the session's clock.", "s", minimum=0),
+    CODE,
+    Column("trial_started_at", "time", "Time when the trial began."),
+    Column("trial_started_s", "number", "Time when the trial began, on the session's clock.", "s", minimum=0),
     Column(
         "outcome",
         "text",
@@ -155,112 +137,171 @@ TRIALS: tuple[Column, ...] = (
         levels=(
             ("complete", "the task was done"),
             ("timeout", "the task's time ran out"),
-            ("interrupted", "stopped before its end: paused, repeated, broken off, or the program ended"),
+            ("interrupted", "stopped early: paused, repeated, cancelled, or the program ended"),
         ),
         may_miss=True,
     ),
     _measure(
-        "duration_s", "From the trial's first painted frame to the task's end, on the device's clock.", "s", sealed=True
+        "duration_s",
+        ("Time from the trial's first painted frame to the end of the task, on the device's clock."),
+        "s",
+        sealed=True,
     ),
-    _count("targets_reached", "Targets reached.", sealed=True),
-    _count("targets", "Targets to be reached; n/a where the task has none or no fixed number."),
+    _count("targets_reached", "Number of targets reached.", sealed=True),
+    _count("targets", "Number of targets to reach; n/a if the task has none or no fixed number."),
     _count("ticks", "Ticks of the servo during the trial.", sealed=True),
-    _measure("tick_rate_hz", "Rate of the servo, achieved.", "Hz"),
+    _measure("tick_rate_hz", "Achieved rate of the servo.", "Hz"),
     _measure("lateness_p99_ms", "Lateness of the servo's ticks, 99th percentile.", "ms"),
     _measure("worst_gap_ms", "Longest time between two ticks of the servo.", "ms"),
     _count("overruns", "Deadlines of the servo that were skipped because a tick took too long."),
-    _count("samples_dropped", "Samples of the telemetry that were overwritten before they were read."),
+    _count("samples_dropped", "Telemetry samples that were overwritten before they were read."),
     _measure("path_length_m", "Length of the hand's path.", "m", sealed=True),
     _measure("mean_speed_mps", "Mean speed of the hand.", "m/s", sealed=True),
     _measure("force_mean_n", "Mean magnitude of the force sent to the device.", "N", sealed=True),
     _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N", sealed=True),
     _measure(
         "withheld_share",
-        "Share of the force that passivity controller, slew limit and device withheld in the task: 0.05 is 5 %.",
+        "Share of the force that passivity controller, slew limit and device withheld during the task; 0.05 is 5 %.",
         sealed=True,
     ),
-    _count("loop_delay_ticks", "Ticks from a command of the servo until its force acts, the most in the task."),
-    _count("loop_delay_changes", "How often that number of ticks changed in the task."),
+    _count("loop_delay_ticks", "Ticks from a command of the servo until its force acts; maximum during the task."),
+    _count("loop_delay_changes", "How often that delay changed during the task."),
     *(
         _count(f"limiter_{name}", f"Ticks of the servo in which {_LIMITERS[name]}.", sealed=True)
         for name in LIMITER_NAMES
     ),
     _count("frames", "Frames shown to the participant.", sealed=True),
-    _count("frames_late", "Frames whose delay was more than the limit over the one asked for.", sealed=True),
+    _count("frames_late", "Frames whose delay exceeded the requested delay by more than the limit.", sealed=True),
     _delay_error("delay_error_mean_ms", "mean"),
     _delay_error("delay_error_p95_ms", "95th percentile"),
     _delay_error("delay_error_max_ms", "largest"),
     _measure(
         "first_frame_gap_ms",
-        "From the trial's beginning to its first painted frame, with which force and task begin.",
+        "Time from the start of the trial to its first painted frame, when force and task begin.",
         "ms",
     ),
     _measure(
-        "worst_frame_gap_ms", "Longest time that one frame stood before the next was shown or the task ended.", "ms"
+        "worst_frame_gap_ms",
+        ("Longest time between two frames, or between the last frame and the end of the task."),
+        "ms",
     ),
     Column(
         "valid",
         "flag",
-        "true where the trial kept the protocol's limits of lateness, gaps, delay error and force withheld; until "
-        "unblinding those of lateness and gaps.",
+        "true if the trial met the protocol's limits of lateness, gaps, delay error and withheld force; until "
+        "unblinding, only those of lateness and gaps.",
         may_miss=True,
     ),
     Column(
         "recording",
         "text",
-        "File of the trial's samples, in the session's folder; n/a where none was kept.",
+        "File of the trial's samples, in the session's folder; n/a if none was stored.",
         may_miss=True,
     ),
     Column(
         "recording_frames",
         "text",
-        "File of the frames shown, in the session's folder; n/a where none was kept.",
+        "File of the frames shown, in the session's folder; n/a if none was stored.",
         may_miss=True,
     ),
-    _count("samples_recorded", "Samples in the recording."),
-    _count("samples_unrecorded", "Samples that the recording lacks, since the disk did not keep up."),
+    _count("samples_recorded", "Number of samples in the recording."),
+    _count("samples_unrecorded", "Number of samples missing from the recording because the disk was too slow."),
     Column(
         "recording_lost",
         "text",
-        "Why the trial's recording could not be kept; n/a where it was, or where none was to be.",
+        "Why the trial's recording could not be stored; n/a if it was stored or not requested.",
         may_miss=True,
     ),
-    Column("marked", "flag", "true where the operator marked the trial."),
+    Column("marked", "flag", "true if the operator marked the trial."),
     Column(
         "notes",
         "text",
-        "The operator's notes from this trial's beginning to the next one's, why it was repeated, and how its device "
-        "failed, one a line.",
+        "The operator's notes from the start of this trial to the start of the next, the reason of a repetition, "
+        "and failures of the device, one per line.",
         may_miss=True,
     ),
 )
 
+_INVALID = (
+    "invalid",
+    "an interval was not delivered as requested: nothing was asked, and the trial was presented again",
+)
+_TRIALS_BY_NAME = {
+    column.name: replace(column, levels=(*column.levels, _INVALID)) if column.name == "outcome" else column
+    for column in TRIALS
+}
+_NOT_OF_INTERVALS = ("of", "trial_started_at", "trial_started_s", "marked", "notes")
+_LEVEL = "distance of the comparison from its standard, or the value itself, as the protocol asks"
+
+_OUTCOME = [column.name for column in TRIALS].index("outcome")
+
+DELIVERED: tuple[Column, ...] = (
+    _signed(
+        "value_delivered",
+        "The varied number as delivered, in its unit: a damping as fitted at the hand; another number of the liquid as "
+        "requested; n/a for a delay, whose error is in delay_error_mean_ms.",
+    ),
+    _signed(
+        "force_share", "Share of the force model's force that was sent to the hand, after the lead; 1 is all of it."
+    ),
+    _signed("apparent_mass_kg", "Apparent mass of the fitted force, in addition to its damping.", "kg"),
+    _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True),
+)
+"""What an interval delivered."""
+
+INTERVALS: tuple[Column, ...] = (
+    *(column for column in TRIALS[: TRIALS.index(CODE) + 1] if column.name not in _NOT_OF_INTERVALS),
+    Column("interval", "integer", "Which interval of the trial, from 1.", minimum=1),
+    Column("interval_started_s", "number", "When the interval began, on the session's clock.", "s", minimum=0),
+    _measure("gap_s", "From the end of the interval before to the beginning of this one; n/a for the first.", "s"),
+    Column(
+        "presented",
+        "text",
+        "What the interval presented.",
+        levels=(("standard", "the standard"), ("comparison", "the comparison")),
+        may_miss=True,
+        sealed=True,
+    ),
+    Column("standard", "number", "The trial's standard, in the unit of the varied number.", may_miss=True, sealed=True),
+    Column("level", "number", f"The trial's level: {_LEVEL}.", may_miss=True, sealed=True),
+    Column(
+        "invalid_reasons",
+        "text",
+        "Keys of the protocol's limits that the interval breaks, with spaces between; n/a if it was delivered as "
+        "requested.",
+        may_miss=True,
+    ),
+    *DELIVERED,
+    *(column for column in TRIALS[_OUTCOME:] if column.name not in _NOT_OF_INTERVALS),
+)
+"""Intervals of the trials of a study with designs."""
+
 PARTICIPANTS: tuple[Column, ...] = (
-    _STUDY,
-    _PARTICIPANT,
-    _SESSION,
-    _SIMULATED,
-    _PILOT,
+    STUDY,
+    PARTICIPANT,
+    SESSION,
+    SIMULATED,
+    PILOT,
     Column(
         "status",
         "text",
         "How the session ended.",
         levels=(
-            ("completed", "it went to its last page"),
+            ("completed", "it reached its last page"),
             ("withdrawn", "the participant stopped"),
             ("aborted", "the operator stopped it"),
             ("broken", "the operator stopped it after device, servo or program had failed"),
-            ("damaged", "its journal is damaged: the row says what could be read"),
-            ("unfinished", "no end recorded: it runs still, or its program was ended from outside"),
+            ("damaged", "its journal is damaged: the row contains what could be read"),
+            ("unfinished", "no end recorded: it is still running, or its program was killed"),
         ),
     ),
-    Column("session_started_at", "time", "When the session began."),
-    Column("session_ended_at", "time", "When the session ended.", may_miss=True),
-    Column("resumed", "integer", "How often it was taken up again after its program had ended.", minimum=0),
+    Column("session_started_at", "time", "Time when the session began."),
+    Column("session_ended_at", "time", "Time when the session ended.", may_miss=True),
+    Column("resumed", "integer", "How often it was resumed after its program had ended.", minimum=0),
     Column("device", "text", "The haptic device.", may_miss=True),
     Column("language", "text", "Language of the participant's pages."),
-    Column("trials", "integer", "Main trials that ran to their end.", minimum=0),
-    Column("responses", "integer", "Answers given in main trials, those off the scale included.", minimum=0),
+    Column("trials", "integer", "Number of completed main trials.", minimum=0),
+    Column("responses", "integer", "Number of answers in main trials, including those off the scale.", minimum=0),
     Column(
         "validity",
         "text",
@@ -270,13 +311,28 @@ PARTICIPANTS: tuple[Column, ...] = (
     ),
 )
 
+GROUP = Column("group", "text", "The participant's group; n/a in a study without groups.", may_miss=True, sealed=True)
+TRIALS_2: tuple[Column, ...] = (*_TRIALS_BY_NAME.values(), GROUP)
+"""Columns of trials in a study whose protocol has format 2."""
+
+PARTICIPANTS_2: tuple[Column, ...] = (
+    *(
+        replace(one, description="Answers given in main trials and forms, those off the scale included.")
+        if one.name == "responses"
+        else one
+        for one in PARTICIPANTS
+    ),
+    GROUP,
+)
+"""Columns of sessions in a study whose protocol has format 2."""
+
 EXCLUSIONS: tuple[Column, ...] = (
-    _PARTICIPANT,
-    _SESSION,
-    replace(_TRIAL, description="Number of the trial; n/a where the whole session is left out.", may_miss=True),
-    Column("rule_or_person", "text", "The rule, or the initials of the person, that leaves it out."),
-    Column("reason", "text", "Why it is left out of the analysis."),
-    Column("excluded_at", "time", "When that was decided."),
+    PARTICIPANT,
+    SESSION,
+    replace(TRIAL, description="Number of the trial; n/a if the whole session is excluded.", may_miss=True),
+    Column("rule_or_person", "text", "The rule that excludes it, or the initials of the person."),
+    Column("reason", "text", "Reason for the exclusion."),
+    Column("excluded_at", "time", "Time of the decision."),
 )
 
 TABLES: dict[str, tuple[Column, ...]] = {
@@ -284,6 +340,13 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "trials": TRIALS,
     "participants": PARTICIPANTS,
 }
+
+
+def tables_of(protocol_format: int) -> dict[str, tuple[Column, ...]]:
+    """Return the tables of a study whose protocol is of that format, by name."""
+    if protocol_format < 2:
+        return TABLES
+    return {"responses": RESPONSES_2, "trials": TRIALS_2, "intervals": INTERVALS, "participants": PARTICIPANTS_2}
 
 
 LATER = frozenset(
@@ -294,18 +357,16 @@ LATER = frozenset(
         "loop_delay_changes",
         "limiter_estimator",
         "recording_lost",
+        "group",
+        "invalid_reasons",
+        *(column.name for column in DELIVERED),
     }
 )
 """Columns that earlier versions did not write: a table without them is read as if they held n/a."""
 
 
-SEALED = frozenset(column.name for column in TRIALS if column.sealed)
+SEALED = frozenset(column.name for column in (*TRIALS_2, *DELIVERED) if column.sealed)
 """Columns of a trial that no table has before the key was opened (see ``sealing``)."""
-
-
-def unsealed(columns: tuple[Column, ...]) -> tuple[Column, ...]:
-    """Return the columns that a table has before the key was opened."""
-    return tuple(column for column in columns if not column.sealed)
 
 
 def columns_held(
@@ -315,44 +376,10 @@ def columns_held(
     return tuple(column for column in columns if column.name in names or column.name not in may_lack)
 
 
-def header(columns: tuple[Column, ...]) -> tuple[str, ...]:
-    """Return the column names in file order."""
-    return tuple(column.name for column in columns)
-
-
-def every_column() -> tuple[Column, ...]:
-    """Return each column of all tables once, in the order of first use."""
-    return tuple({column.name: column for columns in TABLES.values() for column in columns}.values())
-
-
-def variable(column: Column) -> dict[str, Any]:
-    """Return ``column`` as a schema.org PropertyValue for ``dataset_description.json``."""
-    meanings = "; ".join(f"{level}: {meaning}" for level, meaning in column.levels)
-    described: dict[str, Any] = {
-        "@type": "PropertyValue",
-        "name": column.name,
-        "description": f"{column.description} Levels: {meanings}." if meanings else column.description,
-        "valuePattern": cell_pattern(column),
-    }
-    if column.unit:
-        described["unitText"] = column.unit
-    if column.minimum is not None:
-        described["minValue"] = column.minimum
-    if column.maximum is not None:
-        described["maxValue"] = column.maximum
-    return described
-
-
-_PATTERNS: dict[Kind, str] = {
-    "text": r"[\s\S]*",
-    "integer": r"-?[0-9]+",
-    "number": r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?",
-    "flag": "true|false",
-    "time": r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}:[0-9]{2}\.[0-9]{3}[+-][0-9]{2}:[0-9]{2}",
-}
-
-
-def cell_pattern(column: Column) -> str:
-    """Return the regular expression of a whole cell."""
-    value = "|".join(level for level, _ in column.levels) if column.levels else _PATTERNS[column.kind]
-    return f"({value}|{MISSING})" if column.may_miss else f"({value})"
+def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[Column, ...]:
+    """Return each column of all tables once, in the order of first use; only a study with designs has ``intervals``."""
+    found: dict[str, Column] = {}
+    for name, columns in tables_of(protocol_format).items():
+        for column in columns if name != "intervals" or intervals else ():
+            found.setdefault(column.name, column)
+    return tuple(found.values())

@@ -13,7 +13,8 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.store.atomic import write_file
-from study_app.store.tables.columns import LATER, MISSING, Column, columns_held, header
+from study_app.store.tables.column import MISSING, Column, header
+from study_app.store.tables.columns import LATER, columns_held
 from study_app.store.tables.formulas import guarded, unguarded
 
 Row: TypeAlias = dict[str, Any]
@@ -119,11 +120,14 @@ def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:
         if not (finite := np.isfinite(table[name])).all():
             row = int(np.argmin(finite))
             raise StudyError(
-                f"{path} is not written: {name} is {table[name][row]} in row {row + 1}; it must be finite: "
-                "lower places, speeds or parameters"
+                f"{path} is not written: {name} is {table[name][row]} in row {row + 1}; it must be finite: reduce "
+                "positions, speeds or parameters"
             )
+    write_file(path, csv_text_of([names, *zip(*(table[name].tolist() for name in names), strict=True)]).encode())
+
+
+def csv_text_of(rows: Iterable[Iterable[Any]]) -> str:
+    """Return rows of cells, the first the columns' names, as CSV: comma, one line feed a record."""
     text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows(zip(*(table[name].tolist() for name in names), strict=True))
-    write_file(path, text.getvalue().encode())
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

@@ -5,7 +5,7 @@ A program killed while it writes leaves a table that is the beginning of what th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import accumulate
 from pathlib import Path
 
@@ -13,17 +13,23 @@ from study_app.store.atomic import replace_end, write_file
 from study_app.store.blinded.blinding import Key
 from study_app.store.blinded.sealing import opened
 from study_app.store.journals.journal import Line
-from study_app.store.tables.columns import RESPONSES, Column
+from study_app.store.tables.column import Column
 from study_app.store.tables.csv_files import Row, header_bytes, records
-from study_app.store.tables.session_tables import SessionRows, trial_columns
+from study_app.store.tables.session_tables import SessionRows, table_columns
 
 
 class GrowingTables:
-    """The two tables of a session on the disk, ``responses`` and ``trials``, kept up to date with its journal."""
+    """The tables of a session on the disk, kept up to date with its journal.
 
-    def __init__(self, responses: Path, trials: Path) -> None:
-        self._responses = _GrowingTable(responses)
-        self._trials = _GrowingTable(trials)
+    Parameters
+    ----------
+    path_of : callable
+        Returns the path of the table of a name.
+    """
+
+    def __init__(self, path_of: Callable[[str], Path]) -> None:
+        self._path_of = path_of
+        self._tables: dict[str, _GrowingTable] = {}
         self._rows: SessionRows | None = None
         self._taken = 0  # lines of the journal
         self._opened = False
@@ -33,7 +39,9 @@ class GrowingTables:
 
         Parameters
         ----------
-        key : Key, optional
+        lines : sequence of Line
+            The journal's, those of before and new ones.
+        key : Key or None
             The study's, once it was opened; without it the sealed columns are left out.
         whole : bool
             Whether the files are replaced as wholes and flushed to the disk.
@@ -45,15 +53,17 @@ class GrowingTables:
         """
         if whole or self._rows is None or self._opened != (key is not None):
             self._rows, self._taken, self._opened = SessionRows(opened(lines, key)), len(lines), key is not None
-            self._responses.forget()
-            self._trials.forget()
+            for table in self._tables.values():
+                table.forget()
         rows = self._rows
         for line in opened([lines[0], *lines[self._taken :]], key)[1:]:
             self._taken += 1
             rows.take(line)
-        self._responses.write(RESPONSES, rows.responses, self._responses.rows, waits=whole)
-        self._trials.write(trial_columns(lines, opened=self._opened), rows.trials, rows.changed, waits=whole)
-        rows.changed = len(rows.trials)
+        for name, columns in table_columns(lines, opened=self._opened).items():
+            table = self._tables.setdefault(name, _GrowingTable(self._path_of(name)))
+            first = {"trials": rows.changed, "intervals": rows.changed_intervals}.get(name, table.rows)
+            table.write(columns, rows.table(name), first, waits=whole)
+        rows.changed, rows.changed_intervals = len(rows.trials), len(rows.intervals)
 
 
 class _GrowingTable:

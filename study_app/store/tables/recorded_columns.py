@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from study_app.store.tables.columns import Column
+from study_app.store.tables.column import Column
 
 _AXES = (("x", "to the right"), ("y", "up"), ("z", "toward the participant"))
 
@@ -14,35 +14,42 @@ def _vector(name: str, unit: str, ending: str, description: str) -> tuple[Column
 
 
 SAMPLES: tuple[Column, ...] = (
-    Column("tick", "integer", "Number of the servo's turn since it started; a gap is samples that were lost."),
-    Column("time_ns", "integer", "When the device was read, on the servo's clock.", "ns"),
-    Column("due_ns", "integer", "When the turn was due; it was late by time_ns - due_ns.", "ns"),
+    Column("tick", "integer", "Number of the servo's tick since its start; gaps are lost samples."),
+    Column("time_ns", "integer", "Time when the device was read, on the servo's clock.", "ns"),
+    Column("due_ns", "integer", "Time when the tick was due; its lateness is time_ns - due_ns.", "ns"),
     Column("fresh", "flag", "true where the device reported a new sample."),
-    *_vector("position", "m", "m", "Place of the hand, exact"),
-    *_vector("velocity", "m/s", "mps", "Velocity in the scene, as the force was computed from; to 1/4096 m/s"),
-    *_vector("wake", "m/s", "mps", "Velocity of the liquid's wake in the scene; to 1/4096 m/s"),
-    *_vector("device_force", "N", "n", "Force that the device sent to the hand; to 1/16384 N"),
-    *_vector("undelivered", "N", "n", "Force that the servo commanded and the device did not send"),
-    *_vector("withheld", "N", "n", "Force of the liquid that was not sent: device_force + withheld is what it exerted"),
-    Column("buttons", "integer", "Buttons of the device that were down, as bits."),
+    *_vector("position", "m", "m", "Position of the hand, exact"),
+    *_vector(
+        "velocity", "m/s", "mps", ("Velocity in the scene from which the force was computed; resolution 1/4096 m/s")
+    ),
+    *_vector("wake", "m/s", "mps", "Velocity of the liquid's wake in the scene; resolution 1/4096 m/s"),
+    *_vector("device_force", "N", "n", "Force that the device applied to the hand; resolution 1/16384 N"),
+    *_vector("undelivered", "N", "n", "Force that the servo commanded and the device did not apply"),
+    *_vector(
+        "withheld",
+        "N",
+        "n",
+        ("Force of the liquid that was withheld: the force of the liquid is device_force + withheld"),
+    ),
+    Column("buttons", "integer", "Pressed buttons of the device, as bits."),
     Column("limiters", "integer", "Limiters that acted, as bits in the order of the trial's limiter columns."),
-    Column("delay_ticks", "integer", "Ticks by which a force is believed to act late.", minimum=0, maximum=4),
-    Column("scene", "integer", "Number of the scene that was felt; 0 is none.", minimum=0),
+    Column("delay_ticks", "integer", "Estimated delay of the force, in ticks.", minimum=0, maximum=4),
+    Column("scene", "integer", "Number of the presented scene; 0 is none.", minimum=0),
     Column(
         "status",
         "integer",
         "State of the servo.",
         levels=(
-            ("0", "in order"),
+            ("0", "running normally"),
             ("1", "no usable sample for 50 ms"),
             ("2", "device lost"),
-            ("3", "a force that is no number"),
+            ("3", "a non-finite force (NaN or infinite)"),
         ),
     ),
 )
 
 FRAMES: tuple[Column, ...] = (
-    Column("painted_ns", "integer", "When the frame was shown, on the servo's clock.", "ns"),
-    Column("sample_ns", "integer", "The moment whose place of the hand it showed.", "ns"),
-    Column("age_ns", "integer", "Age of what was shown: painted_ns - sample_ns, the visual delay achieved.", "ns"),
+    Column("painted_ns", "integer", "Time when the frame was shown, on the servo's clock.", "ns"),
+    Column("sample_ns", "integer", "Time of the hand position that was shown.", "ns"),
+    Column("age_ns", "integer", "Achieved visual delay: painted_ns - sample_ns.", "ns"),
 )

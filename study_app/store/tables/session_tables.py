@@ -11,8 +11,12 @@ from typing import Any
 
 from study_app.errors import StoreError
 from study_app.store.journals.journal import Line
-from study_app.store.tables.columns import RESPONSES, TRIALS, Column, header, unsealed
+from study_app.store.limits import within_limits
+from study_app.store.progress import is_of_intervals, progress_of
+from study_app.store.tables.column import Column, header, unsealed
+from study_app.store.tables.columns import DELIVERED, TRIALS, tables_of
 from study_app.store.tables.csv_files import Row
+from study_app.store.tables.interval_rows import combined, interval_row
 
 _SESSION_COLUMNS = ("study", "participant", "session", "simulated", "pilot")
 _TRIAL_COLUMNS = ("trial", "attempt", "block", "phase", "part", "index", "code")
@@ -20,16 +24,7 @@ _RECORDED = ("recording", "recording_frames", "samples_recorded", "samples_unrec
 _DERIVED = ("trial_started_at", "trial_started_s", "outcome", "valid", *_RECORDED, "recording_lost", "marked", "notes")
 _MEASURED = tuple(name for name in header(TRIALS) if name not in (*_SESSION_COLUMNS, *_TRIAL_COLUMNS, "of", *_DERIVED))
 
-# What is judged in a trial's row by which limit of the protocol.
-_JUDGED = (
-    ("lateness_p99_ms", "lateness_ms"),
-    ("worst_gap_ms", "worst_gap_ms"),
-    ("delay_error_p95_ms", "delay_error_ms"),
-    ("first_frame_gap_ms", "frame_gap_ms"),
-    ("worst_frame_gap_ms", "frame_gap_ms"),
-    ("withheld_share", "withheld_percent"),
-)
-_LEAST = "targets_reached"  # judged by "targets_percent": the only measure with a least value
+_DELIVERED = header(DELIVERED)
 
 
 class SessionRows:
@@ -37,7 +32,8 @@ class SessionRows:
 
     ``responses`` has one row per response, in the order of confirmation; ``trials`` one per presentation of a trial, in
     order; the running one has no outcome yet. ``changed`` is the index of the first row of ``trials`` that was added or
-    changed since somebody set it; rows of ``responses`` never change.
+    changed since somebody set it; rows of ``responses`` never change. ``intervals`` has one row per interval of a trial
+    with a design, ``changed_intervals`` is likewise the first of them that was added or changed.
 
     Raises
     ------
@@ -48,14 +44,22 @@ class SessionRows:
     def __init__(self, lines: Sequence[Line]) -> None:
         self.responses: list[Row] = []
         self.trials: list[Row] = []
+        self.intervals: list[Row] = []
         self.changed = 0
+        self.changed_intervals = 0
         self._session = _session(lines)
+        self._group = _group(lines)
         self._limits = lines[0].get("limits", {})
         self._started: dict[tuple[int, int], Line] = {}
         self._places: dict[tuple[int, int], int] = {}  # in trials
+        self._intervals: dict[tuple[int, int, int], int] = {}  # in intervals
         self._broke = self._reconnected = ""
         for line in lines:
             self.take(line)
+
+    def table(self, name: str) -> list[Row]:
+        """Return the rows of the table of a name."""
+        return {"responses": self.responses, "trials": self.trials, "intervals": self.intervals}[name]
 
     def take(self, line: Line) -> None:
         """Follow one more line."""
@@ -65,25 +69,38 @@ class SessionRows:
                 which = line["trial"], line["attempt"]
                 repeats = bool(self.trials) and self.trials[-1]["trial"] == line["trial"]
                 self._started[which], self._places[which] = line, len(self.trials)
-                self.trials.append(_trial(self._session, line))
+                self.trials.append(_trial(self._session, line) | self._group)
                 if self._reconnected and repeats:
                     _note(self.trials[-1], f"presented again: {self._reconnected}")
                 self._reconnected = ""
             case "trial_ended":
                 row = self._row_of(line)
-                row |= {name: line.get(name) for name in _MEASURED}
-                row |= {"outcome": line["outcome"], "valid": within_limits(row, self._limits)}
+                row |= self._measured(line)
+                valid = within_limits(row, self._limits) if line["outcome"] != "invalid" else False
+                row |= {"outcome": line["outcome"], "valid": valid}
             case "responses":
                 if (trial := self._started.get((line["trial"], line["attempt"]))) is None:
                     raise _never_started(line)
                 self.responses += [_response(self._session, trial, answer, line["at"]) for answer in line["items"]]
+            case "form_answered":
+                form = {**dict.fromkeys(_TRIAL_COLUMNS), "form": line["form"]}
+                self.responses += [_response(self._session, form, answer, line["at"]) for answer in line["items"]]
             case "session_ended" | "session_resumed":
                 self._interrupt()
+            case "interval_started":
+                self._begin_interval(line)
+            case "interval_ended":
+                row = self._interval_of(line)
+                row |= {name: line.get(name) for name in (*_MEASURED, *_DELIVERED)} | {"ended_s": line["t_s"]}
+                reasons = line.get("invalid", ())
+                row |= {"outcome": line["outcome"], "invalid_reasons": " ".join(reasons) or None}
+                row |= {"valid": within_limits(row, self._limits) if not reasons else False}
             case "recorded":
-                row = self._row_of(line)
+                row = self._row_of(line) if "interval" not in line else self._interval_of(line)
                 row |= {name: line[name] for name in _RECORDED}
             case "recording_lost":
-                self._row_of(line)["recording_lost"] = line["reason"]
+                row = self._row_of(line) if "interval" not in line else self._interval_of(line)
+                row["recording_lost"] = line["reason"]
             case "broke":
                 self._broke = line["what"]
             case "device_reconnected" if self.trials:
@@ -100,6 +117,28 @@ class SessionRows:
         self.changed = min(self.changed, place)
         return self.trials[place]
 
+    def _begin_interval(self, line: Line) -> None:
+        which = line["trial"], line["attempt"]
+        if which not in self._places:
+            raise _never_started(line)
+        before = self._intervals.get((*which, line["interval"] - 1))
+        self._intervals[*which, line["interval"]] = len(self.intervals)
+        earlier = None if before is None else self.intervals[before]
+        self.intervals.append(interval_row(self.trials[self._places[which]], self._started[which], line, earlier))
+
+    def _interval_of(self, line: Line) -> Row:
+        if (place := self._intervals.get((line["trial"], line["attempt"], line["interval"]))) is None:
+            raise _never_started(line)
+        self.changed_intervals = min(self.changed_intervals, place)
+        return self.intervals[place]
+
+    def _measured(self, line: Line) -> Row:
+        """Return what was measured of a trial that ended: of one with a design, in all its intervals."""
+        which = line["trial"], line["attempt"]
+        if not is_of_intervals(self._started[which]):
+            return {name: line.get(name) for name in _MEASURED}
+        return combined((self.intervals[at] for key, at in self._intervals.items() if key[:2] == which), _MEASURED)
+
     def _last(self) -> Row:
         self.changed = min(self.changed, len(self.trials) - 1)
         return self.trials[-1]
@@ -108,6 +147,9 @@ class SessionRows:
         """Say of a trial that was left without its end that it was interrupted."""
         if self.trials and self.trials[-1]["outcome"] is None:
             self._last()["outcome"] = "interrupted"
+        if self.intervals and self.intervals[-1]["outcome"] is None:
+            self.changed_intervals = min(self.changed_intervals, len(self.intervals) - 1)
+            self.intervals[-1]["outcome"] = "interrupted"
 
 
 def responses(lines: Sequence[Line]) -> list[Row]:
@@ -120,69 +162,43 @@ def trials(lines: Sequence[Line]) -> list[Row]:
     return SessionRows(lines).trials
 
 
-def trial_columns(lines: Sequence[Line], *, opened: bool) -> tuple[Column, ...]:
-    """Return the columns of the trials' table: without the sealed ones where they are sealed and not ``opened``."""
-    return TRIALS if opened or not lines[0].get("measures_sealed") else unsealed(TRIALS)
+def table_columns(lines: Sequence[Line], *, opened: bool) -> dict[str, tuple[Column, ...]]:
+    """Return the columns of a session's tables by name: without the sealed ones where they are sealed, not ``opened``.
+
+    Only a study with designs has a table of intervals.
+    """
+    tables = tables_of(protocol_format(lines))
+    names = ("responses", "trials", "intervals") if lines[0].get("intervals") else ("responses", "trials")
+    shows = opened or not lines[0].get("measures_sealed")
+    return {name: tables[name] if shows else unsealed(tables[name]) for name in names}
+
+
+def protocol_format(lines: Sequence[Line]) -> int:
+    """Return the format of the protocol of a session with these journal lines."""
+    return int(lines[0].get("protocol_format", 1))
 
 
 def participant(lines: Sequence[Line]) -> Row:
     """Return the session's row of the participants table."""
-    start, rows = lines[0], SessionRows(lines)
-    ends = [line for line in lines if line["event"] == "session_ended"]
+    start, rows, done = lines[0], SessionRows(lines), progress_of(lines)
     main = [row for row in latest(rows.trials) if row["phase"] == "main" and row["outcome"] in ("complete", "timeout")]
-    answered = [row for row in latest(rows.responses) if row["phase"] == "main" and row["first_choice_s"] is not None]
+    after_main = latest(row for row in rows.responses if row["phase"] == "main")
+    in_forms = (row for row in rows.responses if row.get("form") is not None)
+    answered = [row for row in (*after_main, *in_forms) if row["first_choice_s"] is not None]
     verdicts = [row["valid"] for row in main if row["valid"] is not None]
     return {
         **_session(lines),
-        "status": ends[-1]["status"] if ends else "unfinished",
+        **_group(lines),
+        "status": "unfinished" if done.ended is None else done.ended,
         "session_started_at": start["at"],
-        "session_ended_at": ends[-1]["at"] if ends else None,
-        "resumed": sum(line["event"] == "session_resumed" for line in lines),
+        "session_ended_at": next((line["at"] for line in reversed(lines) if line["event"] == "session_ended"), None),
+        "resumed": done.resumed,
         "device": start.get("device"),
-        "language": language(lines),
+        "language": done.language,
         "trials": len(main),
         "responses": len(answered),
         "validity": None if not verdicts else "valid" if all(verdicts) else "invalid",
     }
-
-
-def language(lines: Sequence[Line]) -> str:
-    """Return the language of the participant's pages: the session's own, or what was chosen instead."""
-    chosen = [line["language"] for line in lines if line["event"] == "language_chosen"]
-    return str(chosen[-1] if chosen else lines[0]["language"])
-
-
-def within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> bool | None:
-    """Return whether a trial's measured columns keep the protocol's limits, by size; None where nothing was measured.
-
-    ``limits`` are those of the journal's first line, or ``Limits`` of a protocol as a mapping.
-    """
-    judged = _judged(measured, limits)
-    return not beyond_limits(measured, limits) if judged else None
-
-
-def beyond_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> tuple[tuple[str, float, float], ...]:
-    """Return which of a trial's measured columns break a limit: the column's name, its value and the limit.
-
-    Value and limit are in the limit's unit, ms or percent.
-    """
-    return tuple(one for one in _judged(measured, limits) if not _keeps(*one))
-
-
-def _keeps(measure: str, value: float, limit: float) -> bool:
-    return value >= limit if measure == _LEAST else abs(value) <= limit
-
-
-def _judged(measured: Mapping[str, Any], limits: Mapping[str, float]) -> list[tuple[str, float, float]]:
-    judged = [
-        (measure, measured[measure] * (100 if limit.endswith("_percent") else 1), limits[limit])
-        for measure, limit in _JUDGED
-        if measured.get(measure) is not None and limit in limits
-    ]
-    reached, targets = measured.get(_LEAST), measured.get("targets")
-    if "targets_percent" in limits and reached is not None and targets:
-        judged.append((_LEAST, 100 * reached / targets, limits["targets_percent"]))
-    return judged
 
 
 def latest(rows: Iterable[Row]) -> list[Row]:
@@ -196,25 +212,48 @@ def latest(rows: Iterable[Row]) -> list[Row]:
 
 def _session(lines: Sequence[Line]) -> Row:
     if not lines or lines[0]["event"] != "session_started":
-        raise StoreError("the journal does not begin with session_started: it is no journal of a session")
+        raise StoreError("the journal does not begin with session_started: it is not the journal of a session")
     return {name: lines[0][name] for name in _SESSION_COLUMNS}
 
 
-def _response(session: Row, trial: Line, answer: Mapping[str, Any], answered_at: str) -> Row:
-    row: Row = {
+def _group(lines: Sequence[Line]) -> Row:
+    """Return the group of the session's participant, where it was opened; nothing in format 1."""
+    return {"group": lines[0].get("group")} if protocol_format(lines) > 1 else {}
+
+
+def _response(session: Row, trial: Mapping[str, Any], answer: Mapping[str, Any], answered_at: str) -> Row:
+    """Return the row of an answer; only in format 2 it says its kind, and the answer as text and as number."""
+    value = answer["value"]
+    if kind := answer.get("kind"):
+        cells = {
+            "form": trial.get("form"),
+            "kind": kind,
+            "response": response_text(value),
+            "value": value if isinstance(value, int | float) else None,
+        }
+    else:
+        cells = {"response": value}
+    row = {
         **session,
         **{name: trial[name] for name in _TRIAL_COLUMNS},
+        **cells,
         "item": answer["item"],
         "number": answer["number"],
-        "response": answer["value"],
-        "cannot_judge": answer["value"] is None and answer["first_s"] is not None,
+        "cannot_judge": value is None and answer["first_s"] is not None,
         "onset_s": answer["onset_s"],
         "first_choice_s": answer["first_s"],
         "last_change_s": answer["last_s"],
         "changes": answer["changes"],
         "answered_at": answered_at,
     }
-    return {name: row[name] for name in header(RESPONSES)}
+    return {name: row[name] for name in header(tables_of(2 if kind else 1)["responses"])}
+
+
+def response_text(value: Any) -> str | None:
+    """Return an answer as text: of several options their ids with spaces between, "" where none was chosen."""
+    if isinstance(value, list | tuple):
+        return " ".join(value)
+    return None if value is None else str(value)
 
 
 def _trial(session: Row, line: Line) -> Row:

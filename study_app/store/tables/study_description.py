@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+from collections.abc import Mapping
+from typing import Any
 
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
@@ -16,9 +18,10 @@ from study_app.store.atomic import is_there, read_own, write_file
 from study_app.store.blinded.blinding import reveals
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.parsing import check_study_name, parse_json
-from study_app.store.tables.columns import LATER, SEALED, every_column, variable
+from study_app.store.tables.cells import variable
+from study_app.store.tables.columns import LATER, SEALED, every_column
 
-# What a study folder holds beside tables; patterns as in .gitignore.
+# What a study folder holds besides tables; patterns as in .gitignore.
 IGNORED = b"""\
 .psychds-ignore
 .*.tmp
@@ -35,10 +38,11 @@ rebuilt.txt
 """
 
 
-def description_bytes(study: StudyHead, *, sealed: bool) -> bytes:
+def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 1, intervals: bool = False) -> bytes:
     """Return the file for ``study``; the same bytes for the same study on every machine.
 
-    ``sealed`` says that no table has the sealed columns.
+    ``sealed`` says that no table has the sealed columns; ``protocol_format`` is the format of the study's file,
+    ``intervals`` whether it has blocks with a design.
     """
     title = text_in(study.title, study.languages[0])
     content = {
@@ -48,7 +52,11 @@ def description_bytes(study: StudyHead, *, sealed: bool) -> bytes:
         "alternateName": title,
         "description": study.description or title,
         "version": study.version,
-        "variableMeasured": [variable(column) for column in every_column() if not (sealed and column.sealed)],
+        "variableMeasured": [
+            variable(column)
+            for column in every_column(protocol_format, intervals=intervals)
+            if not (sealed and column.sealed)
+        ],
     }
     return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
 
@@ -73,18 +81,26 @@ def describes_alike(content: bytes, expected: bytes) -> bool:
     )
 
 
-def write_description(folder: StudyFolder, study: StudyHead) -> None:
+def write_description(
+    folder: StudyFolder, study: StudyHead, protocol_format: int = 1, *, intervals: bool = False
+) -> None:
     """Write the description where it is missing or of an older version of the study.
 
     Until the key is opened it lacks the sealed columns, unless an earlier version of the program described them: then
     tables have them.
     """
     held = read_own(folder.description, folder.path) if is_there(folder.description) else b""
-    content = description_bytes(study, sealed=not (reveals(folder.path) or names_sealed(held)))
+    sealed = not (reveals(folder.path) or names_sealed(held))
+    content = description_bytes(study, sealed=sealed, protocol_format=protocol_format, intervals=intervals)
     if held != content:
         write_file(folder.description, content)
     if not is_there(folder.ignore):
         write_file(folder.ignore, IGNORED)
+
+
+def has_intervals(protocol: Mapping[str, Any]) -> bool:
+    """Return whether the protocol in a receipt has blocks with a design."""
+    return any("slots" in block for block in protocol["blocks"].values())
 
 
 def names_sealed(content: bytes) -> bool:
@@ -107,7 +123,9 @@ def described_study(folder: StudyFolder) -> str | None:
     try:
         return check_study_name(parse_json(read_own(folder.description, folder.path))["name"])
     except (ValueError, KeyError, TypeError) as error:
-        raise StoreError(f"{folder.description} describes no study: is {folder.path} a results folder?") from error
+        raise StoreError(
+            f"{folder.description} does not describe a study: is {folder.path} a results folder?"
+        ) from error
 
 
 def check_study(folder: StudyFolder, study: str) -> None:
@@ -128,6 +146,6 @@ def check_study(folder: StudyFolder, study: str) -> None:
             raise StoreError(f"{folder.path} lies within {above}, which is a study's folder: use one outside of it")
     if within := sorted(path.name for path in folder.path.glob("*") if is_there(StudyFolder(path).key)):
         raise StoreError(
-            f"{folder.path} holds folders of studies ({', '.join(within[:3])}{' ...' if within[3:] else ''}): use one "
-            f"of these or a new one beside them, such as {folder.path / study}"
+            f"{folder.path} holds folders of studies ({', '.join(within[:3])}{' ...' if within[3:] else ''}): use "
+            f"one of these or a new one next to them, such as {folder.path / study}"
         )

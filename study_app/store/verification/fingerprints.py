@@ -1,4 +1,4 @@
-"""The fingerprint of a session that has ended: twelve characters that nobody can give to another session.
+"""The fingerprint of a session that has ended: twelve characters that no other session can have.
 
 It is the beginning of a SHA-256 over the session's checksums, but for those of its tables, which are made from the
 journal and compared with it by `verify`. Each study's ``fingerprints.txt`` has a line for every session that ended; a
@@ -72,14 +72,14 @@ def read_copy(path: Path) -> tuple[tuple[str, str], ...]:
         It cannot be read, holds none, or something else.
     """
     if not path.is_file():
-        raise StoreError(f"{path} is no file: name a copy of a study's fingerprints.txt")
+        raise StoreError(f"{path} is not a file: name a copy of a study's fingerprints.txt")
     if wrong := unreadable(path):
         raise StoreError(
-            f"{path}, line {wrong[0]} is no fingerprint: a line must be such as "
+            f"{path}, line {wrong[0]} is not a fingerprint: a line must be such as "
             "'k3vq-7m2p-xw4d  data/sub-P007/ses-01'; name a copy of a study's fingerprints.txt"
         )
     if not (found := listed(path)):
-        raise StoreError(f"{path} holds no fingerprint: name a copy of a study's fingerprints.txt")
+        raise StoreError(f"{path} has no fingerprint: name a copy of a study's fingerprints.txt")
     return found
 
 

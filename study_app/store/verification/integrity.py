@@ -18,12 +18,12 @@ from study_app.store.journals import journal
 from study_app.store.journals.journal import Contents
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.tables.columns import TABLES
 from study_app.store.tables.csv_files import in_columns_of
+from study_app.store.tables.session_tables import table_columns
 
 CHANGED = "has changed since the session ended (its checksum differs)"
-REBUILT_AFTER = "says that checksums or fingerprint were made again after the session had ended"
-COMPARE = "compare it with fingerprints that were kept elsewhere: liquid-study verify --fingerprints FILE"
+REBUILT_AFTER = "says that checksums or fingerprint were rewritten after the session ended"
+COMPARE = "compare it with fingerprints stored elsewhere: liquid-study verify --fingerprints FILE"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ def _changed_since(place: Place) -> tuple[Doubt, ...]:
     folder = place.folder
     restore = f"restore it from a copy; liquid-study verify {place.study_folder.path} checks everything"
     if not is_there(folder.journal):
-        return (Doubt(folder.journal, "is missing, and nothing else proves the tables", restore),)
+        return (Doubt(folder.journal, "is missing, so the tables cannot be verified", restore),)
     try:
         contents = journal.scan(folder.journal)
     except StoreError as error:
@@ -84,8 +84,8 @@ def _listed(place: Place, contents: Contents) -> tuple[Mapping[str, str], tuple[
     try:
         return read_checksums(place.folder), ()
     except StoreError:
-        remedy = f"restore it from a copy, or let liquid-study rebuild {place.folder.path} make it from the files there"
-        return {}, (Doubt(place.folder.checksums, "is missing or no list of checksums", remedy),)
+        remedy = f"restore it from a copy, or recreate it from the files with liquid-study rebuild {place.folder.path}"
+        return {}, (Doubt(place.folder.checksums, "is missing or not a list of checksums", remedy),)
 
 
 def _as_ended(place: Place) -> bool:
@@ -115,8 +115,9 @@ def _hash(place: Place, name: str) -> str:
 def _behind(place: Place) -> dict[str, Path]:
     """Return the files behind every number: journal, receipt and tables, by their path in the session's folder."""
     folder = place.folder
-    tables = (folder.table(place.study, name) for name in ("responses", "trials"))
-    return {path.name: path for path in (folder.journal, folder.receipt, *tables)}
+    tables = [folder.table(place.study, name) for name in ("responses", "trials", "intervals")]
+    there = [path for path in tables if path != tables[-1] or is_there(path)]  # few studies have intervals
+    return {path.name: path for path in (folder.journal, folder.receipt, *there)}
 
 
 def _tables(place: Place, contents: Contents, restore: str) -> Iterator[Doubt]:
@@ -126,8 +127,9 @@ def _tables(place: Place, contents: Contents, restore: str) -> Iterator[Doubt]:
     except (StoreError, KeyError) as error:
         yield Doubt(place.folder.journal, f"gives no tables ({error})", restore)
         return
-    again = f"liquid-study rebuild {place.folder.path} makes it again from the journal"
-    for (path, whole), name in zip(expected, ("responses", "trials"), strict=True):
+    tables = table_columns(contents.lines, opened=True)
+    again = f"rebuild it from the journal with liquid-study rebuild {place.folder.path}"
+    for (path, whole), name in zip(expected, tables, strict=True):
         try:
             there = read_regular(path)
         except FileNotFoundError:
@@ -136,8 +138,8 @@ def _tables(place: Place, contents: Contents, restore: str) -> Iterator[Doubt]:
         except OSError as error:
             yield Doubt(path, f"cannot be read ({cause(error)})", restore)
             continue
-        content, _ = in_columns_of(there, whole, TABLES[name])
+        content, _ = in_columns_of(there, whole, tables[name])
         if there != content:
             pairs = zip_longest(there.split(b"\n"), content.split(b"\n"))
             line = next(number for number, (ours, theirs) in enumerate(pairs, start=1) if ours != theirs)
-            yield Doubt(path, f"is not what the journal gives, from line {line} on", again)
+            yield Doubt(path, f"differs from the journal, from line {line} on", again)

@@ -1,8 +1,9 @@
 """What would tell a condition, and where it stands: the search that proves that blinding holds.
 
-A condition is told by its id, its liquid's id, the liquid's parameters and its delay. None of them may stand in a file
-or a name of a study folder, but for the sealed key, for the statements (whose words are shown to the participant
-anyway), for the moments of events and for the recordings, where forces and the ages of frames are measured.
+A condition is revealed by its id, its liquid's id, the liquid's parameters and its delay; what a trial with a design
+presents by its level, standard and comparison. None of them may stand in a file or a name of a study folder, but for
+the sealed key, for the statements (whose words are shown to the participant anyway), for the moments of events and for
+the recordings, where forces and the ages of frames are measured.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from study_app.protocol.model import Protocol
+from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
 from study_app.store.atomic import cannot_read, paths_in
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.parsing import parse_json
@@ -54,22 +56,40 @@ class Telltales:
 
 
 def telltales(protocol: Protocol) -> Telltales:
-    """Return all that tells a condition of ``protocol``: ids, and numbers in every unit they are used in."""
-    return Telltales(_words(protocol.model_dump(mode="json", include={"liquids", "conditions"}, exclude_unset=True)))
+    """Return all that reveals a condition or level of ``protocol``: ids, and numbers in every unit they are used in."""
+    words = _words(protocol.model_dump(mode="json", include={"liquids", "conditions"}, exclude_unset=True))
+    return Telltales(words | _all_spelled(presented_numbers(protocol)))
 
 
-def certain_telltales(tables: Tables, published: Any) -> Telltales:
+def presented_numbers(protocol: Protocol) -> frozenset[float]:
+    """Return every level, standard and comparison that trials of a protocol can present, 0 aside."""
+    found: set[float] = set()
+    for block in protocol.blocks.values():
+        if block.design is None or block.stimulus is None:
+            continue
+        stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
+        levels = {*method.asked(stimulus)}
+        first = design_of(protocol, block).first
+        levels |= set() if first is None else {first.level}
+        standards = standards_of(protocol, block)
+        found |= levels | {one for one in standards if one is not None}
+        found |= {stimulus.comparison(standard, level) for standard in standards for level in levels}
+    return frozenset(found - {0.0})
+
+
+def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = ()) -> Telltales:
     """Return what tells a condition and stands nowhere by chance: no short number, no word of the ``published`` part.
 
-    ``tables`` are the sealed key's, ``published`` is the receipt's protocol.
+    ``tables`` are the sealed key's, ``published`` is the receipt's protocol, ``levels`` are `presented_numbers`.
     """
     known = " ".join(text for _, text in _texts(published, "", frozenset()))
-    words = (word for word in _words(tables) if not word[0].isdigit() or _digits(word) >= _TELLING_DIGITS)
+    every = _words(tables) | _all_spelled(levels)
+    words = (word for word in every if not word[0].isdigit() or _digits(word) >= _TELLING_DIGITS)
     return Telltales(word for word in words if not Telltales([word]).in_text(known))
 
 
 def leaks(folder: Path, protocol: Protocol) -> list[Leak]:
-    """Return where in a study folder, or one like it, a condition of ``protocol`` is told.
+    """Return where in a study folder, or one like it, a condition of ``protocol`` is revealed.
 
     Raises
     ------
@@ -112,7 +132,7 @@ def _in_file(path: Path, name: str, words: Telltales) -> Iterator[Leak]:
 
 
 def _fragments(suffix: str, content: str) -> Iterator[tuple[str, str]]:
-    """Yield place and text of what a file holds beside statements."""
+    """Yield place and text of what a file holds besides statements."""
     if suffix == ".csv":
         yield from _cells(content)
     elif suffix == ".json":
@@ -175,6 +195,10 @@ def _words(tables: Tables) -> set[str]:
         collect(tables[table])
         found.update(tables[table])
     return found
+
+
+def _all_spelled(values: Iterable[float]) -> set[str]:
+    return {word for value in values for word in _spelled(value)}
 
 
 def _spelled(value: float) -> Iterator[str]:

@@ -87,7 +87,9 @@ def validate(folder: Path) -> PsychDs:
     listed = _variables(metadata)
     if tables and (missing := sorted(listed - measured)):
         names = ", ".join(missing)
-        errors.append(Issue("VARIABLE_MISSING_FROM_CSV_COLUMNS", _DESCRIPTION, f"{names}: in no file's header"))
+        errors.append(
+            Issue("VARIABLE_MISSING_FROM_CSV_COLUMNS", _DESCRIPTION, (f"{names}: not in the header of any file"))
+        )
     return PsychDs(tuple(errors), tuple(_warnings(folder, files, metadata)))
 
 
@@ -99,7 +101,7 @@ def _description(folder: Path, errors: list[Issue]) -> Metadata:
         return {}
     metadata = _json(path)
     if not isinstance(metadata, dict):
-        errors.append(Issue("INVALID_JSON_FORMATTING", _DESCRIPTION, "is no JSON object"))
+        errors.append(Issue("INVALID_JSON_FORMATTING", _DESCRIPTION, "is not a JSON object"))
         return {}
     if not _SCHEMA_ORG.fullmatch(str(metadata.get("@context", ""))):
         message = f"@context is {metadata.get('@context')!r}, not https://schema.org/"
@@ -117,7 +119,7 @@ def _description(folder: Path, errors: list[Issue]) -> Metadata:
 def _json_errors(folder: Path, files: list[Path]) -> Iterator[Issue]:
     for path in files:
         if path.suffix == ".json" and path != folder / _DESCRIPTION and _json(path) is None:
-            yield Issue("JSON_INVALID", _name(folder, path), "is no JSON in UTF-8")
+            yield Issue("JSON_INVALID", _name(folder, path), "is not JSON in UTF-8")
 
 
 def _folder_errors(folder: Path, tables: list[Path]) -> Iterator[Issue]:
@@ -135,7 +137,7 @@ def _table_errors(folder: Path, path: Path, metadata: Metadata, measured: set[st
     try:
         header, *rows = list(csv.reader(io.StringIO(_content(path).decode("utf-8"), newline=""), strict=True)) or [[]]
     except (UnicodeDecodeError, csv.Error) as error:
-        yield Issue("CSV_FORMATTING_ERROR", name, f"is no CSV in UTF-8 ({error})")
+        yield Issue("CSV_FORMATTING_ERROR", name, f"is not CSV in UTF-8 ({error})")
         return
     measured.update(header)
     if not any(header):
@@ -195,7 +197,7 @@ def _file_warnings(folder: Path, files: list[Path]) -> Iterator[Issue]:
         if path.stat().st_size == 0:
             yield Issue("FILE_EMPTY", name, "is empty")
         if path.name == _DESCRIPTION and len(inside.parts) > 1:
-            yield Issue("WRONG_METADATA_LOCATION", name, "the dataset's description belongs into the topmost folder")
+            yield Issue("WRONG_METADATA_LOCATION", name, "the dataset's description belongs in the top folder")
         if _is_table(inside):
             if DATA_FILE.fullmatch(path.name) and (unofficial := sorted(_keys(path.name) - KEYWORDS)):
                 yield Issue("FILENAME_UNOFFICIAL_KEYWORD_WARNING", name, f"{', '.join(unofficial)}: not official")
@@ -243,7 +245,7 @@ def _name(folder: Path, path: Path) -> str:
 
 
 def _json(path: Path) -> Any:
-    """Return the file's value, None where it is no JSON in UTF-8."""
+    """Return the file's value, None where it is not JSON in UTF-8."""
     try:
         return parse_json(_content(path).decode("utf-8"))
     except ValueError:

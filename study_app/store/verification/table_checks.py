@@ -9,7 +9,8 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 
-from study_app.store.tables.columns import MISSING, Column, cell_pattern, header
+from study_app.store.tables.cells import cell_pattern
+from study_app.store.tables.column import MISSING, Column, header
 
 Check = Callable[[str], bool]
 
@@ -19,7 +20,7 @@ def problems(content: bytes, columns: Sequence[Column]) -> Iterator[str]:
     try:
         names, *rows = list(csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)) or [[]]
     except (UnicodeDecodeError, csv.Error) as error:
-        yield f"is no CSV in UTF-8 ({error})"
+        yield f"is not CSV in UTF-8 ({error})"
         return
     if tuple(names) != header(tuple(columns)):
         yield from _header_problems(names, columns)
@@ -43,7 +44,7 @@ def _header_problems(names: list[str], columns: Sequence[Column]) -> Iterator[st
     if unknown:
         yield f"columns are unknown: {', '.join(unknown)}"
     if not missing and not unknown:
-        yield "columns are in another order, or there more than once"
+        yield "columns are in another order or duplicated"
 
 
 @cache

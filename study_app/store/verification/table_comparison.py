@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import zip_longest
 from pathlib import Path
 
@@ -17,7 +17,9 @@ from study_app.store.blinded.sealing import opened_key
 from study_app.store.journals.journal import Line
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables import csv_files
-from study_app.store.tables.columns import MISSING, TABLES
+from study_app.store.tables.column import MISSING, Column
+from study_app.store.tables.columns import TABLES
+from study_app.store.tables.session_tables import table_columns
 from study_app.store.verification import table_checks
 from study_app.store.verification.violations import Gathered
 
@@ -34,13 +36,20 @@ def check_tables(place: Place, lines: list[Line], said: set[Path], found: Gather
         found.error(place.folder.journal, f"gives no tables: {error}")
         return
     ended = lines[-1]["event"] == "session_ended"
-    for (path, content), name in zip(expected, ("responses", "trials"), strict=True):
+    tables = table_columns(lines, opened=True)
+    for (path, content), name in zip(expected, tables, strict=True):
         if path not in said:
-            check_table(path, content, name, found, may_be_behind=lambda _: not ended)
+            check_table(path, content, name, found, may_be_behind=lambda _: not ended, tables=tables)
 
 
 def check_table(
-    path: Path, expected: bytes, name: str, found: Gathered, *, may_be_behind: Callable[[int], bool]
+    path: Path,
+    expected: bytes,
+    name: str,
+    found: Gathered,
+    *,
+    may_be_behind: Callable[[int], bool],
+    tables: Mapping[str, tuple[Column, ...]] = TABLES,
 ) -> None:
     """Compare a table with what the journals give, and its cells with the dictionary.
 
@@ -52,12 +61,12 @@ def check_table(
     except OSError:
         found.error(path, "is missing or cannot be read; rebuild makes it again")
         return
-    expected, columns = csv_files.in_columns_of(content, expected, TABLES[name])
+    expected, columns = csv_files.in_columns_of(content, expected, tables[name])
     if differing := _differing_lines(content, expected):
         beginning = expected.startswith(content)
         behind = all(map(may_be_behind, differing)) and (beginning or _is_behind(content, expected, name))
         tell = found.warning if behind else found.error
-        tell(path, f"is not what the journal gives, from line {differing[0]} on; rebuild renews it")
+        tell(path, f"differs from the journal, from line {differing[0]} on; rebuild renews it")
         if behind and beginning:  # a program killed while it wrote a row
             return
     for problem in table_checks.problems(content, columns):

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ from study_app.store.journals import journal
 from study_app.store.journals.cut_journal import RESTORE, beyond
 from study_app.store.journals.journal import Contents, Line
 from study_app.store.journals.journal_events import shortened, unknown_events
-from study_app.store.progress import attempts, progress_of, wrong_responses
+from study_app.store.progress import named, progress_of, recordable
 from study_app.store.recorder import recording_files
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place
@@ -33,14 +32,16 @@ from study_app.store.sessions.unstarted_sessions import never_begun
 from study_app.store.tables import csv_files
 from study_app.store.tables.participants import opened_or_none, row_from
 from study_app.store.verification.fingerprints import fingerprint
+from study_app.store.verification.response_checks import wrong_responses
 from study_app.store.verification.table_comparison import check_tables
 from study_app.store.verification.violations import Gathered
+from study_app.workers.executors import open_executor
 
 LOOKS = 20
 """So often is looked again at what was found in files that another program wrote meanwhile."""
 BETWEEN_S = 0.05
 
-_BEGUN = "though receipt, tables, recordings or checksums show that the session was begun: restore it from a copy"
+_BEGUN = "but receipt, tables, recordings or checksums show that the session began: restore it from a copy"
 NOTHING = Contents([], 0)
 READERS = 4  # files whose checksums are computed at the same time
 
@@ -93,11 +94,11 @@ def _look(place: Place, key: Key | None, found: Gathered) -> Checked:
     running = is_open(folder.path)
     half = () if running else (*temporaries(folder.path), *temporaries(folder.recordings))
     for path in half:
-        found.warning(path, "was left half-written by a program that was ended; rebuild takes it away")
+        found.warning(path, "is an incomplete file of a program that was ended; rebuild removes it")
     if running:
-        found.warning(folder.path, "runs in another program")
+        found.warning(folder.path, "is open in another program")
     elif is_there(folder.crash) and folder.crash.stat().st_size:
-        found.warning(folder.crash, "tells where the program crashed: send it to the developers")
+        found.warning(folder.crash, "shows where the program crashed: send it to the developers")
     contents = _journal(folder, found, running=running)
     lines = contents.lines
     _receipt(folder, lines, key.hash if key else None, found, running=running)
@@ -106,7 +107,8 @@ def _look(place: Place, key: Key | None, found: Gathered) -> Checked:
     _place(place, lines[0], found)
     with found.reading(folder.journal):
         opened(lines, key)
-    _answers(folder, lines, found)
+    for wrong in wrong_responses(lines):
+        found.error(folder.journal, wrong)
     hashes = _hashes(folder)
     ended = lines[-1]["event"] == "session_ended" and not running
     if not running:
@@ -120,7 +122,7 @@ def _look(place: Place, key: Key | None, found: Gathered) -> Checked:
         running=running,
         chained="previous" in lines[-1],
         row=row_from(folder, contents, opened_or_none(place.study_folder)),
-        trials=frozenset(trial for trial, _ in attempts(lines)),
+        trials=frozenset(progress_of(lines).presented),
         fingerprint=fingerprint(hashes) if ended else "",
     )
 
@@ -133,7 +135,7 @@ def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Conten
                 return NOTHING
             found.warning(
                 folder.path,
-                "was claimed, and its program was ended before it wrote a journal: begin it again, or delete it",
+                "was created, but the program ended before it wrote a journal: begin it again, or delete it",
             )
         else:
             found.error(folder.journal, f"is missing, {_BEGUN}")
@@ -146,13 +148,13 @@ def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Conten
     if contents.damage is not None:
         found.error(folder.journal, contents.damage.removeprefix(f"{folder.journal}, "))
     if contents.torn_bytes and not running:
-        found.warning(folder.journal, f"its last {contents.torn_bytes} bytes are a line that was never finished")
+        found.warning(folder.journal, f"its last {contents.torn_bytes} bytes are an incomplete line")
     if not contents.lines:
         if running or never_begun(folder.path):
             if not running:
-                found.warning(folder.journal, "holds no whole line: nothing was recorded")
+                found.warning(folder.journal, "has no complete line: nothing was recorded")
         elif contents.damage is None:
-            found.error(folder.journal, f"holds no whole line, {_BEGUN}")
+            found.error(folder.journal, f"has no complete line, {_BEGUN}")
         return NOTHING
     for name in unknown_events(contents.lines):
         found.warning(folder.journal, f"has events {name!r}, which this version does not know")
@@ -163,7 +165,7 @@ def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Conten
         return NOTHING
     if done.ended is None:
         if not running:
-            found.warning(folder.path, "is unfinished: resume it, or leave it so")
+            found.warning(folder.path, "is unfinished: resume it, or leave it unfinished")
     elif contents.lines[-1]["event"] != "session_ended":
         found.error(folder.journal, "lines follow the session's end")
     return contents
@@ -181,13 +183,15 @@ def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, fou
     if missing := [name for name in receipt.FIELDS if name not in held]:
         found.error(path, f"lacks {', '.join(missing)}")
     if key_hash is not None and held["key_hash"] != key_hash:
-        found.error(path, "published another key's hash than that of the sealed key")
+        found.error(path, "contains the hash of another key")
     if not lines:
         return
     if differing := [name for name in receipt.FACTS if name in held and held[name] != lines[0].get(name)]:
-        found.error(path, f"{', '.join(differing)}: not as in the journal")
+        found.error(path, f"{', '.join(differing)}: differ from the journal")
     if receipt.other_format(held, lines[0]):
-        found.error(folder.journal, f"has another format than {path.name} says: it was changed; restore it from a copy")
+        found.error(
+            folder.journal, (f"has another format than {path.name} states: it was changed; restore it from a copy")
+        )
     last = lines[-1]
     status = last["status"] if last["event"] == "session_ended" else receipt.UNFINISHED
     if held.get("status") != status and last["event"] == "session_ended" and not running:
@@ -198,12 +202,9 @@ def _place(place: Place, start: Line, found: Gathered) -> None:
     expected = {"participant": place.folder.participant, "session": place.folder.number, "study": place.study}
     for name, value in expected.items():
         if start.get(name) != value:
-            found.error(place.folder.journal, f"is of {name} {start.get(name)!r}, and lies among those of {value!r}")
-
-
-def _answers(folder: SessionFolder, lines: list[Line], found: Gathered) -> None:
-    for wrong in wrong_responses(lines):
-        found.error(folder.journal, wrong)
+            found.error(
+                place.folder.journal, (f"is of {name} {start.get(name)!r}, but is stored with those of {value!r}")
+            )
 
 
 def _rebuilt(folder: SessionFolder, found: Gathered) -> None:
@@ -235,7 +236,7 @@ def _hashes(folder: SessionFolder) -> dict[str, str]:
             return ""
 
     names = files(folder)
-    with ThreadPoolExecutor(READERS) as readers:
+    with open_executor("threads", READERS) as readers:
         return dict(zip(names, readers.map(hashed, names), strict=True))
 
 
@@ -243,7 +244,9 @@ def _checksums(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, st
     if lines[-1]["event"] != "session_ended":
         return
     if not is_there(folder.checksums):
-        found.error(folder.checksums, "is missing: was the program killed at the session's end? rebuild makes it")
+        found.error(
+            folder.checksums, ("is missing: was the program killed at the end of the session? rebuild creates it")
+        )
         return
     with found.reading(folder.checksums):
         listed = read_checksums(folder)
@@ -252,7 +255,7 @@ def _checksums(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, st
             if name not in hashes:
                 found.error(path, "is missing")
             elif name not in listed:
-                found.error(path, "has come since the session ended")
+                found.error(path, "was added after the session ended")
             elif not hashes[name]:
                 found.error(path, "cannot be read")
             elif hashes[name] != listed[name]:
@@ -263,13 +266,13 @@ def _recordings(
     folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered, *, running: bool
 ) -> None:
     """Check that every recording the journal tells of is there, whole and of this trial, and no other."""
-    told: set[str] = set()
-    known: set[tuple[int, int]] = set()
+    listed: set[str] = set()
+    known: set[tuple[int, int, int | None]] = set()
     for line in lines:
         if line["event"] not in ("recorded", "recording_lost"):
             continue
-        which = f"trial {line['trial']}, attempt {line['attempt']}"
-        known.add((line["trial"], line["attempt"]))
+        which = named(line)
+        known.add((line["trial"], line["attempt"], line.get("interval")))
         if line["event"] == "recording_lost":
             found.warning(folder.recordings, f"{which} has none: {line['reason']}")
             continue
@@ -279,9 +282,9 @@ def _recordings(
             ("samples", line["recording"], line["samples_recorded"], line["sha256"]),
             ("frames", line["recording_frames"], line["frames_recorded"], line["frames_sha256"]),
         ):
-            told.add(name)
+            listed.add(name)
             if name not in hashes:
-                found.error(folder.path / name, f"is missing, though the journal tells of it ({which})")
+                found.error(folder.path / name, f"is missing, but the journal mentions it ({which})")
                 continue
             if hashes[name] != digest:
                 found.error(folder.path / name, f"has changed since it was recorded ({which})")
@@ -290,19 +293,20 @@ def _recordings(
         return
     ends = lines[-1]["event"] == "session_ended"
     if lines[0].get("recordings"):
-        for trial, attempt in attempts(lines)[: None if ends else -1]:
-            if (trial, attempt) not in known:
-                found.warning(folder.recordings, f"trial {trial}, attempt {attempt} has none, and no line says why")
+        for trial, attempt, interval in recordable(lines)[: None if ends else -1]:
+            if (trial, attempt, interval) not in known:
+                which = named({"trial": trial, "attempt": attempt, "interval": interval})
+                found.warning(folder.recordings, f"{which} has none, and the journal gives no reason")
     of_trials = {
         path.relative_to(folder.path).as_posix()
-        for which in attempts(lines)
-        for path in recording_files(folder.recordings, *which)
+        for recorded in recordable(lines)
+        for path in recording_files(folder.recordings, *recorded)
     }
-    for name in sorted(hashes.keys() - told):
+    for name in sorted(hashes.keys() - listed):
         if name.endswith(".parquet") and name not in of_trials:
             found.error(folder.path / name, "is of a trial that the journal never started")
         elif name.endswith(".parquet"):
-            then = "" if ends else "; resuming the session takes it up"
+            then = "" if ends else "; resuming the session adds it"
             found.warning(folder.path / name, f"is in no line of the journal{then}")
 
 
@@ -321,6 +325,7 @@ def _facts(folder: SessionFolder, line: Line, kind: str, name: str, rows: int, f
             "attempt": line["attempt"],
             "kind": kind,
             "rows": rows,
+            "interval": line.get("interval"),
         }
         for fact, value in expected.items():
             if facts.get(fact) != value:

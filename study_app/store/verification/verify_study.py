@@ -20,17 +20,25 @@ from study_app.store import exclusions, receipt
 from study_app.store.atomic import is_there, read_own, read_regular, temporaries
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
+from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place
 from study_app.store.tables import csv_files
-from study_app.store.tables.columns import EXCLUSIONS, PARTICIPANTS
-from study_app.store.tables.participants import opened_or_none, row_of
-from study_app.store.tables.study_description import described_study, describes_alike, description_bytes, names_sealed
+from study_app.store.tables.columns import EXCLUSIONS
+from study_app.store.tables.participants import columns_of, opened_or_none, row_of, table_bytes
+from study_app.store.tables.study_description import (
+    described_study,
+    describes_alike,
+    description_bytes,
+    has_intervals,
+    names_sealed,
+)
 from study_app.store.verification import psychds, table_checks
 from study_app.store.verification.fingerprints import listed, place_of, read_copy, unreadable
-from study_app.store.verification.leaks import certain_telltales, find_leaks
+from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers
 from study_app.store.verification.table_comparison import check_table
+from study_app.store.verification.verify_allocation import check_allocation
 from study_app.store.verification.verify_session import BETWEEN_S, LOOKS, Checked, check_session
 from study_app.store.verification.violations import Finding, Gathered
 
@@ -60,6 +68,8 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
 
     Parameters
     ----------
+    folder : Path
+        The study folder.
     fingerprints : Path, optional
         A copy of the study's ``fingerprints.txt`` that was kept elsewhere: every session that ended must be in it, and
         be the same.
@@ -67,14 +77,14 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     Raises
     ------
     StoreError
-        It is no study's folder, or ``fingerprints`` no copy of fingerprints.
+        It is not a study folder, or ``fingerprints`` no copy of fingerprints.
     """
     copy = None if fingerprints is None else read_copy(fingerprints)
     study = StudyFolder(folder)
     name = described_study(study)
     if name is None:
         raise StoreError(
-            f"{folder} is no study's folder (no {study.description.name}): name one such as results/rek2024"
+            f"{folder} is not a study folder (no {study.description.name}): name one such as results/rek2024"
         )
     found = Gathered(folder)
     key = _key(study, found)
@@ -88,9 +98,10 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     _description(study, found)
     _exclusions(study, sessions, found)
     _reveals(study, key, found)
+    check_allocation(study, key, found)
     _blinding(study, key, found)
     for path in (*temporaries(folder), *temporaries(study.data)):
-        found.warning(path, "was left half-written by a program that was ended, or is just being written")
+        found.warning(path, "is an incomplete file of a program that was ended, or is being written")
     running = sum(one.running for one in sessions)
     whole = not is_open(folder)  # else a program writes tables that the rules ask for when it ends
     rules = psychds.validate(folder)
@@ -119,11 +130,12 @@ def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Gath
     for _ in range(LOOKS):
         if is_open(study.path):  # by a program that writes the table when it ends
             return
-        content = csv_files.csv_bytes(PARTICIPANTS, [row for row, _ in rows])
+        held = [row for row, _ in rows]
+        content, tables = table_bytes(study, held), {"participants": columns_of(study, held)}
         behind = [running or row["status"] == receipt.UNFINISHED for row, running in rows]
         late = {number for number, may_be in enumerate(behind, start=2) if may_be}
         seen = found.alike()
-        check_table(path, content, "participants", seen, may_be_behind=late.__contains__)
+        check_table(path, content, "participants", seen, may_be_behind=late.__contains__, tables=tables)
         if not seen.errors or (rows == before and not any(running for _, running in rows)):
             break
         time.sleep(BETWEEN_S)
@@ -136,7 +148,7 @@ def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Gath
 def _chains(study: StudyFolder, sessions: Sessions, found: Gathered) -> None:
     if early := sum(one.row is not None and not one.chained for one in sessions):
         many = "1 journal is" if early == 1 else f"{early} journals are"
-        found.warning(study.data, f"{many} of format 1, whose lines do not tell whether a line before was changed")
+        found.warning(study.data, f"{many} of format 1, whose lines cannot show whether an earlier line was changed")
 
 
 def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: Gathered) -> None:
@@ -146,7 +158,7 @@ def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: 
     """
     path = study.fingerprints
     for number in unreadable(path):
-        found.error(path, f"line {number} is no fingerprint: restore it from a copy")
+        found.error(path, f"line {number} is not a fingerprint: restore it from a copy")
     _compare(study, sessions, early, path.name, found)
     ended = [place_of(study, one.place.folder) for one in sessions if one.fingerprint and one.chained]
     lacking = _lacking(path, ended)
@@ -154,7 +166,7 @@ def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: 
         time.sleep(BETWEEN_S)
         lacking = _lacking(path, ended)
     for place in lacking:
-        found.error(path, f"lacks {place}, which has ended; rebuild of it adds it")
+        found.error(path, f"lacks {place}, which has ended; rebuild adds it")
 
 
 def _lacking(path: Path, ended: Sequence[str]) -> list[str]:
@@ -177,11 +189,11 @@ def _compare(study: StudyFolder, sessions: Sessions, proofs: Proofs, name: str, 
     for proof, place in proofs:
         one, path = there.get(place), study.path / place
         if one is None:
-            found.error(path, f"is missing, though {name} lists it: it was deleted after it had ended")
+            found.error(path, f"is missing, but {name} lists it: it was deleted after it had ended")
             continue
         proved = _left(one).fingerprint
         if proof != proved:
-            now = f"its fingerprint is {proved}" if proved else "it has no end any more"
+            now = f"its fingerprint is {proved}" if proved else "it no longer has an end"
             found.error(path, f"is not the session that {name} lists as {proof}: it was changed ({now})")
 
 
@@ -201,13 +213,15 @@ def _description(study: StudyFolder, found: Gathered) -> None:
     heads: set[bytes] = set()
     for protocol in _published(study):
         with contextlib.suppress(KeyError, TypeError, ValueError):  # said of the receipt already
-            heads.add(description_bytes(StudyHead.model_validate(protocol["study"]), sealed=sealed))
+            head, number = StudyHead.model_validate(protocol["study"]), protocol.get("format", 1)
+            intervals = has_intervals(protocol)
+            heads.add(description_bytes(head, sealed=sealed, protocol_format=number, intervals=intervals))
     if not heads or held in heads:
         return
     if any(describes_alike(held, head) for head in heads):
         found.warning(study.description, "describes the columns as an earlier version of the program did")
     else:
-        found.error(study.description, "is not what this version writes for the study in the receipts")
+        found.error(study.description, "differs from what this version writes for the study in the receipts")
 
 
 def _published(study: StudyFolder) -> Iterator[dict[str, Any]]:
@@ -237,18 +251,21 @@ def _reveals(study: StudyFolder, key: Key | None, found: Gathered) -> None:
     with found.reading(study.reveals):
         for number, torn in blinding.unreadable_reveals(study.path):
             if torn:
-                found.warning(study.reveals, f"line {number} records no reveal: it was torn by a power cut")
+                found.warning(study.reveals, f"line {number} is not a reveal: it is incomplete after a power failure")
             else:
-                found.error(study.reveals, f"line {number} records no reveal: it was changed; restore it from a copy")
+                found.error(study.reveals, f"line {number} is not a reveal: it was changed; restore it from a copy")
         for number, record in enumerate(blinding.reveals(study.path), start=1):
             if key is not None and record["key_hash"] != key.hash:
                 found.error(study.reveals, f"reveal {number} was of another key")
 
 
 def _blinding(study: StudyFolder, key: Key | None, found: Gathered) -> None:
-    """Say where a condition is told before the key was revealed, but not which."""
+    """Say where a condition is revealed before the key was, but not which."""
     published = next(_published(study), None)
     if key is None or blinding.reveals(study.path) or published is None:
         return
-    for leak in find_leaks(study.path, certain_telltales(key.tables, published)):
-        found.warning(study.path, f"{leak.place} tells a condition, though the key is sealed")
+    levels: frozenset[float] = frozenset()
+    with contextlib.suppress(KeyError, TypeError, AttributeError, ValueError):  # a receipt without what it must hold
+        levels = presented_numbers(whole_protocol(published, key))
+    for leak in find_leaks(study.path, certain_telltales(key.tables, published, levels)):
+        found.warning(study.path, f"{leak.place} reveals a condition, although the key is sealed")

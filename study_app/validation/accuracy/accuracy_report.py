@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from study_app.evaluation.style import file_bytes
+from study_app.figure_style import PLOT_SETTINGS, file_bytes
 from study_app.store.atomic import write_file
+from study_app.store.tables.csv_files import csv_text_of
+from study_app.validation.accuracy.accuracy_figure import draw
 from study_app.validation.accuracy.comparison import Accuracy, Row
-from study_app.validation.accuracy.figure import draw
 
 COLUMNS: Final = (
     "kind",
@@ -52,12 +51,8 @@ def _values(row: Row) -> tuple[str | float, ...]:
 
 def csv_text(found: Accuracy) -> str:
     """Return the table for machines: CSV, named `COLUMNS`."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for row in found.rows:
-        writer.writerow([f"{it:.6g}" if isinstance(it, float) else it for it in _values(row)])
-    return text.getvalue()
+    rows = ([f"{it:.6g}" if isinstance(it, float) else it for it in _values(row)] for row in found.rows)
+    return csv_text_of([COLUMNS, *rows])
 
 
 def write(found: Accuracy, to: Path) -> tuple[Path, ...]:
@@ -70,7 +65,7 @@ def write(found: Accuracy, to: Path) -> tuple[Path, ...]:
     """
     figure = draw(found)
     files = {"csv": csv_text(found).encode(), "md": markdown(found).encode()}
-    files |= {kind: file_bytes(figure, kind, "What accuracy costs in time") for kind in ("png", "svg")}
+    files |= {kind: file_bytes(figure, kind, "What accuracy costs in time", PLOT_SETTINGS) for kind in ("png", "svg")}
     for kind, content in files.items():
         write_file(to / f"accuracy.{kind}", content)
     return tuple(to / f"accuracy.{kind}" for kind in files)
@@ -97,7 +92,7 @@ _WHAT: Final = (
 _HEADINGS: Final = (
     "",
     "model",
-    "ns a tick",
+    "ns per tick",
     "p99",
     "RMS error [N]",
     "max [N]",
@@ -105,7 +100,7 @@ _HEADINGS: Final = (
     "max [%]",
     "direction [°]",
     "memory [kB]",
-    "ticks a second",
+    "ticks per second",
     "times real time",
 )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from study_app.evaluation.scene_variants import _only, _wake, with_effects, with_wake
-from study_app.haptics.model.bounds import REFERENCE
+from study_app.haptics.model.effects.drag import REFERENCE
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws import Law
 from study_app.haptics.model.scene import Effect, Estimator, Ewma, Foaw, Given, Line, Raw, Scene
@@ -105,8 +105,11 @@ def physical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
     for effect in ("added_mass", "history"):
         carried = (*carried, effect)
         rungs.append(_carrying(exact, REFERENCE, carried))
+    rungs.append(TickRung("unsteady drag", "unsteady drag", "effects", with_effects(exact, "unsteady_drag")))
     gated = resolve(_only(scene, scene.liquids[0].model_copy(update={"effects": "auto"}))).liquids[0]
     carried = tuple(it for it in _WORDS if it in gated.effects)
+    if "unsteady_drag" in gated.effects:
+        return tuple(rungs), rungs[-1]
     if "drag" not in gated.effects:
         choice: Rung = TickRung("no resistance", "no resistance", "effects", with_effects(exact, *carried))
     else:

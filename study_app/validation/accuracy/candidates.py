@@ -1,7 +1,7 @@
 """The rungs of the ladders: ways to get a force from a motion, each of which can be measured for error and for time.
 
 A rung takes ticks, one after another: `Rung.forces` takes a whole motion at once, `Rung.begin` and `Rung.take` let the
-ticks be timed in batches. Compiled rungs all run the servo's own turn, door and safety included, so that what differs
+ticks be timed in batches. Compiled rungs all run the servo's own tick, door and safety included, so that what differs
 between their times is the model alone.
 """
 
@@ -21,15 +21,15 @@ from study_app.haptics.kernels.effects.drag import resistance
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.kernels.vector import norm, subtract
-from study_app.haptics.model.bounds import resistance_n
+from study_app.haptics.model.effects.drag import resistance_n
 from study_app.haptics.model.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
-from study_app.haptics.model.limits import Bearable
+from study_app.haptics.model.limits import DampingLimits
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Given, Scene
 from study_app.haptics.runtime.pack import Model, pack
 from study_app.validation.accuracy.naive_wake import NumpyTail, PlainTail, list_follow, list_wake, new_list
 
-UNLIMITED: Final = Bearable(1e9, 1e9)
+UNLIMITED: Final = DampingLimits(1e9, 1e9)
 """Forces are compared as the model gives them: no slope limit, which no table has for the slowest rungs."""
 Family: TypeAlias = Literal["tick", "list", "rate", "estimator", "law", "effects"]
 
@@ -109,7 +109,7 @@ class TickRung(Rung):
     @property
     def memory_bytes(self) -> int:
         """Size of the model."""
-        return sum(rows.nbytes for rows in _packed(self.scene))
+        return sum(rows.nbytes for rows in _packed(self.scene).arrays)
 
 
 class LinearRung(Rung):
@@ -132,7 +132,7 @@ class LinearRung(Rung):
     @property
     def memory_bytes(self) -> int:
         """Size of a model without liquids."""
-        return sum(rows.nbytes for rows in _packed(self.scene.model_copy(update={"liquids": ()})))
+        return sum(rows.nbytes for rows in _packed(self.scene.model_copy(update={"liquids": ()})).arrays)
 
 
 @dataclass(eq=False)
@@ -151,8 +151,8 @@ class ListRung(Rung):
         """Take ticks, as `Rung.take`."""
         motion = (self._t_ns, self._hand_m, self._velocity_mps)
         tail, element, arc, segment = self._list
-        turn = (self._model, self._safety[0], self._sample[0], motion)
-        _by_the_list(turn, self._liquid, (tail[0], element, arc, segment), self.force_n, start, stop)
+        tick = (self._model, self._safety[0], self._sample[0], motion)
+        _by_the_list(tick, self._liquid, (tail[0], element, arc, segment), self.force_n, start, stop)
 
     @property
     def memory_bytes(self) -> int:
@@ -198,7 +198,7 @@ def given(scene: Scene) -> Scene:
 
 
 @kernel
-def _turn(model: Any, safety: Record, sample: Record, motion: Any, k: int) -> None:
+def _tick(model: Any, safety: Record, sample: Record, motion: Any, k: int) -> None:
     """Take one tick of a motion."""
     t_ns, hand_m, velocity_mps = motion
     state = model.state[0]
@@ -215,7 +215,7 @@ def _turn(model: Any, safety: Record, sample: Record, motion: Any, k: int) -> No
 @kernel
 def _by_the_tick(model: Any, safety: Record, sample: Record, motion: Any, force_n: Any, start: int, stop: int) -> None:
     for k in range(start, stop):
-        _turn(model, safety, sample, motion, k)
+        _tick(model, safety, sample, motion, k)
         for axis in range(3):
             force_n[k, axis] = sample.force_n[axis]
 
@@ -225,18 +225,18 @@ def _by_damping(
     model: Any, safety: Record, sample: Record, motion: Any, damping: float, force_n: Any, start: int, stop: int
 ) -> None:
     for k in range(start, stop):
-        _turn(model, safety, sample, motion, k)
+        _tick(model, safety, sample, motion, k)
         for axis in range(3):
             force_n[k, axis] = -damping * sample.velocity_mps[axis]
 
 
 @kernel
-def _by_the_list(turn: Any, liquid: Record, listed: Any, force_n: Any, start: int, stop: int) -> None:
-    model, safety, sample, motion = turn
+def _by_the_list(tick: Any, liquid: Record, listed: Any, force_n: Any, start: int, stop: int) -> None:
+    model, safety, sample, motion = tick
     tail, element, arc, segment = listed
     v, w = sample.velocity_mps, tail.relative_mps
     for k in range(start, stop):
-        _turn(model, safety, sample, motion, k)
+        _tick(model, safety, sample, motion, k)
         list_wake(liquid.wake, tail, element, segment)
         subtract(v, tail.wake_mps, w)
         resistance_nspm = resistance(liquid.drag, norm(w))

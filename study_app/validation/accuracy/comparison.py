@@ -20,6 +20,7 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Scene
 from study_app.validation.accuracy import candidate_sets
 from study_app.validation.accuracy.candidates import Rung, given
+from study_app.validation.cfd.solver_truths import solver_truths
 from study_app.validation.computer import machine
 
 Kind: TypeAlias = Literal["numerical", "physical"]
@@ -141,7 +142,7 @@ def _physical_truths(scene: Scene, notes: list[str]) -> tuple[Truth, ...]:
     measured = truths.steady(scene)
     if measured is None:
         notes.append("steady drag: no experiment is known at Reynolds numbers so low")
-    solved = truths.stored(scene)
+    solved = solver_truths(scene)
     if not solved:
         notes.append(f"fluid solver: no table is stored for {scene.liquids[0].id} and this ball")
     steady = () if measured is None else (measured,)

@@ -15,9 +15,11 @@ import numpy as np
 
 from study_app.evaluation.identify.fit import fit
 from study_app.evaluation.identify.measured_force import along_a_line
+from study_app.haptics.model.effects.local_wake import LocalWake
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.overrides import override_all
-from study_app.haptics.model.scene import Effect, Given, Liquid, LocalWake, Scene, Wake
+from study_app.haptics.model.scene import Effect, Given, Liquid, Scene
 from study_app.haptics.runtime.offline import simulate
 from study_app.validation.cfd.cases import RAMP, STOP, Case
 from study_app.validation.cfd.stored_flows import Table
@@ -50,8 +52,10 @@ MODELS: Final = (
     Model("... and history", ("drag", "history")),
     Model("... history, added mass", ("drag", "added_mass", "history")),
     Model("... history, added mass fitted", ("drag", "added_mass", "history"), free=("coefficient",)),
+    Model("unsteady drag", ("unsteady_drag",)),
 )
-"""From the thesis' drag alone to all that creeping flow has; "..." is the drag of the Reynolds number."""
+"""From the thesis' drag alone to all that creeping flow has, and the law whose constants are fitted to the solver;
+"..." is the drag of the Reynolds number."""
 
 _START: Final = {"length": 300, "scaling": 1000.0}
 

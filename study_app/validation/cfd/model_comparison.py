@@ -1,26 +1,23 @@
-"""The fluid solver beside published drag and our laws, and models beside the solver, as tables in words and as CSV."""
+"""The fluid solver against published drag and our laws, and models against the solver, as text tables and as CSV."""
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from study_app.errors import StudyError
 from study_app.evaluation.identify.parameters import find
 from study_app.evaluation.reference_solutions import measured_drag_n
-from study_app.evaluation.style import file_bytes
+from study_app.figure_style import PLOT_SETTINGS, file_bytes
 from study_app.haptics.model.laws import LAWS
 from study_app.haptics.model.scene import Liquid
 from study_app.store.atomic import write_file
-from study_app.validation.cfd.figure import draw
-from study_app.validation.cfd.fits import MODELS, Fitted, judge, scene_of
+from study_app.store.tables.csv_files import csv_text_of
+from study_app.validation.cfd.fits import Fitted, scene_of
+from study_app.validation.cfd.flow_figure import draw
 from study_app.validation.cfd.stored_flows import Table
 
 FITS_FILE: Final = "fits.csv"
@@ -70,37 +67,12 @@ def fits_markdown(fits: Sequence[Fitted]) -> str:
 
 def fits_csv(fits: Sequence[Fitted]) -> bytes:
     """Return the fits as CSV, named `COLUMNS`; parameters as ``name=value`` apart by blanks."""
-    target = io.StringIO()
-    writer = csv.writer(target, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    rows: list[Sequence[str]] = [COLUMNS]
     for it in fits:
         numbers = (it.rms_n, it.worst_n, it.share, it.within, it.push, it.carried)
         given = " ".join(f"{name}={value!r}" for name, value in it.values.items())
-        writer.writerow([it.case.name, it.model.name, given, *(f"{number:.6g}" for number in numbers)])
-    return target.getvalue().encode()
-
-
-def read_fits(file: Traversable, tables: Sequence[Table]) -> tuple[Fitted, ...]:
-    """Return the fits of a file that `fits_csv` wrote, judged anew by the tables; nothing is fitted.
-
-    Raises
-    ------
-    StudyError
-        The file cannot be read, or is of other models or tables.
-    """
-    models, by_name = {it.name: it for it in MODELS}, {it.case.name: it for it in tables}
-    try:
-        rows = list(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))
-        found = []
-        for row in rows:
-            table = by_name[row["table"]]
-            values = {name: float(value) for name, _, value in (it.partition("=") for it in row["parameters"].split())}
-            values |= {name: round(value) for name, value in values.items() if name == "length"}
-            others = [it for it in tables if it.case.liquid_id == table.case.liquid_id and it is not table]
-            found.append(judge(models[row["model"]], table, values, others))
-    except (OSError, KeyError, ValueError) as error:
-        raise StudyError(f"the stored fits {file.name} cannot be used ({error}): make them again") from error
-    return tuple(found)
+        rows.append([it.case.name, it.model.name, given, *(f"{number:.6g}" for number in numbers)])
+    return csv_text_of(rows).encode()
 
 
 def write(tables: Sequence[Table], drag: Table, fits: Sequence[Fitted], to: Path) -> tuple[Path, ...]:
@@ -114,7 +86,10 @@ def write(tables: Sequence[Table], drag: Table, fits: Sequence[Fitted], to: Path
     figure = draw(tables, fits)
     said = f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}\n"
     files = {FITS_FILE: fits_csv(fits), "cfd.md": said.encode()}
-    files |= {f"cfd.{kind}": file_bytes(figure, kind, "Models beside a fluid solver") for kind in ("png", "svg")}
+    files |= {
+        f"cfd.{kind}": file_bytes(figure, kind, "Models against a fluid solver", PLOT_SETTINGS)
+        for kind in ("png", "svg")
+    }
     for name, content in files.items():
         write_file(to / name, content)
     return tuple(to / name for name in files)

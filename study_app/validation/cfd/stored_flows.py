@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -14,6 +13,7 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.haptics.model.motion import Floats
+from study_app.store.tables.csv_files import csv_text_of
 from study_app.validation.cfd.cases import Case
 
 MOTION: Final = ("t_s", "velocity_mps", "force_n")
@@ -21,6 +21,8 @@ MOTION: Final = ("t_s", "velocity_mps", "force_n")
 STEADY: Final = ("reynolds", "drag_coefficient", "drag_coefficient_coarse", "drag_coefficient_narrow")
 """C_d, the same on a coarser grid, and in a box of half the size."""
 STEADY_FILE: Final = "steady.csv"
+OF_THE_MODEL: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "computing_s_per_s")
+"""The notes of a table of `MOTION` by which models are compared with it."""
 _OF_THE_CASE: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "speed_mps")
 
 
@@ -39,13 +41,9 @@ class Table:
 
 def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats], digits: int = 7) -> bytes:
     """Return a table as the bytes of its file."""
-    target = io.StringIO()
-    for name, value in notes.items():
-        target.write(f"# {name}: {value}\n")
-    writer = csv.writer(target, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([f"{value:.{digits}g}" for value in row] for row in zip(*columns.values(), strict=True))
-    return target.getvalue().encode()
+    head = "".join(f"# {name}: {value}\n" for name, value in notes.items())
+    rows = ([f"{value:.{digits}g}" for value in row] for row in zip(*columns.values(), strict=True))
+    return (head + csv_text_of([columns, *rows])).encode()
 
 
 def notes_of(case: Case) -> dict[str, str]:
@@ -66,10 +64,11 @@ def stored(folder: Traversable | None = None) -> tuple[Table, ...]:
         There is none, or one cannot be understood.
     """
     place = folder or _package()
-    files = sorted((it for it in place.iterdir() if it.name.endswith("mmps.csv")), key=lambda it: it.name)
+    names = place.iterdir() if place.is_dir() else ()
+    files = sorted((it for it in names if it.name.endswith("mmps.csv")), key=lambda it: it.name)
     if not files:
         raise StudyError(f"{place} holds no tables of the fluid solver: make them with liquid-study cfd --solve")
-    return tuple(_read(it, MOTION) for it in files)
+    return tuple(_read(it, MOTION, OF_THE_MODEL) for it in files)
 
 
 def steady(folder: Traversable | None = None) -> Table:
@@ -87,10 +86,13 @@ def _package() -> Traversable:
     return resources.files("study_app.validation.cfd")
 
 
-def _read(file: Traversable, names: Sequence[str]) -> Table:
+def _read(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> Table:
     try:
         lines = file.read_text(encoding="utf-8").splitlines()
-        notes = dict(line[1:].split(":", 1) for line in lines if line.startswith("#"))
+        said = (line[1:].split(":", 1) for line in lines if line.startswith("#"))
+        notes = {name.strip(): value.strip() for name, value in said}
+        for name in noted:
+            float(notes.get(name, f"no note of {name}"))
         header, *rows = csv.reader(line for line in lines if not line.startswith("#"))
         if tuple(header) != tuple(names):
             raise ValueError(f"its columns are {','.join(header)}, not {','.join(names)}")  # noqa: TRY301
@@ -100,4 +102,4 @@ def _read(file: Traversable, names: Sequence[str]) -> Table:
         raise StudyError(
             f"the solver's table {file.name} cannot be used ({error}): make it again with liquid-study cfd --solve"
         ) from error
-    return Table({name.strip(): value.strip() for name, value in notes.items()}, columns)
+    return Table(notes, columns)

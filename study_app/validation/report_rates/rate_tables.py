@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 
+from study_app.store.tables.csv_files import csv_text_of
 from study_app.validation.report_rates.rates import Rate
 
 
@@ -23,10 +22,10 @@ def markdown(rates: Sequence[Rate]) -> str:
 
 def table(rates: Sequence[Rate]) -> bytes:
     """Return the rates as CSV, a row each."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["studies", "participants", "what", "limit", "hits", "of", "share", "low", "high", "holds"])
+    rows: list[list[object]] = [
+        ["studies", "participants", "what", "limit", "hits", "of", "share", "low", "high", "holds"]
+    ]
     for one in rates:
         share = (f"{number:.6f}" for number in (one.share, *one.interval))
-        writer.writerow([one.cell, one.participants, one.what, one.limit, one.hits, one.studies, *share, one.holds])
-    return text.getvalue().encode()
+        rows.append([one.cell, one.participants, one.what, one.limit, one.hits, one.studies, *share, one.holds])
+    return csv_text_of(rows).encode()

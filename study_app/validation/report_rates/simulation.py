@@ -1,17 +1,15 @@
-"""All cells in parallel processes: batches of every cell in turn, so that any part of them is a smaller whole."""
+"""All cells by an executor: batches of every cell alternate, so that any part of them is a smaller whole."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from concurrent.futures import Executor
 from functools import partial
 from typing import Final, TypeAlias
 
-from joblib import Parallel, delayed
-
 from study_app.validation.report_rates import single_test_rates, study_rates
+from study_app.validation.report_rates.known_effects import EXTENTS, GENERATORS, Simulated
 from study_app.validation.report_rates.rates import Rate
-from study_app.validation.report_rates.simulated_studies import EXTENTS, GENERATORS, Simulated
 from study_app.validation.report_rates.study_rates import BATCH, Cell
 
 SIZES: Final = (5, 12, 24)
@@ -34,9 +32,9 @@ def cells(sizes: Sequence[int] = SIZES) -> tuple[Cell, ...]:
 def validate(
     simulation: Simulated,
     studies: int,
-    seed: int = 1,
+    executor: Executor,
     *,
-    jobs: int = -1,
+    seed: int = 1,
     sizes: Sequence[int] = SIZES,
     progress: Callable[[str], object] = str,
 ) -> Iterator[tuple[int, tuple[Rate, ...]]]:
@@ -49,27 +47,28 @@ def validate(
     ----------
     studies : int
         Of each cell.
-    jobs : int
-        How many processes work at once; -1: as many as there are cores. What is counted does not depend on it.
+    executor : concurrent.futures.Executor
+        Counts the batches; what is counted does not depend on it.
+    seed : int
+        Of all randomness; every batch draws from a stream of its own.
     progress : callable
         Is called with a line for each cell that is continued.
     """
-    counts = _counts(simulation, sizes)
+    counts = cell_counts(simulation, sizes)
     done, total = 0, dict[tuple[str, int, str], Rate]()
     for finished in range(ROUNDS):
-        with ExitStack() as running:
-            results = Parallel(n_jobs=jobs, return_as="generator", pre_dispatch="3*n_jobs", batch_size=1)(
-                delayed(count)(seed, batch, many)
-                for batch, many in _batches(studies, finished)
-                for count in counts.values()
-            )
-            running.callback(results.close)
-            for rates in results:
-                done += rates[0].studies
-                for rate in rates:
-                    key = (rate.cell, rate.participants, rate.what)
-                    total[key] = total[key] + rate if key in total else rate
-                yield done, tuple(total.values())
+        waiting = [
+            executor.submit(count, seed, batch, many)
+            for batch, many in _batches(studies, finished)
+            for count in counts.values()
+        ]
+        for future in waiting:
+            rates = future.result()
+            done += rates[0].studies
+            for rate in rates:
+                key = (rate.cell, rate.participants, rate.what)
+                total[key] = total[key] + rate if key in total else rate
+            yield done, tuple(total.values())
         undecided = [rate for rate in total.values() if rate.holds == "too few studies"]
         counts = {key: counts[key] for key in dict.fromkeys((rate.cell, rate.participants) for rate in undecided)}
         if not counts:
@@ -79,7 +78,7 @@ def validate(
                 progress(f"continued: {rate}")
 
 
-def _counts(simulation: Simulated, sizes: Sequence[int]) -> Mapping[Key, Count]:
+def cell_counts(simulation: Simulated, sizes: Sequence[int]) -> Mapping[Key, Count]:
     """Return how the rates of every cell are counted."""
     every = cells(sizes)
     kinds = {(cell.generator, cell.extent): cell for cell in every}

@@ -31,7 +31,7 @@ WIDTH_MS: Final = 60.0
 LAPSE: Final = 0.02
 
 TWELVE_EQUAL: Final = (12, (0.0,))
-"""In 6.9 % of these studies nobody of the one in five takes part, and all twelve differences are 0: equivalent."""
+"""In 6.9 % of these studies no one of the one in five takes part, and all twelve differences are 0: equivalent."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""A wake written down element by element, beside the servo's running sums, to be summed exactly now and then.
+"""A wake stored element by element, to be summed exactly now and then and compared with the servo's running sums.
 
 The servo keeps sums and takes from them what falls off. Here nothing is ever summed in passing: from the samples in
 telemetry alone, by the definition, each stored velocity is kept as it was, with its segment and the time it was stored;
@@ -13,9 +13,10 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
 from study_app.haptics.model.motion import Floats
-from study_app.haptics.model.scene import Everywhere, Liquid, Scene, Wake
+from study_app.haptics.model.scene import Everywhere, Liquid, Scene
 
 REST_MPS: Final = 1e-3
 REFUSALS_IN_A_ROW: Final = 5
@@ -63,7 +64,8 @@ def wake_of(scene: Scene) -> Wake | None:
     liquid: Liquid = scene.liquids[0]
     if "wake" not in liquid.effects or "current" in liquid.effects or not isinstance(liquid.region, Everywhere):
         return None
-    return liquid.wake
+    found: Wake | None = liquid.wake
+    return found
 
 
 class Ledger:

@@ -77,7 +77,7 @@ _inner_read, _inner_write = call_at(READ), call_at(WRITE)
 
 
 class FaultyDevice:
-    """A device between the servo and ``inner``, which it breaks; both must live as long as the servo turns.
+    """A device between the servo and ``inner``, which it breaks; both must live as long as the servo ticks.
 
     Parameters
     ----------

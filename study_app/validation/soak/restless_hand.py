@@ -32,7 +32,7 @@ class RestlessHand(ScriptedDevice):
         if kind < 0.4:
             self.rest()
             return 0.1 + self._draw()
-        return self._circle() if kind < 0.7 else self._turn_sharply()
+        return self._circle() if kind < 0.7 else self._tick_sharply()
 
     def keep_still(self) -> None:
         """Stay, without a tremor: the encoders come to rest."""
@@ -40,7 +40,7 @@ class RestlessHand(ScriptedDevice):
         self.rest()
 
     def _shake(self, amplitude_m: float) -> None:
-        self._state.hand.tremor_m = amplitude_m
+        self.state.hand.tremor_m = amplitude_m
 
     def _reach(self) -> float:
         duration_s = 0.12 + 1.5 * self._draw() ** 2
@@ -65,7 +65,7 @@ class RestlessHand(ScriptedDevice):
         self.follow(t_s, np.column_stack([radius_m * np.cos(angle), y_m, radius_m * np.sin(angle)]))
         return duration_s
 
-    def _turn_sharply(self) -> float:
+    def _tick_sharply(self) -> float:
         """Go along straight legs to random places, without slowing down at the corners."""
         legs = 4 + int(8 * self._draw())
         places_m = np.array([self._place_m() for _ in range(legs)])

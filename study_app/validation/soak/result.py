@@ -32,7 +32,7 @@ _SEEN: Final = {
     NON_FINITE: "not_finite",
     GLITCH: "displaced",
     SILENCE: "silent",
-    JUMP: "long_turns",
+    JUMP: "long_ticks",
     BUTTON: "buttons",
     LOST: "lost",
     LOST_AT_WRITE: "lost_at_write",
@@ -89,7 +89,7 @@ class Soaked:
         """Of each kind: its name, how many times, how many readings, and how many of these telemetry has."""
         rows = []
         for kind, name in enumerate(KINDS):
-            shown = kind != JUMP or self.virtual  # a turn may take long for other reasons too
+            shown = kind != JUMP or self.virtual  # a tick may take long for other reasons too
             seen = int(self.counts[_SEEN[kind]]) if shown else None
             rows.append((name, int(self.device.episodes[kind]), int(self.device.injected[kind]), seen))
         return tuple(rows)
@@ -105,17 +105,17 @@ class Soaked:
         counts, device = self.counts, self.device
         first = f", first at tick {counts.first_tick}"
         yield f"{counts.excess} forces above the limit of {counts.limit_n:g} N{first}", counts.excess > 0
-        yield f"{counts.no_number} forces that are no numbers{first}", counts.no_number > 0
+        yield f"{counts.no_number} non-finite forces{first}", counts.no_number > 0
         spoilt = int(counts.limiters[LIMITER_NAMES.index("non_finite")])
-        yield f"{spoilt} forces of the liquids that are no numbers", spoilt > 0
-        yield f"{device.not_finite} forces were written that are no numbers", device.not_finite > 0
+        yield f"{spoilt} non-finite forces of the liquids", spoilt > 0
+        yield f"{device.not_finite} non-finite forces were written", device.not_finite > 0
         yield f"a force of {device.most_n:.3g} N was written", device.most_n > counts.limit_n + TOLERANCE_N
         yield (
             f"{counts.steps} steps of up to {counts.steepest_n:.3g} N, not {counts.slew_n:g} N{first}",
             counts.steps > 0,
         )
         yield f"{counts.unstopped} forces other than zero while stopped{first}", counts.unstopped > 0
-        yield f"{counts.believed} readings believed that are no place{first}", counts.believed > 0
+        yield f"{counts.believed} implausible readings accepted{first}", counts.believed > 0
         yield f"the clock is off its ticks by up to {counts.drift_ns} ns{first}", counts.drift_ns > 0
         yield f"the last force written is {device.last_n.tolist()} N, not zero", bool(device.last_n.any())
 
@@ -134,7 +134,7 @@ class Soaked:
         yield f"{self.ticks} ticks are not {counts.samples} samples and {self.dropped} dropped", lost
         if self.dropped == 0:
             wrong = counts.overruns != self.overruns
-            yield f"{self.overruns} overruns, but {counts.overruns} follow from the turns", wrong
+            yield f"{self.overruns} overruns, but {counts.overruns} follow from the ticks", wrong
             for name, _, readings, seen in self.faults:
                 yield f"{readings} readings of {name}, but {seen} in telemetry", seen not in {None, readings}
 
@@ -173,7 +173,7 @@ class Soaked:
             "",
             "drift",
             f"  clock against ticks   {self.counts.drift_ns} ns",
-            f"  wake and definition   {drift.worst:.1e} of Σ|e|/S at most in {drift.comparisons:,} looks; "
+            f"  wake and definition   {drift.worst:.1e} of Σ|e|/S at most in {drift.comparisons:,} comparisons; "
             f"a wake ran for {drift.longest_s:,.0f} s",
             f"  left after {rests.count:,} rests   wake {rests.wake_mps:g} m/s, force {rests.force_n:.1e} N; "
             f"more than {FELT_N} N for {rests.pushed_s:.2f} s at most",
@@ -187,8 +187,8 @@ class Soaked:
             f"  largest written       {device.most_n:.6f} N of {counts.limit_n:g} N, {device.writes:,} writes",
             f"  largest step          {counts.steepest_n:.6f} N",
             f"    let go              {counts.let_go_n:.6f} N at a stop or a fault",
-            f"    paid back           {counts.paid_n:.6f} N by the energy account",
-            f"  no numbers            {counts.no_number + device.not_finite}",
+            f"    paid back           {counts.paid_n:.6f} N by the passivity controller",
+            f"  non-finite forces     {counts.no_number + device.not_finite}",
         )
 
     def _counter_text(self) -> tuple[str, ...]:
@@ -198,7 +198,7 @@ class Soaked:
         return (
             "",
             "counters",
-            f"  overruns {self.overruns:,}; dropped samples {self.dropped:,}; latest turn {latest_ms:.3f} ms late",
+            f"  overruns {self.overruns:,}; dropped samples {self.dropped:,}; latest tick {latest_ms:.3f} ms late",
             f"  readings refused {counts.refused:,}; stale faults {counts.stale:,}; recoveries {self.recoveries:,}",
             f"  scenes presented {self.loads:,}; force stopped by the host {self.stops:,} times",
             f"  limiters: {', '.join(f'{name} {ticks:,}' for name, ticks in limiters)}",

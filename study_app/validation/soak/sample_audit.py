@@ -41,23 +41,23 @@ COUNTS = np.dtype(
         ("last_n", np.float64, (3,)),
         # counted
         ("samples", np.int64),
-        ("missing", np.int64),  # turns that no sample came of
+        ("missing", np.int64),  # ticks that no sample came of
         ("overruns", np.int64),
         ("limiters", np.int64, (len(LIMITER_NAMES),)),
         ("refused", np.int64),  # readings
         ("not_finite", np.int64),  # readings that are no place
         ("displaced", np.int64),  # readings beyond anything the device reaches
-        ("silent", np.int64),  # turns without a new reading
-        ("lost", np.int64),  # turns in which the device was lost when it was read
+        ("silent", np.int64),  # ticks without a new reading
+        ("lost", np.int64),  # ticks in which the device was lost when it was read
         ("lost_at_write", np.int64),  # and when it was written to
-        ("stale", np.int64),  # turns that ended with a stale fault
+        ("stale", np.int64),  # ticks that ended with a stale fault
         ("buttons", np.int64),  # readings with the stop button down
-        ("long_turns", np.int64),  # turns that took a period or more
+        ("long_ticks", np.int64),  # ticks that took a period or more
         ("most_n", np.float64),
         ("steepest_n", np.float64),  # greatest change between two forces, where a limit is promised
         ("let_go_n", np.float64),  # where a stop or a fault let go
-        ("paid_n", np.float64),  # where the energy account took what was owed
-        ("latest_s", np.float64),  # how late a turn began at most
+        ("paid_n", np.float64),  # where the passivity controller took what was owed
+        ("latest_s", np.float64),  # how late a tick began at most
         # broken promises: how often, and the tick of the first
         ("believed", np.int64),
         ("excess", np.int64),
@@ -185,7 +185,7 @@ def _look_at_force(counts: Any, sample: Any) -> None:
 
 @kernel
 def _look_at_time(counts: Any, sample: Any) -> None:
-    """Predict each deadline from the one before and from when that turn ended."""
+    """Predict each deadline from the one before and from when that tick ended."""
     deadline_ns = sample.time_ns - sample.lateness_ns
     counts.latest_s = max(counts.latest_s, sample.lateness_ns * 1e-9)
     if counts.follows != 0 and deadline_ns != counts.next_deadline_ns:
@@ -194,7 +194,7 @@ def _look_at_time(counts: Any, sample: Any) -> None:
     counts.next_deadline_ns = deadline_ns + counts.period_ns
     late_ns = sample.time_ns + sample.busy_ns - counts.next_deadline_ns
     if sample.busy_ns >= counts.period_ns:
-        counts.long_turns += 1
+        counts.long_ticks += 1
     if late_ns > 0:
         missed = late_ns // counts.period_ns
         counts.overruns += missed

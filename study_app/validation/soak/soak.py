@@ -6,7 +6,7 @@ its sums run on and on. *Rest*: the hand keeps still for longer than the wake is
 quarter of a shorter soak, but five seconds at least.
 
 Every sample is looked at (``audit``), the wake is compared with its definition (``ledger``), memory is read at every
-tenth. On a virtual clock the same loop turns as fast as it computes.
+tenth. On a virtual clock the same loop ticks as fast as it computes.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from types import TracebackType
 from typing import Final, Literal, NamedTuple, Self, TypeAlias
 
 import numpy as np
+import psutil
 
 from study_app.errors import DeviceLost, ServoFault, StudyError
 from study_app.haptics.model.gate import resolve
@@ -44,7 +45,6 @@ from study_app.validation.soak.faulty_device import (
     SILENCE,
     FaultyDevice,
 )
-from study_app.validation.soak.memory import resident_bytes
 from study_app.validation.soak.restless_hand import RestlessHand
 from study_app.validation.soak.result import FELT_N, Rests, Soaked
 from study_app.validation.soak.sample_audit import Audit
@@ -57,11 +57,11 @@ SHORTEST_ROUND_S: Final = 5.0
 ROUGH: Final = 0.35  # share of a round
 SETTLING_S: Final = 2.0  # until a hand that keeps still has come to rest, and its velocity too
 LONGEST_REST: Final = 0.4  # share of a round; where a rest takes more, there is none
-MOST_TURNS: Final = (
+MOST_TICKS: Final = (
     1000  # between two looks: fewer than a wake is long, so that what spoils it is seen before it is gone
 )
 WAITING_S: Final = 0.25  # likewise, on a clock that runs by itself
-PATIENCE_S: Final = 10.0  # with a servo that takes no turn
+PATIENCE_S: Final = 10.0  # with a servo that takes no tick
 
 # kind: share of all faults, fewest and most readings
 ROUGH_FAULTS: Final = {
@@ -127,14 +127,14 @@ class Soak:
         slew_n = max(slew_limit_n(1 / self._rate_hz, hand.dynamics, scene.velocity) for scene in self._scenes.values())
         self.audit = Audit(limit_n, slew_n, round(1e9 / self._rate_hz), max(hand.workspace_m))
         self.drift = Drift()
-        self._reader = self.servo.telemetry.reader()
+        self.reader = self.servo.telemetry.reader()
         self._due, self._rests = _Due(), Rests()
         self._recoveries, self._loads, self._stops = 0, 0, 0
         self._presented = self._names[0]
-        self._stretch: Stretch | None = None
+        self.stretch: Stretch | None = None
         self._still_from = 0
         self._memory: list[int] = []
-        self._began_s = self._turned_s = 0.0
+        self._began_s = self._ticked_s = 0.0
 
     @property
     def done(self) -> int:
@@ -148,7 +148,7 @@ class Soak:
         for _ in range(2):
             records(SAMPLE, HISTORY).status = 1  # the most that a look takes: what the system keeps of it is no growth
         self._began_s = time.perf_counter()
-        self._turned_s = time.monotonic()
+        self._ticked_s = time.monotonic()
         if not self.virtual:
             self.servo.start()
         return self
@@ -162,29 +162,29 @@ class Soak:
         """Do what is due, let some ticks pass, and look at them; an ``ending`` that is set cuts the waiting short."""
         tick = self.done
         stretch = self._at(tick)
-        if self._stretch is None or (stretch.part, stretch.round) != (self._stretch.part, self._stretch.round):
+        if self.stretch is None or (stretch.part, stretch.round) != (self.stretch.part, self.stretch.round):
             self._leave()
-            self._stretch = stretch
+            self.stretch = stretch
             self._enter(stretch, tick)
         self._act(stretch, tick)
         due = [at for at in (self._due.motion, self._due.scene, self._due.stop, self._due.fade) if at > tick]
-        turns = min(MOST_TURNS, self.ticks - tick, stretch.end - tick, *(at - tick for at in due))
+        ticks = min(MOST_TICKS, self.ticks - tick, stretch.end - tick, *(at - tick for at in due))
         if self.virtual:
-            self.servo.advance(turns)
+            self.servo.advance(ticks)
         else:
-            (ending or threading.Event()).wait(min(turns / self._rate_hz, WAITING_S))
+            (ending or threading.Event()).wait(min(ticks / self._rate_hz, WAITING_S))
         self._look()
         if self.servo.fault is not None:
             self._recover()
         self._watch(tick)
 
     def _watch(self, before: int) -> None:
-        """Raise ``ServoFault`` where turns have stopped coming without a fault: waiting longer would find no end."""
+        """Raise ``ServoFault`` where ticks have stopped coming without a fault: waiting longer would find no end."""
         now_s = time.monotonic()
         if self.done > before:
-            self._turned_s = now_s
-        elif now_s - self._turned_s > PATIENCE_S:
-            raise ServoFault(f"the servo has taken no turn for {PATIENCE_S:g} s, after {before} of {self.ticks} ticks")
+            self._ticked_s = now_s
+        elif now_s - self._ticked_s > PATIENCE_S:
+            raise ServoFault(f"the servo has taken no tick for {PATIENCE_S:g} s, after {before} of {self.ticks} ticks")
 
     def report(self) -> Soaked:
         """Stop the servo, look at what is left, and say what was found so far."""
@@ -203,13 +203,13 @@ class Soak:
             planned=self.ticks,
             ticks=self.done,
             took_s=took_s,
-            memory=(*self._memory, resident_bytes()),
+            memory=(*self._memory, psutil.Process().memory_info().rss),
             drift=self.drift,
             rests=self._rests,
             counts=counts.copy(),
             device=device.copy(),
             overruns=self.servo.overruns,
-            dropped=self._reader.dropped,
+            dropped=self.reader.dropped,
             recoveries=self._recoveries,
             loads=self._loads,
             stops=self._stops,
@@ -261,7 +261,7 @@ class Soak:
     def _is_left_alone(self) -> bool:
         """Whether the hand keeps still in a liquid that leaves no force by itself."""
         effects = {effect for liquid in self._scenes[self._presented].liquids for effect in liquid.effects}
-        return self._stretch is not None and self._stretch.part == "rest" and not effects - {"drag", "wake"}
+        return self.stretch is not None and self.stretch.part == "rest" and not effects - {"drag", "wake"}
 
     def _act(self, stretch: Stretch, tick: int) -> None:
         """Do what is due: another motion, another liquid, the force stopped, the force let on again."""
@@ -302,14 +302,14 @@ class Soak:
 
     def _look(self) -> None:
         """Look at all samples that are new, and at every tenth at the memory."""
-        samples = self._reader.read()
+        samples = self.reader.read()
         self.audit.take(samples)
         self.drift.take(samples)
         pushed = samples.tick[np.linalg.norm(samples.device_force_n, axis=1) > FELT_N]
         if self._is_left_alone and pushed.size:
             self._rests.pushed_s = max(self._rests.pushed_s, (int(pushed[-1]) - self._still_from) / self._rate_hz)
         if len(self._memory) <= min(10 * self.done // self.ticks, 9) and self.done > 0:
-            self._memory.append(resident_bytes())
+            self._memory.append(psutil.Process().memory_info().rss)
 
 
 def _size(vector: Floats) -> float:
@@ -351,12 +351,12 @@ def soak(
     """
     ending = ending or threading.Event()
     with Soak(scenes, hours, virtual=virtual, seed=seed) as run:
-        tell(f"{run.ticks:,} ticks begin; Ctrl+C ends them with the report so far")
+        tell(f"{run.ticks:,} ticks begin; Ctrl+C ends the run with the report so far")
         tenth = 0
         while run.done < run.ticks and not ending.is_set():
             run.step(ending)
             if 10 * run.done // run.ticks > tenth:
                 tenth = 10 * run.done // run.ticks
-                held_mib = resident_bytes() / 2**20
+                held_mib = psutil.Process().memory_info().rss / 2**20
                 tell(f"{10 * tenth:3} %  {run.done:,} ticks, drift {run.drift.worst:.1e}, {held_mib:.1f} MiB")
         return run.report()

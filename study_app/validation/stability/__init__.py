@@ -1,1 +1,1 @@
-"""Whether hard closed loops of liquid, servo, device and hand stay stable, and how much damping they bear."""
+"""Whether hard closed loops of liquid, servo, device and hand stay stable, and their maximum stable damping."""

@@ -1,4 +1,4 @@
-"""A second plant beside ``haptics.kernels.plant``: an arm that holds the handle through the tissue of its fingers.
+"""A second plant besides ``haptics.kernels.plant``: an arm that holds the handle through the tissue of its fingers.
 
 ::
 

@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 
 from study_app.validation.stability.stability_cases import (
     CIRCLES,
+    DAMPER,
     FALCON,
     FIRST,
     GRIPS,
@@ -173,9 +174,13 @@ def _drawn(seed: str, cases: Iterable[Case], choices: Mapping[str, tuple[Any, ..
 
 
 def _releases(seed: str, plants: Iterable[str], masses_kg: Iterable[float]) -> Iterator[Case]:
-    """Yield releases at every phase of strokes of 1 to 4 Hz ±30 mm, in the loop of a study."""
-    draw = Random(seed)  # noqa: S311 - the same cases in every run
+    """Yield releases at every phase of strokes of 1 to 4 Hz ±30 mm, in the loop of a study.
+
+    The damper's are drawn from a stream of their own, so that those of the liquids stay the ones that were judged.
+    """
+    shared, own = Random(seed), {DAMPER: Random(f"{seed} {DAMPER}")}  # noqa: S311 - the same cases in every run
     for plant, liquid, mass_kg, phase in itertools.product(plants, liquids(), masses_kg, range(PHASES)):
+        draw = own.get(liquid, shared)
         case = Case(liquid=liquid, hand=LETS_GO, motion=SINE, mass_kg=mass_kg, plant=plant)
         hz = _one(draw, (1.0, 2.0, 4.0))
         yield dataclasses.replace(

@@ -29,7 +29,7 @@ SLOWER_S: Final = 0.5
 MEASURED_S: Final = 0.03
 """How long a device that has become slower takes to measure it."""
 
-# What hand, servo and encoder do beside the handle and the model.
+# Hand, servo and encoder, in addition to the handle and the model.
 LOOP = np.dtype(
     [
         ("safe", np.int64),  # 1: with the safety layer, 0: the force of the effects goes to the motors as it is
@@ -49,7 +49,7 @@ LOOP = np.dtype(
         ("now_s", np.float64),
         ("broken", np.int64),  # 1 once a force or the handle's place was no number
         ("was_m", np.float64, (3,)),  # where the hand is
-        ("goes_m", np.float64, (3,)),  # where it will be at the next turn
+        ("goes_m", np.float64, (3,)),  # where it will be at the next tick
         ("measured", np.int64),  # 1 where it is of this tick
         ("seen_m", np.float64, (3,)),  # the last sample
         ("arm", ARM),  # the second plant, where it is used
@@ -57,7 +57,7 @@ LOOP = np.dtype(
     align=True,
 )
 
-# One turn, as seen from outside.
+# One tick, as seen from outside.
 TRACE = np.dtype(
     [
         ("t_s", np.float64),
@@ -67,7 +67,7 @@ TRACE = np.dtype(
         ("velocity_mps", np.float64, (3,)),
         ("asked_n", np.float64, (3,)),  # by the effects
         ("sent_n", np.float64, (3,)),  # by the servo
-        ("acting_n", np.float64, (3,)),  # from this turn to the next
+        ("acting_n", np.float64, (3,)),  # from this tick to the next
         ("lift_n", np.float64, (3,)),  # buoyancy and weight in what was sent
         ("drift_mps", np.float64, (3,)),  # of the current
         ("reserve_j", np.float64),  # what liquids and estimator could give back
@@ -101,10 +101,10 @@ def place(loop: Any, t_s: float, out: Any) -> None:
     """Write where the hand means to be into ``out`` (3,): reaches, circles, one straight stroke, or a sine."""
     t = min(t_s, loop.moving_s)
     if loop.motion == REACHES:
-        turns = t * loop.speed_mps / (1.875 * loop.way_m)
-        s = turns - math.floor(turns)
+        ticks = t * loop.speed_mps / (1.875 * loop.way_m)
+        s = ticks - math.floor(ticks)
         share = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-        x = loop.way_m * (0.5 - share if math.floor(turns) % 2.0 == 1.0 else share - 0.5)
+        x = loop.way_m * (0.5 - share if math.floor(ticks) % 2.0 == 1.0 else share - 0.5)
         out[0], out[1], out[2] = 0.9 * x, 0.3 * x, 0.3 * x
     elif loop.motion == CIRCLES:
         radius_m = 0.5 * loop.way_m
@@ -123,7 +123,7 @@ def place(loop: Any, t_s: float, out: Any) -> None:
 
 @kernel
 def run(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any, trace: Any, first: int) -> int:
-    """Take turns, one to each row of ``trace`` from ``first`` on, until ``loop.until_s``; return the next row."""
+    """Take ticks, one to each row of ``trace`` from ``first`` on, until ``loop.until_s``; return the next row."""
     k = first
     while k < trace.shape[0] and loop.now_s < loop.until_s and loop.broken == 0:
         if k > 0:
@@ -203,10 +203,10 @@ def _write_down(model: Any, safety: Any, sample: Any, handle: Any, loop: Any, ro
     copy(sample.force_n, row.asked_n)
     copy(sample.device_force_n, row.sent_n)
     copy(handle.force_n, row.acting_n)
-    copy(safety.account.lift_n if loop.safe else model.state[0].lift_n, row.lift_n)
+    copy(safety.passivity.lift_n if loop.safe else model.state[0].lift_n, row.lift_n)
     for axis in range(3):
         row.drift_mps[axis] = model.state[0].drift_mps[axis] / model.parameters[0].scale
-    row.reserve_j = safety.account.reserve_j
+    row.reserve_j = safety.passivity.reserve_j
     row.permitted_n, row.withheld_n = sample.permitted_n, sample.withheld_n
     row.delay = handle.delay
     row.limiters = sample.limiters
@@ -216,7 +216,7 @@ def _write_down(model: Any, safety: Any, sample: Any, handle: Any, loop: Any, ro
 def play(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any, trace: Any, places_m: Any) -> None:
     """Let the tick answer a motion (rows, 3) at the times of ``trace``, and write its force over ``sent_n`` there.
 
-    Samples are lost and repeated in the same ticks as in the trace. An estimator that knows the force is told what
+    Samples are lost and repeated in the same ticks as in the trace. An estimator that uses the force receives what
     ``sent_n`` held before: the force that belongs to the motion. No work is done on anything, so the passivity
     controller stays out of it.
     """
@@ -226,19 +226,19 @@ def play(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any
             handle.position_m[axis] = places_m[k, axis]
         sample.fresh, loop.measured = trace[k].fresh, trace[k].measured
         _read(sample, handle, pace, loop)
-        _settle_account(safety.account)
+        _settle_passivity(safety.passivity)
         _answer(model, safety, sample, loop.safe)
-        log_acted(safety.account, trace[k].sent_n)
+        log_acted(safety.passivity, trace[k].sent_n)
         copy(sample.device_force_n, trace[k].sent_n)
 
 
 @kernel
-def _settle_account(account: Any) -> None:
+def _settle_passivity(passivity: Any) -> None:
     """Owe nothing: each balance begins the tick as high as the liquid's reserve lets it be."""
-    account.balance_j = account.late_balance_j = account.later_balance_j = account.fast.balance_j = math.inf
-    account.gain = 1.0
-    account.settling = 0
-    clear(account.velocity_mps)
+    passivity.balance_j = passivity.late_balance_j = passivity.later_balance_j = passivity.fast.balance_j = math.inf
+    passivity.gain = 1.0
+    passivity.settling = 0
+    clear(passivity.velocity_mps)
 
 
 @kernel
@@ -275,9 +275,9 @@ def _answer(model: Any, safety: Any, sample: Any, safe: int) -> None:
     watchdog(model.parameters[0], safety, sample)
     if interval_s > 0.0:
         take_force(model.state[0], safety)
-        step_model(model, interval_s)
+        step_model(model, interval_s, safety.delay_ticks)
     write_sample(model.state[0], sample)
     update_observer(model, safety, interval_s)
     copy(sample.force_n, sample.device_force_n)
-    copy(model.state[0].lift_n, safety.account.lift_n)
-    log_command(safety.account, sample.device_force_n)
+    copy(model.state[0].lift_n, safety.passivity.lift_n)
+    log_command(safety.passivity, sample.device_force_n)

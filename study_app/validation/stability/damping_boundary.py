@@ -1,4 +1,4 @@
-"""How much damping a free handle bears, measured on the real tick, and the table of limits that follows from it."""
+"""The maximum stable damping of a free handle, measured with the real tick, and the table of limits."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from study_app.haptics.kernels.plant import new_handle
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick_schedule import new_schedule
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
+from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.layout import SAMPLE, records
-from study_app.haptics.model.limits import INERTIA_SHARE, Bearable, Entry
-from study_app.haptics.model.scene import Body, Drag, Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity
+from study_app.haptics.model.limits import INERTIA_SHARE, DampingLimits, Entry
+from study_app.haptics.model.scene import Body, Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity
 from study_app.haptics.runtime.pack import pack
 from study_app.validation.stability.closed_loop import LOOP, STROKE, TRACE, begin, run
 from study_app.validation.stability.stability_cases import ESTIMATORS
@@ -28,7 +29,7 @@ FRICTION_NSPM: Final = 0.5
 FELT_NSPM: Final = 53.0
 """What is felt as it is at 1 kHz, up to one tick of delay, with "ewma" and "kalman": light oil has a secant of 55 N·s/m
 where it reaches 8 N at scale 10; this takes 4 % of that one force, and with "ewma" is 75 % of what a free handle of
-0.1 kg bears."""
+0.1 kg is stable with."""
 FELT_SHARE: Final = 0.75
 """Of the boundary that a limit takes there at most, if the filter is another."""
 FELT_INERTIA_SHARE: Final = 0.85
@@ -109,13 +110,13 @@ def measure_limits(velocities: Iterable[Velocity] | None = None) -> Iterator[Ent
         for period_s in PERIODS_S:
             for delay in DELAYS[1:]:
                 felt = velocity.kind in {"ewma", "kalman"} and period_s == NOMINAL_S and delay <= 1
-                drag = _bearable_nspm(velocity, period_s, delay, felt=felt)
+                drag = _limit_nspm(velocity, period_s, delay, felt=felt)
                 inertia = (FELT_INERTIA_SHARE if felt else INERTIA_SHARE) * drag
-                bears = Bearable(_rounded_down(drag), _rounded_down(inertia))
-                yield Entry(velocity.kind, getattr(velocity, "alpha", None), period_s, delay, bears)
+                limits = DampingLimits(_rounded_down(drag), _rounded_down(inertia))
+                yield Entry(velocity.kind, getattr(velocity, "alpha", None), period_s, delay, limits)
 
 
-def _bearable_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) -> float:
+def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) -> float:
     """Return the limit of drag: a share of the boundary, less where that is noisy or the filter may be mistaken.
 
     The raw difference passes a count of the encoder on whole, "ewma" its weight. A window has a fixed number of
@@ -123,7 +124,7 @@ def _bearable_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: boo
     """
     fast = period_s < NOMINAL_S
     if velocity.kind in WINDOWS and fast:
-        return _bearable_nspm(velocity, NOMINAL_S, delay, felt=felt) * period_s / NOMINAL_S
+        return _limit_nspm(velocity, NOMINAL_S, delay, felt=felt) * period_s / NOMINAL_S
     share = FELT_SHARE if felt else FAST_SHARE if fast else SHARE
     limits = [share * boundary_nspm(velocity, period_s, delay)]
     if felt:
@@ -178,7 +179,7 @@ def _comes_to_rest(
     begin(loop, handle)
     trace = records(TRACE, round(_LASTS_S / period_s))
     run(
-        pack(scene, limits=Bearable(damping_nspm, damping_nspm), dynamics=dynamics),
+        pack(scene, limits=DampingLimits(damping_nspm, damping_nspm), dynamics=dynamics),
         new_safety(delay_ticks=delays[1])[0],
         records(SAMPLE, 1)[0],
         handle,

@@ -11,7 +11,7 @@ from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick_schedule import new_schedule
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import SAMPLE, records
-from study_app.haptics.model.limits import Bearable
+from study_app.haptics.model.limits import DampingLimits
 from study_app.haptics.runtime.pack import Model, pack
 from study_app.validation.stability.arm_plant import ARMS, new_arm
 from study_app.validation.stability.closed_loop import LOOP, TRACE, begin, run
@@ -38,7 +38,8 @@ class Bench:
 
     def copy(self) -> Bench:
         """Return a bench of its own, in the same state."""
-        model = Model(*(field.copy() for field in self.model))
+        rows = type(self.model.rows)(*(array.copy() for array in self.model.rows))
+        model = Model._make([*(array.copy() for array in self.model[:-1]), rows])
         handle, pace, loop = (record.copy() for record in (self.handle, self.pace, self.loop))
         return Bench(model, self.safety.copy(), self.sample.copy(), handle, pace, loop)
 
@@ -66,7 +67,7 @@ def trace_of(case: Case) -> Any:
     return trace[: bench.run(trace, 0, lasts_s(case))]
 
 
-def new_bench(case: Case, *, safe: bool, limits: Bearable | None = None) -> Bench:
+def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Bench:
     """Return the records of a case; ``limits`` are tried in place of the table's."""
     safety = new_safety(FORCE_LIMIT_N, case.believed_delay)
     safety[0].fade = 1.0

@@ -1,4 +1,4 @@
-"""Cases through the driver of a Falcon and its emulator, beside the scripted device in the same hand.
+"""Cases through the driver of a Falcon and its emulator, compared with the scripted device in the same hand.
 
 The servo's own compiled loop runs on the driver's C functions; grip and hand are the emulator's, with mass and friction
 of the case. Samples, encoders and delay are those of the Falcon. What is judged is that of `verdict`, and:
@@ -71,30 +71,15 @@ class _Falcon(EmulatedFalcon):
     """A Falcon in the hand of a case, which is as new for each."""
 
     def __init__(self) -> None:
-        self._grip = _Grip(running=True, tremor_m=0.0)
-        super().__init__(emulator=self._grip)
+        super().__init__(emulator=Emulator(running=True, tremor_m=0.0))
 
     def open(self) -> None:
         super().open()
-        self._opened = self._memory.copy(), self._grip.memory.copy()
+        self._opened = self.memory.copy(), self.hand.memory.copy()
 
     def renew(self) -> None:
         """Be as after it was opened."""
-        self._memory[:], self._grip.memory[:] = self._opened
-
-
-class _Grip(Emulator):
-    """An emulator that lets the handle be seen."""
-
-    @property
-    def memory(self) -> Any:
-        """All its state."""
-        return self._memory
-
-    @property
-    def handle(self) -> Any:
-        """The record of ``plant.HANDLE`` that moves the grip."""
-        return self._state.handle
+        self.memory[:], self.hand.memory[:] = self._opened
 
 
 class _Scripted(ScriptedDevice):
@@ -102,23 +87,18 @@ class _Scripted(ScriptedDevice):
 
     def __init__(self, count_m: float) -> None:
         super().__init__(tremor_m=0.0, quantum_m=count_m)
-        self.handle.delay = DELAY
-
-    @property
-    def handle(self) -> Any:
-        """The record of ``plant.HANDLE``."""
-        return self._state.handle
+        self.state.handle.delay = DELAY
 
 
 def judge_driven(case: Case) -> Verdict:
     """Run a case through the Falcon's driver, and say whether it is stable."""
-    falcon = _opened_falcon()
+    falcon = opened_falcon()
     falcon.renew()
     dynamics = falcon.dynamics
-    trace = _falcon_trace(case, falcon)
+    trace = falcon_trace(case, falcon)
     if not (np.isfinite(trace.sent_n).all() and np.isfinite(trace.position_m).all()):
         return Verdict(case, True, ("not finite",), math.nan, math.nan, math.nan, math.nan, math.nan, acted(trace))
-    others = _scripted_traces(case, dynamics)
+    others = scripted_traces(case, dynamics)
     balance_j, strongest_n, longest_m = lowest_balance(trace)
     permitted_j = -ALLOWANCE_J - (1 + DELAY) * strongest_n * longest_m
     lacks = balance_j < permitted_j
@@ -128,7 +108,7 @@ def judge_driven(case: Case) -> Verdict:
         for shift_s in SHIFTS_S:
             if balance_j < permitted_j:
                 near = dataclasses.replace(case, release_s=case.release_s + shift_s)
-                given_j = max(_given_out(near, other) for other in _scripted_traces(near, dynamics))
+                given_j = max(_given_out(near, other) for other in scripted_traces(near, dynamics))
                 permitted_j = min(permitted_j, -BEYOND_SCRIPTED_J - given_j)
     swing_mps = swing(trace, case)
     fast_n, scripted_n = _restlessness(case, trace, others)
@@ -143,20 +123,20 @@ def judge_driven(case: Case) -> Verdict:
     return Verdict(case, True, reasons, balance_j, permitted_j, swing_mps, fast_n, scripted_n, acted(trace))
 
 
-def _falcon_trace(case: Case, falcon: _Falcon) -> Any:
+def falcon_trace(case: Case, falcon: _Falcon) -> Any:
     """Return the trace of a case on the Falcon."""
     trace = _trace(case, falcon, falcon.hand, falcon.dynamics)
     trace.acting_n[:-1] = trace.acting_n[1:]  # of the handle, which keeps what acted up to the present
     return trace
 
 
-def _scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:
+def scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:
     """Return the traces of a case on scripted devices, one for each encoder count."""
     devices = [_Scripted(count_m) for count_m in COUNTS_M]
     return [_trace(case, device, device, dynamics) for device in devices]
 
 
-def _opened_falcon() -> _Falcon:
+def opened_falcon() -> _Falcon:
     """Return the opened Falcon of this thread."""
     if not hasattr(_ours, "falcon"):
         _ours.falcon = _Falcon()
@@ -167,7 +147,7 @@ def _opened_falcon() -> _Falcon:
 
 def _trace(case: Case, device: Driver, hand: Any, dynamics: Dynamics) -> Any:
     """Return the trace of a case from the begin of its motion on, on a device and the hand at it."""
-    handle, grip = hand.handle, GRIPS[case.hand]
+    handle, grip = hand.state.handle, GRIPS[case.hand]
     handle.mass_kg, handle.viscous_nspm, handle.coulomb_n = case.mass_kg, case.viscous_nspm, case.coulomb_n
     handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = grip.mass_kg, grip.stiffness_npm, grip.damping_nspm
     handle.stop_m = STOP_M
@@ -223,10 +203,10 @@ def _follow(
         copy(sample.force_n, row.asked_n)
         copy(sample.device_force_n, row.sent_n)
         copy(handle.force_n, row.acting_n)
-        copy(safety[0].account.lift_n, row.lift_n)
+        copy(safety[0].passivity.lift_n, row.lift_n)
         for axis in range(3):
             row.drift_mps[axis] = model.state[0].drift_mps[axis] / model.parameters[0].scale
-        row.reserve_j = safety[0].account.reserve_j
+        row.reserve_j = safety[0].passivity.reserve_j
         row.permitted_n, row.withheld_n = sample.permitted_n, sample.withheld_n
         row.delay = DELAY
         row.limiters = sample.limiters

@@ -2,7 +2,7 @@
 
 Each liquid of the shipped studies at its own scale and with its own estimator, moved by a middling hand (0.55 kg,
 135 N/m, 6.5 N·s/m) along reaches, circles and strokes of 0.1 to 1 m/s, through several loops. The target is that of the
-choice of effects: 5 % or 0.05 N, whichever is more, taken of the mean square root over a motion. Single turns may be
+choice of effects: 5 % or 0.05 N, whichever is more, taken of the mean square root over a motion. Single ticks may be
 further off: a wake that breaks or a hand that turns back may change the force by more than the slew limit permits.
 """
 
@@ -21,8 +21,8 @@ LOOPS: Final = ((1000.0, 0), (1000.0, 1), (1000.0, 2), (1000.0, 4), (2000.0, 1),
 """Ticks a second and ticks of delay; the first two are those of a study."""
 STUDY_LOOPS: Final = LOOPS[:2]
 MOTIONS: Final = (REACHES, CIRCLES, STROKE)
-LIMITED: Final = ("physical_tar", "dense")
-"""No free handle bears what these ask for, 192 N·s/m and more: they feel as thick as the loop allows."""
+LIMITED: Final = ("physical_tar", "dense", "damper")
+"""No free handle is stable with what these ask for, 192 N·s/m and more: they feel as thick as the loop allows."""
 SPEEDS_MPS: Final = (0.1, 0.3, 0.6, 1.0)
 RELATIVE: Final = 0.05
 ABSOLUTE_N: Final = 0.05
@@ -33,7 +33,7 @@ MOVING_S: Final = 1.2
 class Fidelity(NamedTuple):
     """One liquid in one loop, in the worst of its motions.
 
-    ``difference_n`` and ``force_n`` are mean square roots [N] over a motion; ``beyond`` is the greatest share of turns
+    ``difference_n`` and ``force_n`` are mean square roots [N] over a motion; ``beyond`` is the greatest share of ticks
     in which a single force is further off than the target.
     """
 

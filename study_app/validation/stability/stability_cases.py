@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any, Final
 
 from study_app.errors import StudyError
+from study_app.haptics.model.effects.drag import DAMPING_NSPM, Drag
 from study_app.haptics.model.scene import Ewma, Foaw, Kalman, Line, Liquid, Raw, Scene, Velocity
 from study_app.protocol.load import load
 
@@ -22,6 +23,9 @@ FIRST: Final = "handle"
 SECOND: Final = "arm"
 PLANTS: Final = (FIRST, SECOND)
 FALCON: Final = "falcon"
+
+DAMPER: Final = "damper"
+"""The strongest linear damper that a file may ask for."""
 
 THROWN: Final = "thrown"
 LETS_GO: Final = "lets-go"
@@ -158,7 +162,7 @@ def parse(line: str) -> Case:
         if not low <= getattr(case, name) <= high:
             raise StudyError(f"{name}={getattr(case, name):g} must lie between {low:g} and {high:g}")
     for name, permitted in (
-        ("liquid", liquids()),
+        ("liquid", scenes()),
         ("hand", GRIPS),
         ("motion", MOTIONS),
         ("estimator", ESTIMATORS),
@@ -171,20 +175,32 @@ def parse(line: str) -> Case:
 
 @cache
 def liquids() -> Mapping[str, Scene]:
-    """Return every liquid of the shipped studies, tar among them, and one far denser, each with its scene."""
+    """Return what the sweep presents, each with its scene.
+
+    Every liquid of the shipped studies, tar among them, one far denser, and the strongest linear damper that a file may
+    ask for.
+    """
     found: dict[str, Scene] = {}
     for protocol, prefix in (("rek2024", ""), ("physical_liquids", "physical_")):
         study = load(protocol)
         found |= {f"{prefix}{name}": study.scene_of(name) for name in study.liquids}
-    dense = Liquid(id="dense", density_kg_m3=10_000)
-    found["dense"] = Scene(liquids=(dense,))
+    damper = Liquid(id=DAMPER, density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=DAMPING_NSPM[1]))
+    for liquid in (Liquid(id="dense", density_kg_m3=10_000), damper):
+        found[liquid.id] = Scene(liquids=(liquid,))
     return found
+
+
+@cache
+def scenes() -> Mapping[str, Scene]:
+    """Return what a case may present: what the sweep does, and the liquids of physical2."""
+    study = load("physical2")
+    return {**liquids(), **{f"physical2_{name}": study.scene_of(name) for name in study.liquids}}
 
 
 def scene_of(case: Case) -> Scene:
     """Return what the case presents."""
     changed = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": ESTIMATORS[case.estimator]}
-    return Scene.model_validate(liquids()[case.liquid].model_copy(update=changed).model_dump())
+    return Scene.model_validate(scenes()[case.liquid].model_copy(update=changed).model_dump())
 
 
 def _word(value: object) -> str:

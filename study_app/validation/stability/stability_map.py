@@ -1,4 +1,4 @@
-"""The map of stability: what a free handle bears, what its friction proves, what limits allow, what a sweep finds."""
+"""The map of stability: the limit of a free handle, what its friction proves, what limits allow, what a sweep finds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
-from study_app.evaluation import style
+from study_app import figure_style as style
 from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.scene import Ewma
 from study_app.validation.stability.damping_boundary import (
@@ -36,7 +36,7 @@ COLOURS: Final = dict(zip(MAP_DELAYS, (style.STEPS[0], style.STEPS[1], style.STE
 CAPTION: Final = (
     "Lines: measured on the servo's own tick, encoder exact, safety off. Dashed: b = B·α/(2 − α) and its like with a "
     "delay; below it no hand can make the loop unstable. Bars: the limits that ship; only 1 kHz with up to one tick of "
-    "delay has more than half of what a free handle bears."
+    "delay has more than half of a free handle's limit."
 )
 CAPTION_LETTERS: Final = 112
 MARKS: Final = dict(zip(MAP_DELAYS, "osD^", strict=True))
@@ -45,22 +45,24 @@ MARKS: Final = dict(zip(MAP_DELAYS, "osD^", strict=True))
 def draw_map(off: Sequence[Verdict]) -> Mapping[str, bytes]:
     """Return the map as the bytes of each of `FORMATS`; ``off`` are the verdicts of a sweep without safety."""
     figure = _figure(off)
-    return {kind: style.file_bytes(figure, kind, "Where a liquid stays stable") for kind in FORMATS}
+    return {
+        kind: style.file_bytes(figure, kind, "Where a liquid stays stable", style.PLOT_SETTINGS) for kind in FORMATS
+    }
 
 
-@style.own_settings()
+@style.own_settings(style.PLOT_SETTINGS)
 def _figure(off: Sequence[Verdict]) -> Figure:
-    figure = Figure(figsize=(style.WIDTH_PT / 72, HEIGHT_PT / 72), facecolor="white")
+    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, HEIGHT_PT / 72), facecolor="white")
 
     def place(left_pt: float, width_pt: float) -> Axes:
         height, foot = PLOT_PT / HEIGHT_PT, FOOT_PT / HEIGHT_PT
-        return figure.add_axes((left_pt / style.WIDTH_PT, foot, width_pt / style.WIDTH_PT, height))
+        return figure.add_axes((left_pt / style.PAGE_WIDTH_PT, foot, width_pt / style.PAGE_WIDTH_PT, height))
 
     _boundary(place(34, 150))
     _limits(place(232, 118))
     _found(place(400, 105), off)
     figure.text(
-        34 / style.WIDTH_PT,
+        34 / style.PAGE_WIDTH_PT,
         6 / HEIGHT_PT,
         textwrap.fill(CAPTION, CAPTION_LETTERS),
         color=style.TEXT_SOFT,
@@ -70,7 +72,7 @@ def _figure(off: Sequence[Verdict]) -> Figure:
 
 
 def _boundary(axes: Axes) -> None:
-    """Draw the damping that a handle of some friction bears, and that which its friction alone proves."""
+    """Draw the maximum stable damping of a handle with some friction, and that which its friction alone proves."""
     for delay in MAP_DELAYS:
         measured = [boundary_nspm(Ewma(), NOMINAL_S, delay, friction_nspm=b) for b in FRICTIONS_NSPM]
         proved = [passive_nspm(b, NOMINAL_S, delay) for b in FRICTIONS_NSPM]
@@ -78,7 +80,7 @@ def _boundary(axes: Axes) -> None:
         axes.plot(FRICTIONS_NSPM, measured, marker=MARKS[delay], markersize=3, label=str(delay), **look)
         axes.plot(FRICTIONS_NSPM, proved, linestyle=(0, (3, 2)), linewidth=0.9, **look)
     _logarithmic(axes, FRICTIONS_NSPM, (1, 10, 100))
-    axes.set_title(f"Damping B [N·s/m] that {FREE_HANDLE_KG:g} kg bear at 1 kHz", pad=26)
+    axes.set_title(f"Maximum stable damping B [N·s/m] of {FREE_HANDLE_KG:g} kg at 1 kHz", pad=26)
     axes.set_xlabel("Friction b of the handle [N·s/m]", loc="right", labelpad=1)
     _name_curves(axes, 4)
 

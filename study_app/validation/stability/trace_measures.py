@@ -14,7 +14,7 @@ from study_app.haptics.kernels.compiled import kernel
 def lowest_balance(trace: Any) -> tuple[float, float, float]:
     """Return the lowest balance of hand and liquid [J], the strongest force [N] and the longest step [m].
 
-    From turn to turn the hand does the work -f·Δp on the liquid, with the force that acts on the handle, buoyancy and
+    From tick to tick the hand does the work -f·Δp on the liquid, with the force that acts on the handle, buoyancy and
     weight aside, over its true step in the frame of the current. The balance begins at 0 and never exceeds what the
     liquid could give back.
     """

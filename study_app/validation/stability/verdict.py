@@ -2,7 +2,7 @@
 
 - *not finite*: a force or the handle's place is no number;
 - *limit*: the servo sent more than it may;
-- *energy*: the account at the handle (force that acts · true step, at most what the liquid can give back) fell below
+- *energy*: the passivity at the handle (force that acts · true step, at most what the liquid can give back) fell below
   -1 mJ and the work of the steps under way, (1 + delay) · strongest force · longest step; or below -10 mJ, if that is
   lower, where the loop is mistaken about the device's delay;
 - *oscillation*: the handle, at rest or let go, goes on swinging above 12 Hz at more than 40 mm/s and does not tire over
@@ -31,7 +31,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.model.layout import LIMITER_NAMES
-from study_app.haptics.model.limits import Bearable
+from study_app.haptics.model.limits import DampingLimits
 from study_app.validation.stability.closed_loop import begin, play
 from study_app.validation.stability.device_bench import FORCE_LIMIT_N, MOVING_S, Bench, lasts_s, new_bench, new_trace
 from study_app.validation.stability.stability_cases import LETS_GO, THROWN, Case
@@ -59,7 +59,7 @@ SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * FAST_HZ)  # a Gaus
 class Verdict:
     """What became of a case: ``reasons`` why it is unstable, none if it is not, and what was measured.
 
-    ``acted`` is the share of turns in which each limiter acted, in the order of ``LIMITER_NAMES``.
+    ``acted`` is the share of ticks in which each limiter acted, in the order of ``LIMITER_NAMES``.
     """
 
     case: Case
@@ -78,7 +78,7 @@ class Verdict:
         return not self.reasons
 
 
-def judge(case: Case, *, safe: bool, limits: Bearable | None = None) -> Verdict:
+def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Verdict:
     """Run a case, with the safety layer or without, and say whether it is stable.
 
     ``limits`` are tried in place of the table's.
@@ -142,7 +142,7 @@ def swing(trace: Any, case: Case) -> float:
 
 
 def _restlessness(
-    case: Case, trace: Any, before: list[tuple[int, Bench]], limits: Bearable | None
+    case: Case, trace: Any, before: list[tuple[int, Bench]], limits: DampingLimits | None
 ) -> tuple[float, float]:
     """Return the force's fast part, and that of the same motion without feedback, where they differ most."""
     calm_m, calm_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
@@ -176,7 +176,7 @@ def _restlessness(
     return max(found, key=lambda pair: pair[0] - pair[1])
 
 
-def _passive(case: Case, safe: bool, limits: Bearable | None) -> Any | None:
+def _passive(case: Case, safe: bool, limits: DampingLimits | None) -> Any | None:
     """Return the trace of a hand that holds the handle while the motors are off, as long as it holds it."""
     if case.hand == THROWN:
         return None
@@ -188,5 +188,5 @@ def _passive(case: Case, safe: bool, limits: Bearable | None) -> Any | None:
 
 
 def acted(trace: Any) -> tuple[float, ...]:
-    """Return the share of turns in which each limiter acted."""
+    """Return the share of ticks in which each limiter acted."""
     return tuple(float(np.mean((trace.limiters >> k) & 1)) for k in range(len(LIMITER_NAMES)))

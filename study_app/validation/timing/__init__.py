@@ -1,1 +1,1 @@
-"""How late the servo's turns begin: beside a bare loop on the same clock, a Python thread and a Qt timer."""
+"""How late the servo's ticks begin, compared with a bare loop on the same clock, a Python thread and a Qt timer."""

@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from study_app.evaluation import style
+from study_app import figure_style as style
 from study_app.validation.timing.delay_results import BESIDE, TAIL_PERCENT, Delayed, Shown
+from study_app.validation.timing.figure_key import figure_key
 from study_app.validation.timing.machine_load import LoadName
 
 HEIGHT_PT: Final = 212.0
@@ -31,20 +32,20 @@ LOOKS: Final[dict[LoadName, dict[str, Any]]] = {
 }
 
 
-@style.own_settings()
+@style.own_settings(style.PLOT_SETTINGS)
 def draw(found: Delayed) -> Figure:
     """Draw what was found."""
-    figure = Figure(figsize=(style.WIDTH_PT / 72, HEIGHT_PT / 72), facecolor="white")
+    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, HEIGHT_PT / 72), facecolor="white")
     screens = found.screens
-    width_pt = (style.WIDTH_PT - LEFT_PT - RIGHT_PT - GAP_PT * (len(screens) - 1)) / len(screens)
+    width_pt = (style.PAGE_WIDTH_PT - LEFT_PT - RIGHT_PT - GAP_PT * (len(screens) - 1)) / len(screens)
     for number, screen in enumerate(screens):
-        left = (LEFT_PT + number * (width_pt + GAP_PT)) / style.WIDTH_PT
+        left = (LEFT_PT + number * (width_pt + GAP_PT)) / style.PAGE_WIDTH_PT
         tall = (HEIGHT_PT - TOP_PT - FOOT_PT) / HEIGHT_PT
-        axes = figure.add_axes((left, FOOT_PT / HEIGHT_PT, width_pt / style.WIDTH_PT, tall))
+        axes = figure.add_axes((left, FOOT_PT / HEIGHT_PT, width_pt / style.PAGE_WIDTH_PT, tall))
         _panel(axes, found, screen, first=number == 0)
     _key(figure, found)
     text = "\n".join(textwrap.wrap(_caption(found), LETTERS))
-    figure.text(4 / style.WIDTH_PT, 29 / HEIGHT_PT, text, va="top", fontsize=6.6, color=style.TEXT_SOFT)
+    figure.text(4 / style.PAGE_WIDTH_PT, 29 / HEIGHT_PT, text, va="top", fontsize=6.6, color=style.TEXT_SOFT)
     return figure
 
 
@@ -72,9 +73,9 @@ def _panel(axes: Axes, found: Delayed, screen: str, *, first: bool) -> None:
     axes.set_xlim(-0.6, len(delays_ms) - 0.4)
     axes.set_ylim(0, top_ms)
     axes.tick_params(labelsize=6.6)
-    axes.set_xlabel("delay asked for [ms]", fontsize=7, labelpad=2)
+    axes.set_xlabel("requested delay [ms]", fontsize=7, labelpad=2)
     if first:
-        axes.set_ylabel("later than asked for [ms]", fontsize=7, labelpad=2)
+        axes.set_ylabel("later than requested [ms]", fontsize=7, labelpad=2)
     paced = found.on(screen, found.loads[0])[0].paced
     axes.set_title(f"{screen[0].upper()}{screen[1:]}, {paced}", pad=13, color=style.TEXT)
 
@@ -106,22 +107,14 @@ def _key(figure: Figure, found: Delayed) -> None:
         Line2D([], [], markersize=4.5, linewidth=1.3, label=BESIDE[load].capitalize(), **LOOKS[load])
         for load in found.loads
     ]
-    figure.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=((LEFT_PT - 6) / style.WIDTH_PT, 1.0),
-        ncols=len(handles),
-        frameon=False,
-        fontsize=7.2,
-        handlelength=2.6,
-        columnspacing=2.2,
-    )
+    figure_key(figure, handles, LEFT_PT - 6, handlelength=2.6)
 
 
 def _caption(found: Delayed) -> str:
     width, height = found.size_px
     return (
-        f"Signs: mean of all frames; lines reach up to the {TAIL_PERCENT:g}th percentile, which is written where it is "
-        f"off the scale. {found.seconds:g} s of reaching at each delay with the tank at {width} × {height}, from the "
+        f"Marks: mean of all frames; lines reach up to the {TAIL_PERCENT:g}th percentile, which is written if it is "
+        f"off the scale. {found.seconds:g} s of reaching at each delay with the tank at {width} × {height}, from "
+        "the "
         f"sample that is drawn to the end of its painting. {found.machine}."
     )

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from study_app.store.tables.csv_files import csv_text_of
 from study_app.validation.timing.delay_figure import draw
 from study_app.validation.timing.delay_results import BESIDE, Delayed, Shown
 from study_app.validation.timing.output_files import write_report
@@ -47,7 +47,7 @@ def write(found: Delayed, to: Path) -> tuple[Path, ...]:
         A file cannot be written.
     """
     texts = {"txt": text(found), "md": markdown(found), "csv": csv_text(found)}
-    return write_report(to, "delays", texts, draw(found), "How well delays are kept")
+    return write_report(to, "delays", texts, draw(found), "Accuracy of visual delays")
 
 
 def text(found: Delayed) -> str:
@@ -79,12 +79,10 @@ def markdown(found: Delayed) -> str:
 
 def csv_text(found: Delayed) -> str:
     """Return the table for machines: CSV, named `COLUMNS`."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    rows: list[Sequence[object]] = [COLUMNS]
     for trial in found.shown:
         errors_ms = (trial.mean_ms, *map(trial.percentile_ms, PERCENTILES), trial.worst_ms)
-        writer.writerow(
+        rows.append(
             (
                 trial.screen,
                 trial.paced,
@@ -98,14 +96,14 @@ def csv_text(found: Delayed) -> str:
                 trial.missed,
             )
         )
-    return out.getvalue()
+    return csv_text_of(rows)
 
 
 def _head(found: Delayed) -> str:
     width, height = found.size_px
     return (
-        f"{found.seconds:g} s of reaching at each delay, the tank at {width} × {height}; an error is what was achieved "
-        f"less what was asked for, from the sample drawn to the end of its painting; late: by more than a frame. "
+        f"{found.seconds:g} s of reaching at each delay, the tank at {width} × {height}; error: achieved minus "
+        "requested delay, from the sample drawn to the end of its painting; late: by more than a frame. "
         f"{found.machine}."
     )
 

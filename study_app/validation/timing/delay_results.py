@@ -20,9 +20,9 @@ DELAYS_S: Final = (0.0, 0.05, 0.075, 0.1, 0.125, 0.15, 0.2)
 VIRTUAL_HZ: Final = (60.0, 144.0)
 
 BESIDE: Final[dict[LoadName, str]] = {
-    "none": "the tank alone",
-    "gui": "beside the cockpit",
-    "gui+cpu": "beside the cockpit and busy cores",
+    "none": "tank alone",
+    "gui": "with the cockpit",
+    "gui+cpu": "with the cockpit and busy cores",
 }
 
 MEAN_FRAMES: Final = 0.5
@@ -34,7 +34,7 @@ TAIL_PERCENT: Final = 99.0
 class Shown:
     """The frames of one trial: when they were painted or swapped, and of which moment they were [ns] (n,).
 
-    ``screen`` names the screen, ``paced`` says what its frames followed, ``load`` what went on beside.
+    ``screen`` names the screen, ``paced`` says what its frames followed, ``load`` the concurrent load.
     """
 
     screen: str
@@ -116,7 +116,7 @@ class Delayed:
 
     @property
     def loads(self) -> tuple[LoadName, ...]:
-        """What went on beside, in its order."""
+        """The concurrent loads, in their order."""
         return tuple(dict.fromkeys(one.load for one in self.shown))
 
     def on(self, screen: str, load: LoadName) -> tuple[Shown, ...]:
@@ -134,8 +134,8 @@ class Delayed:
         tail = max(one.percentile_ms(TAIL_PERCENT) / one.frame_ms for one in trials)
         means_ms = [one.mean_ms for one in trials]
         return (
-            f"{screen}, {BESIDE[load]}: mean error at most {mean:.2f} of a frame (promised: {MEAN_FRAMES:g}), "
-            f"99th percentile at most {tail:.2f} (promised: {TAIL_FRAMES:g}), "
+            f"{screen}, {BESIDE[load]}: mean error at most {mean:.2f} of a frame (goal: {MEAN_FRAMES:g}), "
+            f"99th percentile at most {tail:.2f} (goal: {TAIL_FRAMES:g}), "
             f"means within {max(means_ms) - min(means_ms):.2f} ms of each other: "
-            f"{'held' if all(one.held for one in trials) else 'missed'}"
+            f"{'met' if all(one.held for one in trials) else 'missed'}"
         )

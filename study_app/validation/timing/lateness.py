@@ -23,7 +23,7 @@ BUSY_US: Final = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """One loop in one priority class: its latenesses, and how long its turns took (empty: nothing was to do) [ns]."""
+    """One loop in one priority class: its latenesses, and how long its ticks took (empty: nothing was to do) [ns]."""
 
     kind: Kind
     grant: Grant
@@ -38,7 +38,7 @@ class Lane:
 
     @property
     def ticks(self) -> int:
-        """How many turns were taken."""
+        """How many ticks were taken."""
         return len(self.lateness_ns)
 
     def late_us(self, percent: float) -> float:
@@ -46,12 +46,12 @@ class Lane:
         return float(np.percentile(self.lateness_ns, percent)) * 1e-3
 
     def busy_us(self, percent: float) -> float:
-        """Return a percentile of how long a turn took [µs]."""
+        """Return a percentile of how long a tick took [µs]."""
         return float(np.percentile(self.busy_ns, percent)) * 1e-3
 
     @property
     def late(self) -> int:
-        """How many turns began more than 1 ms late, or not at all: a deadline passed over is one of them."""
+        """How many ticks began more than 1 ms late, or not at all: a deadline passed over is one of them."""
         return int((self.lateness_ns > LATE_NS).sum()) + self.overruns
 
     @property
@@ -69,7 +69,7 @@ class Promise:
     held: bool
 
     def __str__(self) -> str:
-        return f"{self.level}: {self.said}: {'held' if self.held else 'missed'}"
+        return f"{self.level}: {self.said}: {'met' if self.held else 'missed'}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ class Timed:
         ratio = self.ratio(servo, 99)
         took_us = servo.busy_us(99)
         late = (
-            f"{servo.late:,} turns over 1 ms late, {_fewer(thread, servo)} than of a Python thread "
+            f"{servo.late:,} ticks over 1 ms late, {_fewer(thread, servo)} than with a Python thread "
             f"(at least {FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
         )
         return tuple(
@@ -123,20 +123,20 @@ class Timed:
                 ),
                 (f"p99 {ratio:.2f} times the bare loop's (at most {TAIL_RATIO:g})", ratio <= TAIL_RATIO),
                 (late, thread.late_share >= FEWER_LATE * servo.late_share),
-                (f"a turn took {took_us:.1f} µs at p99 (at most {BUSY_US:g} µs)", took_us <= BUSY_US),
+                (f"a tick took {took_us:.1f} µs at p99 (at most {BUSY_US:g} µs)", took_us <= BUSY_US),
             )
         )
 
 
 def _fewer(thread: Lane, other: Lane) -> str:
-    """Return in words how many times fewer turns over 1 ms late one lane has than a Python thread."""
+    """Return in words how many times fewer ticks over 1 ms late one lane has than a Python thread."""
     if other.late == 0:
         return f"{thread.late:,} fewer"
     return f"{thread.late_share / other.late_share:.1f} times fewer"
 
 
 def lane(kind: Kind, grant: Grant, parts: Sequence[Taken]) -> Lane:
-    """Return a lane of what its loop did in all its turns."""
+    """Return a lane of what its loop did in all its ticks."""
     return Lane(
         kind,
         grant,

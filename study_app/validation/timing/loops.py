@@ -1,6 +1,6 @@
-"""The loops that are timed: each takes a turn every millisecond for a while, and says how late each began.
+"""The loops that are timed: each takes a tick every millisecond for a while, and says how late each began.
 
-All count alike: a deadline every millisecond; one that a turn ran past is passed over and counted, never made up for.
+All count alike: a deadline every millisecond; one that a tick ran past is passed over and counted, never made up for.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from study_app.haptics.kernels.c_functions import SLEEP, call_at
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock, raise_priority
+from study_app.haptics.runtime.clocks.clock import Clock, SystemClock, VirtualClock, raise_priority
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
@@ -26,7 +26,7 @@ Kind: TypeAlias = Literal["servo", "bare", "thread", "qt"]
 Whole: TypeAlias = NDArray[np.int64]
 
 PERIOD_NS: Final = 1_000_000
-LEAD_IN: Final = 50  # turns at the start of each while that are not counted: threads begin, scenes are loaded
+LEAD_IN: Final = 50  # ticks at the start of each while that are not counted: threads begin, scenes are loaded
 NAMES: Final[dict[Kind, str]] = {
     "servo": "this servo",
     "bare": "bare compiled loop",
@@ -38,7 +38,7 @@ _sleep = call_at(SLEEP)
 
 
 class Taken(NamedTuple):
-    """What a loop did: how late each turn began, how long it took [ns] (n,), and how many deadlines it passed over."""
+    """What a loop did: how late each tick began, how long it took [ns] (n,), and how many deadlines it passed over."""
 
     lateness_ns: Whole
     busy_ns: Whole
@@ -60,7 +60,7 @@ class Loop(Protocol):
     kind: Kind
     grant: Grant
 
-    def turn(self, ticks: int) -> Taken: ...  # noqa: D102
+    def run(self, ticks: int) -> Taken: ...  # noqa: D102
 
 
 class ServoLoop:
@@ -74,8 +74,8 @@ class ServoLoop:
         self.servo = Servo(PlayedHand(), clock=self.clock, elements=elements_needed(FULL), real_time=real_time)
         self.servo.prepare()
 
-    def turn(self, ticks: int) -> Taken:
-        """Take at least so many turns."""
+    def run(self, ticks: int) -> Taken:
+        """Take at least so many ticks."""
         servo = self.servo
         reader = servo.telemetry.reader()
         began = int(servo.telemetry.written[0])
@@ -99,14 +99,14 @@ class BareLoop:
 
     kind: Kind = "bare"
 
-    def __init__(self, grant: Grant, *, real_time: bool, spin_us: float | None) -> None:
+    def __init__(self, grant: Grant, *, real_time: bool, clock: Clock) -> None:
         self.grant = grant
         self._real_time = real_time
-        self._clock = SystemClock(spin_us)
+        self._clock = clock
         _sleep_on(self._clock.sleep.address, self._clock.context, 0, np.zeros(0, np.int64), np.zeros(1, np.int64))
 
-    def turn(self, ticks: int) -> Taken:
-        """Take so many turns."""
+    def run(self, ticks: int) -> Taken:
+        """Take so many ticks."""
         lateness_ns, overruns = np.zeros(ticks + LEAD_IN, np.int64), np.zeros(1, np.int64)
 
         def take() -> None:
@@ -132,15 +132,15 @@ def _sleep_on(sleep: int, context: int, start_ns: int, lateness_ns: Any, overrun
 
 
 class _SameTick:
-    """The servo's tick as Python calls it: one turn of the same compiled loop, its time passed by hand."""
+    """The servo's tick as Python calls it: one tick of the same compiled loop, its time passed by hand."""
 
     def __init__(self) -> None:
-        self._servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
-        self._servo.load(FULL)
-        self._servo.advance(1)
+        self.servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
+        self.servo.load(FULL)
+        self.servo.advance(1)
 
     def __call__(self) -> None:
-        self._servo.advance(1)
+        self.servo.advance(1)
 
 
 class ThreadLoop:
@@ -151,10 +151,10 @@ class ThreadLoop:
     def __init__(self, grant: Grant, *, real_time: bool) -> None:
         self.grant = grant
         self._real_time = real_time
-        self._tick = _SameTick()
+        self.tick = _SameTick()
 
-    def turn(self, ticks: int) -> Taken:
-        """Take so many turns."""
+    def run(self, ticks: int) -> Taken:
+        """Take so many ticks."""
         times: list[tuple[int, int]] = []
         start_ns = 0
 
@@ -168,7 +168,7 @@ class ThreadLoop:
                 if pause_ns > 0:
                     time.sleep(pause_ns * 1e-9)
                 began_ns = time.monotonic_ns()
-                self._tick()
+                self.tick()
                 ended_ns = time.monotonic_ns()
                 times.append((began_ns, ended_ns))
                 deadline_ns += PERIOD_NS * max(1, (ended_ns - deadline_ns) // PERIOD_NS)
@@ -185,24 +185,24 @@ class QtLoop:
     def __init__(self, grant: Grant, timer: Timer) -> None:
         self.grant = grant
         self._timer = timer
-        self._tick = _SameTick()
+        self.tick = _SameTick()
 
-    def turn(self, ticks: int) -> Taken:
-        """Take so many turns."""
+    def run(self, ticks: int) -> Taken:
+        """Take so many ticks."""
         times: list[tuple[int, int]] = []
 
         def fire() -> None:
             began_ns = time.monotonic_ns()
-            self._tick()
+            self.tick()
             times.append((began_ns, time.monotonic_ns()))
 
         return taken(self._timer(PERIOD_NS // 1_000_000, ticks + LEAD_IN, fire), times)
 
 
 def taken(start_ns: int, times: Sequence[tuple[int, int]]) -> Taken:
-    """Return the lateness of turns that began and ended at ``times`` [ns], a deadline every millisecond from a start.
+    """Return the lateness of ticks that began and ended at ``times`` [ns], a deadline every millisecond from a start.
 
-    After each turn the deadlines that it ran past are passed over, but for the last; one that comes early is not late.
+    After each tick the deadlines that it ran past are passed over, but for the last; one that comes early is not late.
     """
     began, ended = np.array(times, np.int64).reshape(-1, 2).T
     lateness_ns = np.zeros(len(began), np.int64)

@@ -29,7 +29,7 @@ class Windows(Protocol):
     def during(self, work: Callable[[], T]) -> T: ...  # noqa: D102
 
 
-def beside(load: LoadName, windows: Windows | None, work: Callable[[], T]) -> T:
+def under_load(load: LoadName, windows: Windows | None, work: Callable[[], T]) -> T:
     """Return what ``work`` returns, done while ``windows``, if there are any, live in this thread under this load."""
     if windows is None:
         return work()

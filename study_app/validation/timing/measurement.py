@@ -1,4 +1,4 @@
-"""One run: all loops in short turns, round about, so that what else the machine does strikes all alike."""
+"""One run: all loops in short ticks, round about, so that what else the machine does strikes all alike."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from collections.abc import Callable
 from typing import Final
 
 from study_app.errors import StudyError
+from study_app.haptics.runtime.clocks.clock import SystemClock
 from study_app.validation.computer import machine
 from study_app.validation.timing.lateness import Timed, lane
 from study_app.validation.timing.loops import PERIOD_NS, BareLoop, Loop, QtLoop, ServoLoop, Taken, ThreadLoop, granted
-from study_app.validation.timing.machine_load import LoadName, Windows, beside
+from study_app.validation.timing.machine_load import LoadName, Windows, under_load
 
-TURN_S: Final = 0.25
+TICK_S: Final = 0.25
 LEAST_S: Final = 0.5
 MOST_S: Final = 3600.0
 
@@ -46,11 +47,11 @@ def timing(
     if not LEAST_S <= seconds <= MOST_S:
         raise StudyError(f"each loop is timed for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
     run = _Run(seconds, load, windows, spin_us, ending or threading.Event(), tell)
-    return beside(load, windows, run.race)
+    return under_load(load, windows, run.race)
 
 
 class _Run:
-    """The loops, and their turns so far."""
+    """The loops, and their ticks so far."""
 
     def __init__(
         self,
@@ -67,7 +68,7 @@ class _Run:
         self._servos = [ServoLoop(ordinary, real_time=False, spin_us=spin_us)]
         self._loops: list[Loop] = [
             *self._servos,
-            BareLoop(ordinary, real_time=False, spin_us=spin_us),
+            BareLoop(ordinary, real_time=False, clock=SystemClock(spin_us)),
             ThreadLoop(ordinary, real_time=False),
         ]
         if windows is not None:
@@ -77,17 +78,17 @@ class _Run:
             self._servos.append(ServoLoop(best, real_time=True, spin_us=spin_us))
             self._loops += [
                 self._servos[-1],
-                BareLoop(best, real_time=True, spin_us=spin_us),
+                BareLoop(best, real_time=True, clock=SystemClock(spin_us)),
                 ThreadLoop(best, real_time=True),
             ]
         else:
             self._notes += ordinary.advice
         if windows is None:
-            self._notes.append("no Qt here: its timer was not timed")
+            self._notes.append("Qt is not available: its timer was not measured")
 
     def race(self) -> Timed:
-        """Let the loops take their turns."""
-        rounds = max(1, round(self._seconds / TURN_S))
+        """Let the loops take their ticks."""
+        rounds = max(1, round(self._seconds / TICK_S))
         ticks = round(self._seconds / rounds * 1e9) // PERIOD_NS
         parts: list[list[Taken]] = [[] for _ in self._loops]
         frames, began_s = self._frames(), time.monotonic()
@@ -95,18 +96,18 @@ class _Run:
             for loop, mine in zip(self._loops, parts, strict=True):
                 if self._ending.is_set():
                     raise KeyboardInterrupt
-                mine.append(loop.turn(ticks))
+                mine.append(loop.run(ticks))
             if number * 10 // rounds < (number + 1) * 10 // rounds:
                 self._tell(f"{100 * (number + 1) // rounds:3} %")
         lasted_s = time.monotonic() - began_s
         clocks = [servo.clock for servo in self._servos]
-        turned_ns = len(self._servos) * rounds * ticks * PERIOD_NS
+        ticked_ns = len(self._servos) * rounds * ticks * PERIOD_NS
         return Timed(
             machine=machine(),
             load=self._load,
             seconds=rounds * ticks * PERIOD_NS * 1e-9,
             spin_us=clocks[0].spin_us,
-            spun_share=sum(clock.spun_ns for clock in clocks) / turned_ns,
+            spun_share=sum(clock.spun_ns for clock in clocks) / ticked_ns,
             frames_hz=(self._frames() - frames) / lasted_s if self._load != "none" else None,
             lanes=tuple(lane(loop.kind, loop.grant, mine) for loop, mine in zip(self._loops, parts, strict=True)),
             notes=tuple(self._notes),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from study_app.evaluation.style import file_bytes
+from study_app.figure_style import PLOT_SETTINGS, file_bytes
 from study_app.store.atomic import write_file
 
 
@@ -19,7 +19,7 @@ def write_report(to: Path, name: str, texts: dict[str, str], figure: Figure, tit
         A file cannot be written.
     """
     contents = {ending: text.encode() for ending, text in texts.items()}
-    contents |= {ending: file_bytes(figure, ending, title) for ending in ("png", "svg")}
+    contents |= {ending: file_bytes(figure, ending, title, PLOT_SETTINGS) for ending in ("png", "svg")}
     for ending, content in contents.items():
         write_file(to / f"{name}.{ending}", content)
     return tuple(to / f"{name}.{ending}" for ending in contents)

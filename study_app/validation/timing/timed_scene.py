@@ -1,4 +1,4 @@
-"""What a turn has to do while it is timed: a scene with every effect on, and a hand that costs nothing itself."""
+"""What a tick has to do while it is timed: a scene with every effect on, and a hand that costs nothing itself."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ import numpy as np
 from study_app.evaluation.cost import hand
 from study_app.haptics.kernels.c_functions import READ, READ_NEW, WRITE, c_function, record_at
 from study_app.haptics.model.device_dynamics import UNKNOWN
+from study_app.haptics.model.effects.current import Vortex
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.layout import READING, records
-from study_app.haptics.model.scene import Cylinder, Drag, Liquid, Scene, Vortex, Wake
+from study_app.haptics.model.scene import Cylinder, Liquid, Scene
 
 FULL: Final = Scene(
     liquids=(
@@ -44,7 +47,7 @@ _reading_at = record_at(READING)
 
 
 class PlayedHand:
-    """A device that gives one place of a motion at every reading and takes any force: what is timed is the turn."""
+    """A device that gives one place of a motion at every reading and takes any force: what is timed is the tick."""
 
     name = "played"
     force_limit_n = 8.0

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from study_app.validation.timing.figure import LOADS, draw
+from study_app.store.tables.csv_files import csv_text_of
 from study_app.validation.timing.lateness import PERCENTILES, Lane, Timed
+from study_app.validation.timing.lateness_figure import LOADS, draw
 from study_app.validation.timing.output_files import write_report
 
 BEGIN: Final = "<!-- timing: printed by liquid-study timing --to DIR -->"
@@ -28,8 +28,8 @@ COLUMNS: Final = (
     "max_us",
     "p50_against_bare",
     "p99_against_bare",
-    "turn_p50_us",
-    "turn_p99_us",
+    "tick_p50_us",
+    "tick_p99_us",
 )
 _HEADINGS: Final = (
     "priority",
@@ -40,10 +40,10 @@ _HEADINGS: Final = (
     "p99.9",
     "worst",
     "over 1 ms",
-    "passed over",
+    "skipped",
     "p50 : bare",
     "p99 : bare",
-    "turn p99",
+    "tick p99",
 )
 
 
@@ -56,14 +56,14 @@ def write(found: Timed, to: Path) -> tuple[Path, ...]:
         A file cannot be written.
     """
     texts = {"txt": text(found), "md": markdown(found), "csv": csv_text(found)}
-    return write_report(to, "timing", texts, draw(found), "How late turns begin")
+    return write_report(to, "timing", texts, draw(found), "Lateness of ticks")
 
 
 def text(found: Timed) -> str:
     """Return the report for a terminal."""
     rows = [_HEADINGS, *(_row(found, lane) for lane in found.lanes)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(_HEADINGS))]
-    lines = [_head(found), "lateness in µs; passed over: deadlines that a turn ran past", ""]
+    lines = [_head(found), "lateness in µs; skipped: deadlines that passed during a longer tick", ""]
     for row in rows:
         left = (cell.ljust(width) if column < 2 else cell.rjust(width) for column, (cell, width) in _with(row, widths))
         lines.append("  ".join(left).rstrip())
@@ -82,12 +82,10 @@ def markdown(found: Timed) -> str:
 
 def csv_text(found: Timed) -> str:
     """Return the table for machines: CSV, named `COLUMNS`."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    rows: list[Sequence[object]] = [COLUMNS]
     for lane in found.lanes:
         busy = (f"{lane.busy_us(50):.3f}", f"{lane.busy_us(99):.3f}") if len(lane.busy_ns) else ("n/a", "n/a")
-        writer.writerow(
+        rows.append(
             (
                 lane.grant.level,
                 lane.grant.how,
@@ -100,13 +98,13 @@ def csv_text(found: Timed) -> str:
                 *busy,
             )
         )
-    return out.getvalue()
+    return csv_text_of(rows)
 
 
 def _head(found: Timed) -> str:
-    painted = "" if found.frames_hz is None else f", {found.frames_hz:.0f} frames a second"
+    painted = "" if found.frames_hz is None else f", {found.frames_hz:.0f} frames per second"
     return (
-        f"{found.seconds:g} s of each loop at 1 kHz, in turns of a quarter second round about; {LOADS[found.load]}"
+        f"{found.seconds:g} s of each loop at 1 kHz, alternating every quarter second; {LOADS[found.load]}"
         f"{painted}. {found.machine}."
     )
 

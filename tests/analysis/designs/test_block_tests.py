@@ -7,10 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study_app.analysis.designs.block_tests import MANY, Asked, asked_again, compared, of_tables, over_all
+from study_app.analysis.designs.block_tests import MANY, Asked, of_tables
+from study_app.analysis.findings.other_assumptions import asked_again
+from study_app.analysis.findings.over_all_statements import over_all
+from study_app.analysis.findings.settings_differ import compared
 from study_app.analysis.statistics.outcome import DRAWS
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting
 from study_app.analysis.tables.planned_analysis import NOTHING
+
+pytestmark = pytest.mark.slow
 
 DECIDED = replace(NOTHING, made=True)
 
@@ -44,7 +49,7 @@ def test_in_a_large_family_of_many_people_nothing_is_out_of_reach() -> None:
     whole, _ = compared(answers(block(40), MANY + 50))
     assert "chi-square approximation" in whole[0].outcome.method
     assert {one.verdict for one in whole} <= {"shown", "not shown"}
-    _, again, _ = asked_again(asked, None, "the settings")
+    again = asked_again(asked, None, "the settings")[0].incomplete
     assert {one.verdict for one in again} <= {"suggested", "not shown"}
     assert again[0].outcome.p is not None
     assert again[0].outcome.p < 1e-4

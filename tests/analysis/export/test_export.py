@@ -6,14 +6,17 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from study_app.analysis.export.delivered import Delivered
 from study_app.analysis.export.export import export
 from study_app.analysis.export.frame_csv import table_bytes
-from study_app.analysis.export.typed_tables import Delivered
 from study_app.errors import AnalysisError
 from study_app.store.output_files import write_files
-from study_app.store.tables.columns import RESPONSES, SEALED, TRIALS, Column, header, unsealed
+from study_app.store.tables.column import Column, header, unsealed
+from study_app.store.tables.columns import RESPONSES, SEALED, TRIALS
 from study_app.store.tables.formulas import unguarded
 from tests.analysis.conftest import CANNOT_JUDGE, DELAY_ERROR_MS, HIDDEN, Results
+
+pytestmark = pytest.mark.slow
 
 NAMES = {
     "study-rek2024_description-responses_data.csv",
@@ -249,7 +252,7 @@ def test_a_broken_folder_leaves_no_export(rek: Results, to: Path) -> None:
 def test_a_file_in_the_place_of_the_folder_is_refused(rek: Results, tmp_path: Path) -> None:
     rek.add("P001", lambda *_: 6)
     (tmp_path / "taken").write_text("x")
-    with pytest.raises(AnalysisError, match=r"taken cannot be written .*--to"):
+    with pytest.raises(AnalysisError, match=r"taken cannot be written \(it is a file, not a folder\): .*--to"):
         export(rek.folder, tmp_path / "taken")
     assert (tmp_path / "taken").read_text() == "x"
 

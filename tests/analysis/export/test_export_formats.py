@@ -25,6 +25,8 @@ from study_app.protocol.load import parse
 from study_app.store.verification.psychds import validate
 from tests.analysis.conftest import HIDDEN, SMALL, Results, make_results
 
+pytestmark = pytest.mark.slow
+
 pyreadstat = pytest.importorskip("pyreadstat", reason="the extra spss is not installed")
 
 NOTE = '=1+1, "so" — naïve 😀\nnew line'
@@ -123,7 +125,10 @@ def test_parquet_keeps_whole_numbers_flags_and_texts_where_some_are_missing(smal
     assert set(trials.loc[trials["participant"] == "A", "notes"]) == {NOTE}
     assert trials.loc[trials["participant"] == "B", "notes"].isna().all()
     field = parquet.read_schema(table(to, "small", "responses", "parquet")).field("onset_s")
-    assert field.metadata == {b"description": b"When the statement was shown, on the session's clock.", b"unit": b"s"}
+    assert field.metadata == {
+        b"description": b"Time when the statement was shown, on the session's clock.",
+        b"unit": b"s",
+    }
 
 
 def test_sav_has_labels_levels_measures_and_codes_of_missing_answers(small: Results, to: Path) -> None:
@@ -147,7 +152,7 @@ def test_sav_has_labels_levels_measures_and_codes_of_missing_answers(small: Resu
     assert (levels[1], levels[7], levels[98], levels[99]) == ("a", "g", "Cannot judge", "No answer")
     assert about.variable_measure["response"] == "ordinal"
     assert about.variable_measure["item"] == "nominal"
-    assert about.column_names_to_labels["onset_s"] == "When the statement was shown, on the session's clock. [s]"
+    assert about.column_names_to_labels["onset_s"] == "Time when the statement was shown, on the session's clock. [s]"
     assert about.file_label == "A small study (small 2)"
     assert about.file_encoding == "UTF-8"
 

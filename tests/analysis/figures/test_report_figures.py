@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from study_app.analysis import style
+from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures, movement_plots, recognition_matrix, small_multiples
 from study_app.analysis.tables.study import load_study
 from tests.analysis.conftest import Results, twelve

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import csv
-import importlib
 import io
 import os
 import signal
 import subprocess
 import sys
 import textwrap
-import types
 from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -19,21 +18,25 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.power import sweep as sweeping
-from study_app.analysis.power.counts import BATCH, EFFECTS, FULL, Counts, count
+from study_app.analysis.power import power_sweep
+from study_app.analysis.power.batch_counts import BATCH, EFFECTS, FULL, Counts, count
 from study_app.analysis.power.plan import Plan, plan
 from study_app.analysis.power.power_curves import Curve, Powers, interval, powers
 from study_app.analysis.power.power_files import write
+from study_app.analysis.power.power_sweep import sweep
 from study_app.analysis.power.power_tables import COLUMNS, power_csv, power_markdown
 from study_app.analysis.power.simulated_studies import people
-from study_app.analysis.power.sweep import sweep
 from study_app.analysis.statistics.trend import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError
+from study_app.protocol.forms.simulated_observer import NOTHING_FELT, Felt
 from study_app.protocol.load import load, parse
-from study_app.protocol.questions.simulated_answers import Felt
 from study_app.store.verification.table_checks import problems
+from study_app.workers.executors import Engine, open_executor
 from tests.analysis.conftest import SMALL
+from tests.protocol.groups.grouped import grouped
+
+pytestmark = pytest.mark.slow
 
 SIZES = (5, 9)
 
@@ -55,8 +58,16 @@ def planned(name: str = "rek2024") -> Plan:
     return plan(protocol, felt_in(protocol))
 
 
-def swept(study: Plan, studies: int = 30, **how: Any) -> tuple[int, Counts]:
-    *_, last = sweep(study, SIZES, studies, 1, **{"jobs": 1, **how})
+def swept(
+    study: Plan,
+    studies: int = 30,
+    *,
+    sizes: tuple[int, ...] = SIZES,
+    seed: int = 1,
+    executor: Executor | None = None,
+) -> tuple[int, Counts]:
+    with ThreadPoolExecutor(1) as one:
+        *_, last = sweep(study, sizes, studies, seed, executor or one)
     return last
 
 
@@ -79,20 +90,21 @@ def curves(found: Powers, question: str, item: str | None = None) -> dict[str | 
     return {one.setting: one for one in found.curves if (one.question, one.item) == (question, item)}
 
 
-@pytest.mark.parametrize("how", [{"jobs": 2}, {"jobs": 2, "by": "threads"}], ids=["processes", "threads"])
-def test_the_numbers_do_not_depend_on_who_works(counted: tuple[int, Counts], how: dict[str, Any]) -> None:
-    studies, counts = swept(planned(), **how)
+@pytest.mark.parametrize(("engine", "workers"), [("processes", 1), ("processes", 2), ("threads", 2)])
+def test_the_counts_do_not_depend_on_the_executor(counted: tuple[int, Counts], engine: Engine, workers: int) -> None:
+    with open_executor(engine, workers) as executor:
+        studies, counts = swept(planned(), executor=executor)
     assert studies == 30
     assert same(counts, counted[1])
 
 
 def test_another_seed_gives_other_numbers(counted: tuple[int, Counts]) -> None:
-    *_, (_, other) = sweep(planned(), SIZES, 30, 2, jobs=1)
+    _, other = swept(planned(), seed=2)
     assert not same(other, counted[1])
 
 
 def test_a_size_is_answered_alike_whichever_others_are_asked_for(counted: tuple[int, Counts]) -> None:
-    *_, (_, alone) = sweep(planned(), (9,), 30, 1, jobs=1)
+    _, alone = swept(planned(), sizes=(9,))
     for what, numbers in alone.items():
         if what[1] != "means":  # of all participants that were simulated
             assert np.array_equal(numbers[0], counted[1][what][1]), what
@@ -103,11 +115,12 @@ def test_the_first_studies_of_many_are_those_of_few() -> None:
     few, many = (people(study_plan, size, 1, 3) for size in SIZES)
     for one, other in zip(few, many, strict=True):
         assert np.array_equal(one.thought, other.thought[:5])
-        assert np.array_equal(one.beside, other.beside[:5])
+        assert np.array_equal(one.noise, other.noise[:5])
 
 
 def test_every_batch_tells_how_far_it_is() -> None:
-    told = [done for done, _ in sweep(planned(), (5,), 2 * BATCH + 3, 1, jobs=1)]
+    with ThreadPoolExecutor(1) as executor:
+        told = [done for done, _ in sweep(planned(), (5,), 2 * BATCH + 3, 1, executor)]
     assert told == [BATCH, 2 * BATCH, 2 * BATCH + 3]
 
 
@@ -216,6 +229,18 @@ def test_a_study_of_two_liquids_without_decisions_can_be_study_plantoo(tmp_path:
     assert write(found, tmp_path / "power")
 
 
+def test_a_block_of_some_groups_counts_their_participants() -> None:
+    """Where all groups have a block, nothing is said."""
+    steps = {"a": ["hello", "thin", "end"], "b": ["hello", "thin", "thick", "end"]}
+    groups = "".join(f"\n[groups.{name}]\nsequence = {of_group}\n" for name, of_group in steps.items())
+    felt = {(block, condition): (NOTHING_FELT,) for block in ("thin", "thick") for condition in ("water", "honey")}
+    study_plan = plan(grouped(groups=groups), felt)
+    assert {block.id: block.groups for block in study_plan.blocks} == {"thin": (), "thick": ("b",)}
+    studies, counts = swept(study_plan)
+    found = powers(study_plan, SIZES, studies, studies, 1, counts)
+    assert power_markdown(found).count("n counts participants of b; no other group has it.") == 1
+
+
 def test_a_protocol_that_compares_nothing_is_refused() -> None:
     protocol = load("demo")
     alone = {name: block.model_copy(update={"questionnaire": None}) for name, block in protocol.blocks.items()}
@@ -223,19 +248,11 @@ def test_a_protocol_that_compares_nothing_is_refused() -> None:
         plan(protocol.model_copy(update={"blocks": alone}), felt_in(protocol))
 
 
-@pytest.mark.parametrize(("by", "needs"), [("dask", "distributed"), ("ray", "ray")])
-def test_an_engine_that_is_not_installed_is_one_clear_line(
-    monkeypatch: pytest.MonkeyPatch, by: Any, needs: str
-) -> None:
-    def missing(name: str) -> types.ModuleType:
-        if name.partition(".")[0] == needs:
-            raise ModuleNotFoundError(name)
-        return importlib.import_module(name)
-
-    monkeypatch.setattr(sweeping.importlib, "import_module", missing)
-    with pytest.raises(AnalysisError, match=f"--engine {by} needs the package '{needs}'.*pip install {needs}") as told:
-        list(sweep(planned(), (5,), 20, 1, by=by))
-    assert "\n" not in str(told.value)
+@pytest.mark.parametrize("engine", ["dask", "ray", "loky"])
+def test_an_engine_that_does_not_exist_is_a_usage_error(engine: str) -> None:
+    result = CliRunner().invoke(commands, ["power", "rek2024", "--engine", engine])
+    assert result.exit_code == 2
+    assert f"'{engine}' is not one of 'processes', 'threads'" in result.output
 
 
 @pytest.mark.parametrize("sizes", ["5,many", "1", "5,2000", ""])
@@ -251,7 +268,7 @@ def test_the_command_ended_by_the_user_writes_what_it_has(
         yield counted
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sweeping, "sweep", until)
+    monkeypatch.setattr(power_sweep, "sweep", until)
     monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda protocol, **_: felt_in(protocol))
     to = tmp_path / "power"
     result = CliRunner().invoke(commands, ["power", "rek2024", "--sizes", "5,9", "--to", str(to)])
@@ -265,13 +282,15 @@ def test_an_interrupt_ends_the_workers_too() -> None:
     program = textwrap.dedent(
         """
         import signal
-        from study_app.analysis.power.sweep import sweep
+        from study_app.analysis.power.power_sweep import sweep
+        from study_app.workers.executors import open_executor
         from tests.analysis.power.test_power import planned
         if __name__ == "__main__":
             signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job starts deaf to it
             try:
-                for done, counts in sweep(planned(), (5,), 1_000_000, 1, jobs=2):
-                    print(done, flush=True)
+                with open_executor("processes", 2) as executor:
+                    for done, counts in sweep(planned(), (5,), 1_000_000, 1, executor):
+                        print(done, flush=True)
             except KeyboardInterrupt:
                 print("ended", flush=True)
         """

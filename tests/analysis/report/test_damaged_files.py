@@ -57,11 +57,13 @@ def test_what_nobody_touched_is_not_doubted(copy: StudyFolder) -> None:
     assert told(copy) == []
 
 
+@pytest.mark.slow
 def test_a_table_changed_by_hand_is_named_with_what_mends_it(copy: StudyFolder) -> None:
     session = copy.sessions()[1]
     path = another_answer(session)
     (line,) = told(copy)
-    assert line.startswith(f"{path} is not what the journal gives, from line 2 on: liquid-study rebuild {session.path}")
+    again = f"rebuild it from the journal with liquid-study rebuild {session.path}"
+    assert line.startswith(f"{path} differs from the journal, from line 2 on: {again}")
     rebuild(session.path)
     assert told(copy) == []
 
@@ -78,13 +80,13 @@ def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
 @pytest.mark.parametrize(
     ("harm", "says"),
     [
-        (lambda session: session.journal.unlink(), "is missing, and nothing else proves the tables"),
+        (lambda session: session.journal.unlink(), "is missing, so the tables cannot be verified"),
         (lambda session: change(session.journal, b"\n", b"garbage\n"), "is damaged (line 1"),
         (lambda session: change(session.journal, b'"n":2,', b'"n":3,'), "is damaged (line 2"),
         (lambda session: session.journal.write_bytes(b""), "has changed since the session ended"),
         (lambda session: cut_last_line(session.journal), "has changed since the session ended"),
         (lambda session: change(session.receipt, b'"version"', b'"version" '), "has changed since the session ended"),
-        (lambda session: session.checksums.unlink(), "is missing or no list of checksums"),
+        (lambda session: session.checksums.unlink(), "is missing or not a list of checksums"),
     ],
 )
 def test_every_damage_behind_the_numbers_is_one_line(
@@ -96,6 +98,7 @@ def test_every_damage_behind_the_numbers_is_one_line(
     assert "liquid-study" in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["export", "plot"])
 def test_the_commands_go_on_and_say_so_in_a_line_and_beside_what_they_write(
     copy: StudyFolder, tmp_path: Path, command: str
@@ -104,16 +107,17 @@ def test_the_commands_go_on_and_say_so_in_a_line_and_beside_what_they_write(
     finished = CliRunner().invoke(commands, [command, str(copy.path), "--to", str(tmp_path / "out")])
     assert finished.exit_code == 0
     (line,) = finished.stderr.splitlines()
-    assert line.startswith(f"warning: {path} is not what the journal gives")
+    assert line.startswith(f"warning: {path} differs from the journal")
     name = path.relative_to(copy.path).as_posix()
     if command == "export":
         codebook = json.loads((tmp_path / "out" / "codebook.json").read_text(encoding="utf-8"))
-        assert codebook["doubts"] == [{"file": name, "what": "is not what the journal gives, from line 2 on"}]
+        assert codebook["doubts"] == [{"file": name, "what": "differs from the journal, from line 2 on"}]
     else:
         caption = (tmp_path / "out" / "liquids.txt").read_text(encoding="utf-8")
         assert f"1 file is not as recorded, and used as found: {name}." in caption
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["export", "plot"])
 def test_the_commands_say_nothing_where_there_is_nothing_to_say(
     copy: StudyFolder, tmp_path: Path, command: str

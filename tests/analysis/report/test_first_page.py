@@ -9,18 +9,27 @@ import numpy as np
 import pytest
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.block_results import Results
+from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
+from study_app.analysis.findings.contrast_with_control import equivalent_up_to
+from study_app.analysis.findings.detection_threshold import FINDING as THRESHOLD
+from study_app.analysis.findings.distinguished_liquids import given, recognised
+from study_app.analysis.findings.liquid_recognition import FINDING as RECOGNITION
 from study_app.analysis.findings.liquid_recognition import RecognitionResult
-from study_app.analysis.findings.section_failures import Failures
+from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
+from study_app.analysis.findings.over_all_statements import FINDING as OVERALL
+from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
+from study_app.analysis.findings.unchanged_delay import common_ms
 from study_app.analysis.report.first_page.answer import Answer
-from study_app.analysis.report.first_page.answers_of_delays import common_ms
-from study_app.analysis.report.first_page.answers_of_liquids import given, recognised
 from study_app.analysis.report.first_page.claims import answers
 from study_app.analysis.report.first_page.page import first_page
 from study_app.analysis.report.measured import CLAIMS, STUDIES, empty_studies
+from study_app.analysis.results.block_results import Results
+from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.statistics.recognition import recognition
 from study_app.analysis.tables.planned_analysis import Decided
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
+
+pytestmark = pytest.mark.slow
 
 DELAYS = (0.0, 50.0, 100.0, 150.0)
 
@@ -56,28 +65,33 @@ def test_a_delay_that_is_noticed_is_told_with_direction_size_and_interval() -> N
     found = named(rising(3), "noticed from")
     assert found.claims
     assert not found.exploratory
-    assert found.told.startswith("From 100 ms on at the latest")
+    assert found.text.startswith("From 100 ms on at the latest")
     assert any("“Different” from 100 ms on at the latest: +" in line and "[" in line for line in found.sizes)
     assert any("“Harder” from 100 ms on at the latest: −" in line for line in found.sizes)
-    assert not any("p =" in line or "p <" in line for line in (found.told, *found.sizes))
+    assert not any("p =" in line or "p <" in line for line in (found.text, *found.sizes))
 
 
 def test_up_to_which_delay_nothing_changes_needs_every_statement() -> None:
     results = rising(3)
     found = named(results, "unchanged up to")
     assert common_ms(results.blocks[0]) == 50.0
-    assert found.told.startswith("Up to 50 ms: mean answers to both statements stay within ±1 point of those at 0 ms")
-    block = replace(results.blocks[0], equivalent_up_to={ITEMS[0]: 50.0, ITEMS[1]: None})
+    assert found.text.startswith("Up to 50 ms: mean answers to both statements stay within ±1 point of those at 0 ms")
+    against = tuple(
+        one if one.item == ITEMS[0] else replace(one, found=replace(one.found, verdict="inconclusive"))
+        for one in CONTRASTS.of(results.blocks[0])
+    )
+    block = CONTRASTS.add_to(results.blocks[0], against)
+    assert equivalent_up_to(against) == {ITEMS[0]: 50.0, ITEMS[1]: None}
     assert common_ms(block) is None
     assert (
-        "For no delay is it shown in all statements" in named(replace(results, blocks=(block,)), "unchanged up to").told
+        "For no delay is it shown in all statements" in named(replace(results, blocks=(block,)), "unchanged up to").text
     )
 
 
 def test_where_nothing_is_shown_it_says_that_this_is_no_evidence() -> None:
     found = named(flat(), "noticed from")
     assert not found.claims
-    assert "No delay was shown to be noticed. That is not evidence" in found.told
+    assert "No delay was shown to be noticed. That is not evidence" in found.text
 
 
 def test_liquids_are_recognised_by_name_and_the_wrong_name_is_told() -> None:
@@ -97,10 +111,10 @@ def test_liquids_are_recognised_by_name_and_the_wrong_name_is_told() -> None:
     )
     told = named(evaluate(right, planning=False), "distinguished")
     assert told.claims
-    assert told.told == "Liquid1 and liquid2 were recognised above chance."
+    assert told.text == "Liquid1 and liquid2 were recognised above chance."
     assert "liquid1 12 of 12 (74 to 100 %), 33 % by chance" in told.sizes[0]
     wrong = named(evaluate(study(settings, list(everybody(settings, 12, answer))), planning=False), "distinguished")
-    assert "liquid2 was called liquid1 by 12 of 12" in wrong.told
+    assert "liquid2 was called liquid1 by 12 of 12" in wrong.text
 
 
 def test_decisions_that_came_later_are_marked_as_exploratory() -> None:
@@ -127,12 +141,12 @@ def ordered(people: int, decided: Decided = DECIDED) -> Results:
     settings = liquids(3)
     trials = list(everybody(settings, people, lambda _p, _s, code, i: 2 * int(code[1:]) if i == ITEMS[1] else 4))
     results = evaluate(study(settings, trials, decided), planning=False)
-    return replace(results, blocks=(replace(results.blocks[0], named=None),))
+    return replace(results, blocks=(RECOGNITION.add_to(results.blocks[0], None),))
 
 
 def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() -> None:
     told = named(ordered(5), "distinguished")
-    assert told.told == (
+    assert told.text == (
         "The liquids were rated differently in “Harder”; which ones cannot be shown with five participants."
     )
     assert told.claims
@@ -140,12 +154,12 @@ def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() ->
     assert any("“Harder”: Kendall's W 1.00" in line for line in told.sizes)
     assert named(ordered(5, replace(DECIDED, primary=ITEMS[:1])), "distinguished").exploratory
     results = ordered(7)
-    assert named(results, "distinguished").told.startswith("Rated differently: liquid1 – liquid2")
-    unclear = replace(
+    assert named(results, "distinguished").text.startswith("Rated differently: liquid1 – liquid2")
+    unclear = PAIRS.add_to(
         results.blocks[0],
-        pairs=tuple(replace(one, tested=replace(one.tested, verdict="not shown")) for one in results.blocks[0].pairs),
+        tuple(replace(one, tested=replace(one.tested, verdict="not shown")) for one in PAIRS.of(results.blocks[0])),
     )
-    assert named(replace(results, blocks=(unclear,)), "distinguished").told == (
+    assert named(replace(results, blocks=(unclear,)), "distinguished").text == (
         "The liquids were rated differently in “Harder”; which ones is not shown."
     )
 
@@ -153,11 +167,11 @@ def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() ->
 def test_pairs_that_only_exploratory_statements_tell_apart_are_marked() -> None:
     results = ordered(8)
     block = results.blocks[0]
-    first = replace(block.pairs[0], tested=replace(block.pairs[0].tested, verdict="suggested"))
-    marked = named(replace(results, blocks=(replace(block, pairs=(first, *block.pairs[1:])),)), "distinguished")
-    assert marked.told.startswith("Rated differently: liquid1 – liquid2 (exploratory), liquid1 – liquid3 and")
+    first = replace(PAIRS.of(block)[0], tested=replace(PAIRS.of(block)[0].tested, verdict="suggested"))
+    marked = named(replace(results, blocks=(PAIRS.add_to(block, (first, *PAIRS.of(block)[1:])),)), "distinguished")
+    assert marked.text.startswith("Rated differently: liquid1 – liquid2 (exploratory), liquid1 – liquid3 and")
     assert not marked.exploratory
-    assert "exploratory" not in named(results, "distinguished").told
+    assert "exploratory" not in named(results, "distinguished").text
 
 
 def test_the_headline_is_of_primary_statements_and_exploratory_ones_follow_it_marked() -> None:
@@ -174,7 +188,7 @@ def test_the_headline_is_of_primary_statements_and_exploratory_ones_follow_it_ma
     made = study(settings, list(everybody(settings, 16, answer)), replace(DECIDED, primary=ITEMS[1:]))
     results = evaluate(made, planning=False)
     found = named(results, "noticed from")
-    assert found.told == (
+    assert found.text == (
         "From 150 ms on at the latest: “Harder” changes with the delay up to there. Shorter delays may be noticed too. "
         "In exploratory statements, from 50 ms on at the latest: “Different” changes with the delay up to there. "
         "Shorter delays may be noticed too."
@@ -182,11 +196,11 @@ def test_the_headline_is_of_primary_statements_and_exploratory_ones_follow_it_ma
     assert not found.exploratory
     assert found.at_ms == 150
     assert [line.startswith("Exploratory: ") for line in found.sizes] == [True, False, True]
-    block = replace(results.blocks[0], lowest=tuple(one for one in results.blocks[0].lowest if one.item != "harder"))
-    block = replace(block, against=tuple(one for one in block.against if one.item != "harder"))
+    block = LOWEST.add_to(results.blocks[0], tuple(one for one in LOWEST.of(results.blocks[0]) if one.item != "harder"))
+    block = CONTRASTS.add_to(block, tuple(one for one in CONTRASTS.of(block) if one.item != "harder"))
     alone = named(replace(results, blocks=(block,)), "noticed from")
     assert alone.exploratory
-    assert alone.told.startswith("From 50 ms on at the latest: “Different”")
+    assert alone.text.startswith("From 50 ms on at the latest: “Different”")
     assert not any(line.startswith("Exploratory") for line in alone.sizes)
 
 
@@ -198,9 +212,9 @@ def test_a_threshold_alone_is_exploratory_unless_its_statement_is_primary(
     decided: dict[str, Any], exploratory: bool
 ) -> None:
     results = rising(3)
-    block = replace(results.blocks[0], lowest=(), against=())
-    assert block.threshold is not None
-    assert block.threshold.effect is not None
+    block = CONTRASTS.add_to(LOWEST.add_to(results.blocks[0], ()), ())
+    assert THRESHOLD.of(block) is not None
+    assert THRESHOLD.of(block).effect is not None
     found = named(replace(results, blocks=(block,), decided=replace(results.decided, **decided)), "noticed from")
     assert (found.claims, found.exploratory) == (True, exploratory)
 
@@ -209,7 +223,7 @@ def test_a_threshold_is_no_claim_at_a_smaller_alpha_that_was_decided() -> None:
     settings = delays(DELAYS)
     trials = list(everybody(settings, 4, lambda p, _s, code, _i: 6 if (p, code) in NOTICED or code == "D4" else 2))
     usual, strict = (
-        evaluate(study(settings, trials, replace(DECIDED, alpha=alpha)), planning=False).blocks[0].threshold
+        THRESHOLD.of(evaluate(study(settings, trials, replace(DECIDED, alpha=alpha)), planning=False).blocks[0])
         for alpha in (0.05, 0.0001)
     )
     assert usual is not None
@@ -227,11 +241,11 @@ def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int
 
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
     results = rising(3)
-    assert results.blocks[0].overall is not None
+    assert OVERALL.of(results.blocks[0]) is not None
 
     def with_p(*ps: float) -> list[bool]:
         blocks = tuple(
-            replace(results.blocks[0], overall=replace(results.blocks[0].overall, p=p))  # type: ignore[type-var]
+            OVERALL.add_to(results.blocks[0], replace(OVERALL.of(results.blocks[0]), p=p))  # type: ignore[type-var]
             for p in ps
         )
         return [one.claims for one in answers(replace(results, blocks=blocks)) if one.question == "noticed from"]
@@ -240,8 +254,8 @@ def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() 
     assert with_p(0.051) == [False]
     assert with_p(0.03, 0.9) == [False, False]
     assert with_p(0.02, 0.04) == [True, True]
-    none = replace(results, blocks=(replace(results.blocks[0], overall=None),))
-    assert named(none, "noticed from").told.startswith("Nothing is claimed here")
+    none = replace(results, blocks=(OVERALL.add_to(results.blocks[0], None),))
+    assert named(none, "noticed from").text.startswith("Nothing is claimed here")
     assert named(none, "noticed from").sizes == ()
 
 

@@ -43,6 +43,7 @@ def test_a_figure_keeps_its_width_on_a_narrow_window_and_is_moved_sideways() -> 
     assert "img { max-width: 100%; height: auto; }" in style()
 
 
+@pytest.mark.slow
 def test_a_page_without_the_typeface_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     assert font_faces("abc").count("@font-face") == 2
     assert font_faces("abc") == font_faces("abc")

@@ -15,6 +15,8 @@ from study_app.analysis.statistics.paired import paired
 from study_app.analysis.statistics.psychometrics.threshold import threshold
 from study_app.analysis.statistics.trend import page
 
+pytestmark = pytest.mark.slow
+
 
 def answers(n: int, k: int, seed: int = 0) -> np.ndarray:
     rng = np.random.default_rng(seed)

@@ -137,6 +137,7 @@ def test_mean_ranks_give_the_published_nemenyi_and_conover_comparisons() -> None
     assert holm([*ps, 0.289692])[:2] == pytest.approx([0.002387, 0.000692], abs=1e-6)
 
 
+@pytest.mark.slow
 @given(answers)
 @settings(max_examples=40, deadline=None)
 def test_the_exact_p_is_that_of_all_rearrangements(rows: list[list[int]]) -> None:
@@ -218,6 +219,7 @@ def test_a_drawn_p_is_repeatable_and_near_the_exact_one(monkeypatch: pytest.Monk
     assert abs(drawn.p - exact.p) < 5 * np.sqrt(exact.p / 9999) + 1e-4
 
 
+@pytest.mark.slow
 def test_seven_settings_are_drawn_and_many_people_approximated() -> None:
     rng = np.random.default_rng(0)
     seven = friedman(rng.integers(1, 8, (5, 7)))

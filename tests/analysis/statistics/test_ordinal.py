@@ -6,6 +6,8 @@ from study_app.analysis.statistics.cumulative import Answers, fit, log_likelihoo
 from study_app.analysis.statistics.ordinal import ordinal
 from study_app.errors import AnalysisError
 
+pytestmark = pytest.mark.slow
+
 # Bitterness of wine (Randall 1989; R, ordinal): nine judges; bottles 1-4 cold, 5-8 warm; 3, 4, 7, 8 with contact.
 JUDGES = "23344455 12132354 23325544 32323253 23433333 32322454 11222323 22233334 12323244"
 WINE = np.array([[int(digit) for digit in judge] for judge in JUDGES.split()])

@@ -66,8 +66,8 @@ PUBLISHED = {
         "test_paired.py::test_published_differences_by_the_normal_approximation",
     ),
     "CIEDE2000 (Sharma, Wu & Dalal 2005); palettes to four kinds of eyes (Machado et al. 2009)": (
-        "../test_style.py::test_published_differences_of_colours",
-        "../test_style.py::test_published_differences_of_palettes_to_four_kinds_of_eyes",
+        "../../test_figure_style.py::test_published_differences_of_colours",
+        "../../test_figure_style.py::test_published_differences_of_palettes_to_four_kinds_of_eyes",
     ),
     "What so many participants can reach at all": (
         "test_paired.py::test_the_smallest_p_of_so_many_pairs",

@@ -65,6 +65,7 @@ def test_a_statement_without_any_answer_has_no_median() -> None:
     assert found.iloc[2]["missing"] == 0
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(1, 7), min_size=1, max_size=40), st.randoms(use_true_random=False))
 def test_the_order_of_participants_changes_nothing_and_reversing_the_scale_mirrors(values: list[int], mixer) -> None:
     row = of_one(values)

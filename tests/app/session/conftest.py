@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QEvent
@@ -14,12 +16,14 @@ from study_app.app.session.parts import Parts
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.protocol.load import load
+from study_app.protocol.load import load, source_bytes
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.wording.languages import words
+from study_app.session import start
+from study_app.store.progress import Progress
 from study_app.viewmodels.operator import Session
-from study_app.viewmodels.session_stages import SessionProgress, stages
-from tests.app.session.world import World
+from study_app.viewmodels.session.stages import stages
+from tests.app.world import World
 
 
 @pytest.fixture
@@ -35,22 +39,22 @@ def make(qapp, world):
         schedule = build_schedule(protocol, "P001", 1)
         session = Session(
             protocol=protocol,
+            schedule=schedule,
             stages=stages(protocol, schedule),
             who="Participant P001",
             expected_s=180.0,
             answers_of=8,
             lateness_limit_s=0.002,
             device_name="Mouse",
-            device_kind="mouse",
+            device_icon="mouse",
             device_rows=(),
         )
         given = {
             "session": session,
-            "schedule": schedule,
             "key": draw_key(protocol, stream(1, "key").random),
             "language": "en",
             "servo": world,
-            "journal": WatchedJournal(world, SessionProgress(protocol, schedule), world.seconds),
+            "journal": WatchedJournal(world, Progress(), world.seconds),
             "clock": world.seconds,
             "aim_m": lambda: (0.0, 0.0, 0.0),
         }
@@ -64,7 +68,7 @@ def make(qapp, world):
         bridge = SessionBridge(made, participant, operator, strip=strip)
         made_bridges.append(bridge)
         bridge.start()
-        bridge._frames.stop()  # a test moves time itself
+        bridge.frames.stop()  # a test moves time itself
         return bridge
 
     made_bridges = []
@@ -72,7 +76,7 @@ def make(qapp, world):
     yield build
     for bridge in made_bridges:
         if isValid(bridge):
-            bridge._leave()
+            bridge.leave_now()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     assert sys.excepthook is hook
 
@@ -80,3 +84,33 @@ def make(qapp, world):
 @pytest.fixture
 def bridge(make):
     return make()
+
+
+@pytest.fixture
+def nobody_stays():
+    """Let no simulated person of one test look at the windows of the next."""
+    yield
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+@pytest.fixture
+def quick_preflight(monkeypatch):
+    """Measure a tenth of a second: what is judged of it is tested by itself."""
+    monkeypatch.setattr(start, "MEASURED_S", 0.1)
+
+
+@pytest.fixture
+def short_demo(tmp_path: Path) -> str:
+    """Return the demo protocol with tasks of a second."""
+    text = source_bytes("demo").decode()
+    for key, value in (("min_s", "0.3"), ("count", "1"), ("dwell_s", "0.05")):
+        text, found = re.subn(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
+        assert found == 1
+    path = tmp_path / "demo.toml"
+    path.write_text(text)
+    return str(path)
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    return tmp_path / "results" / "demo"

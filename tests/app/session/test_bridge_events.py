@@ -11,7 +11,9 @@ from PySide6.QtCore import Qt
 from study_app.errors import StoreError
 from study_app.session.pages import PausePage, TaskPage, TextPage
 from study_app.session.transitions.events import Continue
-from tests.app.session.world import begin_trial, tick
+from tests.app.world import begin_trial, tick
+
+pytestmark = pytest.mark.slow
 
 
 def test_starting_shows_the_first_page_to_both(bridge, world):
@@ -39,7 +41,7 @@ def test_leaving_out_is_kept_and_noted_and_a_refusal_is_told(make, world):
 
     def exclude(trial, reason):
         if reason == "again":
-            raise StoreError("trial 1 is left out already")
+            raise StoreError("trial 1 is already excluded")
         left_out.append((trial, reason))
 
     bridge = make(exclude=exclude)
@@ -50,8 +52,8 @@ def test_leaving_out_is_kept_and_noted_and_a_refusal_is_told(make, world):
     assert left_out == [(1, "phone rang"), (None, "no consent")]
     notes = [done[1]["text"] for done in world.done if done[0] == "note"]
     assert notes == [
-        "left out of the analysis: trial 1: phone rang",
-        "left out of the analysis: the session: no consent",
+        "excluded from the analysis: trial 1: phone rang",
+        "excluded from the analysis: the session: no consent",
     ]
     assert bridge.trouble == ""
     assert isinstance(bridge.participant.page, TaskPage)
@@ -64,19 +66,19 @@ def test_force_and_task_begin_when_the_tank_is_painted_and_not_while_a_page_asks
     bridge.participant.event.emit(Continue(0.0))
     for second in range(1, 4):
         world.samples = tick(world, float(second))
-        bridge._frame()
+        bridge.draw_frame()
     assert bridge.participant.tank is None
     assert "load" not in world.done
     assert bridge.runner.task.elapsed_s == 0
     painted.set()
     qtbot.waitUntil(lambda: bridge.participant.tank is not None)
     assert "load" not in world.done
-    bridge._frame()
+    bridge.draw_frame()
     assert world.done[-1] == "load"
     world.samples = tick(world, 3.0)
-    bridge._frame()
+    bridge.draw_frame()
     world.samples = tick(world, 3.75)
-    bridge._frame()
+    bridge.draw_frame()
     assert bridge.runner.task.elapsed_s == 0.75
 
 
@@ -112,21 +114,21 @@ def test_a_simulated_hand_sees_each_frame_and_may_go_on(make, world):
     bridge = make(hand_for=hand_for)
     begin_trial(bridge, world)
     world.samples = tick(world, 2.0)
-    bridge._frame()
+    bridge.draw_frame()
     assert len(seen) == 1
     assert isinstance(bridge.participant.page, TaskPage)
     for at_s in (11.0, 11.1, 11.2):
         world.samples = tick(world, at_s)
-        bridge._frame()
+        bridge.draw_frame()
     assert "trial_ended" in world.events()
 
 
 def test_the_operator_sees_traces_and_figures(bridge, world):
     begin_trial(bridge, world)
     world.samples = tick(world, 2.0)
-    bridge._frame()
-    bridge._traces()
-    bridge._tiles()
+    bridge.draw_frame()
+    bridge.show_traces()
+    bridge.show_tiles()
     times, _ = bridge.operator.position.plot.curves[0].getData()
     assert len(times) >= 1
     assert bridge.operator.tiles.cards[1].value.text() == "0"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QGuiApplication, QWindow
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialog, QLineEdit, QVBoxLayout, QWidget
@@ -15,13 +15,13 @@ from PySide6.QtWidgets import QDialog, QLineEdit, QVBoxLayout, QWidget
 from study_app.app.session.bridge import SessionBridge
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.widgets import escape_key
-from study_app.protocol.load import load
-from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.pages import PausePage, TaskPage
 from study_app.session.transitions.events import Continue
-from study_app.viewmodels.session_stages import SessionProgress
-from tests.app.session.world import World, begin_trial
+from study_app.store.progress import Progress
+from tests.app.world import World, begin_trial
 from tests.compiled import needs_servo
+
+pytestmark = pytest.mark.slow
 
 Bridge = SessionBridge
 ESC = Qt.Key.Key_Escape
@@ -73,7 +73,7 @@ def ending(bridge: Bridge) -> QWidget:
 
 
 def told(bridge: Bridge) -> QWidget:
-    bridge.operator.tell("It was not left out", "trial 1 is left out already.")
+    bridge.operator.tell("It was not excluded", "trial 1 is already excluded.")
     return next(one for one in bridge.operator.findChildren(QDialog) if one.isVisible())
 
 
@@ -117,7 +117,8 @@ def test_held_escape_stops_the_force(
 def test_tapped_escape_leaves_the_force(
     bridge: Bridge, world: World, qtbot: Any, open_: Callable[[Bridge], QWidget]
 ) -> None:
-    timers = bridge.operator.escape._timer, bridge.participant._escape._timer
+    holds = bridge.operator.escape, bridge.participant.findChild(escape_key.EscapeHold)
+    timers = [hold.findChild(QTimer) for hold in holds]
     for timer in timers:
         timer.setInterval(LONG_MS)  # the release comes before, however slow the machine is
     begin_trial(bridge, world)
@@ -204,15 +205,13 @@ def real() -> Iterator[Real]:
 def test_the_servo_sends_no_force_from_the_next_tick_on(
     make: Any, real: Real, qtbot: Any, open_: Callable[[Bridge], QWidget]
 ) -> None:
-    protocol = load("demo")
-    schedule = build_schedule(protocol, "P001", 1)
-    journal = WatchedJournal(real, SessionProgress(protocol, schedule), real.seconds)
+    journal = WatchedJournal(real, Progress(), real.seconds)
     bridge = make(servo=real.servo, journal=journal, clock=real.seconds)
     bridge.participant.event.emit(Continue(real.seconds()))
     assert isinstance(bridge.participant.page, TaskPage)
     with qtbot.waitExposed(bridge.participant):
         pass
-    bridge._frame()  # the first one of the tank, with which the force begins
+    bridge.draw_frame()  # the first one of the tank, with which the force begins
     assert real.forces_n(800).max() > 0.1
     handle = in_focus(open_(bridge), qtbot)
     QTest.keyPress(handle, ESC)

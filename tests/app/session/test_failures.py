@@ -15,21 +15,24 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.errors import StoreError
 from study_app.gui.widgets.dialogs import Notice
+from study_app.gui.widgets.escape_key import EscapeHold
 from study_app.session.pages import TaskPage, TroublePage
 from study_app.session.transitions.events import Submitted
-from tests.app.session.world import begin_trial
+from tests.app.world import begin_trial
+
+pytestmark = pytest.mark.slow
 
 
 def test_an_exception_in_a_slot_ends_in_zero_force(bridge, world, caplog):
     begin_trial(bridge, world)
     world.broken_clock = True
-    bridge._frame()
+    bridge.draw_frame()
     assert "stop_force" in world.done
     assert not world.force_is_on
     assert "the clock fell off the wall" in caplog.text
     caplog.clear()
     world.broken_clock = False
-    bridge._tiles()
+    bridge.show_tiles()
     assert "the clock fell off the wall" in bridge.operator.banner.what.text()
 
 
@@ -38,7 +41,7 @@ def test_what_breaks_again_and_again_is_written_once(bridge, world, caplog):
     bridge.participant.show_view = None  # not callable: every frame fails
     for _ in range(5):
         world.now_s += 0.1
-        bridge._frame()
+        bridge.draw_frame()
     assert world.events().count("broke") == 1
     assert len(caplog.records) == 1
     caplog.clear()
@@ -70,17 +73,17 @@ def test_an_event_that_comes_too_late_changes_nothing(bridge, world):
 
 def test_a_servo_fault_calls_the_operator(bridge, world):
     begin_trial(bridge, world)
-    world.fault = "the device 'mouse' stopped answering; plug it in again and start anew"
-    bridge._frame()
+    world.fault = "the device 'mouse' stopped responding; plug it in again and start anew"
+    bridge.draw_frame()
     assert isinstance(bridge.participant.page, TroublePage)
-    assert "stopped answering" in bridge.operator.banner.what.text()
-    assert "stopped answering" not in bridge.participant.page.paragraph
+    assert "stopped responding" in bridge.operator.banner.what.text()
+    assert "stopped responding" not in bridge.participant.page.paragraph
     assert bridge.operator.device.chip.word == "Fault"
-    bridge._frame()
+    bridge.draw_frame()
     assert dict(bridge.view().device.rows)["Safety faults"] == "1"
     world.fault = None
-    bridge._frame()
-    world.fault = "the device 'mouse' stopped answering again"
+    bridge.draw_frame()
+    world.fault = "the device 'mouse' stopped responding again"
     assert dict(bridge.view().device.rows)["Safety faults"] == "2"
 
 
@@ -108,7 +111,7 @@ def scribble(bridge):
 
 
 def show_position(bridge):
-    bridge._traces()
+    bridge.show_traces()
 
 
 def choose_theme(bridge):
@@ -138,7 +141,7 @@ def show_notes(bridge):
 
 
 def hold(bridge):
-    bridge.participant._escape.tapped.emit()
+    bridge.participant.findChild(EscapeHold).tapped.emit()
 
 
 @pytest.mark.parametrize(
@@ -216,11 +219,11 @@ def test_a_panel_that_fails_is_replaced_by_a_line_and_the_session_goes_on(
     qtbot.waitUntil(lambda: None not in panels.covers.values() and bool(panels.covers))
     for _ in range(3):
         do(bridge)
-        bridge._tiles()
+        bridge.show_tiles()
         QApplication.processEvents()
-    cover = next(cover for panel, cover in panels.covers.items() if panels._names[panel] == name)
+    cover = next(cover for panel, cover in panels.covers.items() if panels.names[panel] == name)
     assert cover.isVisible()
-    assert cover.line.text() == f"{name}: this panel failed. The session goes on."
+    assert cover.line.text() == f"{name}: this panel failed. The session continues."
     assert world.force_is_on
     assert not bridge.trouble
     assert isinstance(bridge.participant.page, TaskPage)
@@ -237,7 +240,7 @@ def test_a_painter_that_a_failure_leaves_at_work_is_ended(make, world, qtbot, mo
     """Else Qt paints no window any more: what failed could not even be read."""
     left = []
 
-    def broken(_tank, painter, _region):
+    def broken(painter, _place, **_named):
         left.append(weakref.ref(painter))
         raise ValueError(BROKEN)
 
@@ -246,7 +249,7 @@ def test_a_painter_that_a_failure_leaves_at_work_is_ended(make, world, qtbot, mo
     begin_trial(bridge, world)
     QApplication.processEvents()
     with monkeypatch.context() as patched:
-        patched.setattr("study_app.gui.participant.tank_widget.TankWidget._paint", broken)
+        patched.setattr("study_app.gui.participant.tank_widget.paint_patch", broken)
         QTimer.singleShot(0, lambda: paint_tank(bridge))
         qtbot.waitUntil(lambda: not world.force_is_on)
     assert [painter() for painter in left] == [None] * len(left)
@@ -286,5 +289,5 @@ def test_the_recorders_losses_reach_the_cockpit_without_an_event(make, world, qt
 
     bridge = make(recorder=Losing())
     begin_trial(bridge, world)
-    bridge._tiles()
+    bridge.show_tiles()
     assert bridge.operator.rail.tally.beyond.text().endswith("lost: No space left on device.")

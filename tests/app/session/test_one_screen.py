@@ -8,7 +8,9 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.gui.operator.strip import Strip
 from study_app.session.transitions.events import Continue
-from tests.app.session.world import begin_trial
+from tests.app.world import begin_trial
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
@@ -31,7 +33,7 @@ def test_strip_stands_above_every_page_and_covers_none(one_screen, world):
         assert strip.width() == participant.width()
         assert participant.widget.geometry().top() == strip.height()
         assert participant.widget.geometry().bottom() == participant.rect().bottom()
-        one_screen._event(Continue(world.seconds()))
+        one_screen.participant.event.emit(Continue(world.seconds()))
 
 
 def test_strip_tells_the_state_and_stops_the_force_at_the_first_touch(one_screen, world, qtbot):
@@ -65,7 +67,7 @@ def test_trouble_brings_the_operators_window_to_the_front_once(one_screen, world
     qtbot.waitUntil(lambda: in_front(one_screen) is one_screen.operator)
     one_screen.participant.come_forward()
     qtbot.waitUntil(lambda: in_front(one_screen) is one_screen.participant)
-    one_screen._tiles()
+    one_screen.show_tiles()
     assert in_front(one_screen) is one_screen.participant
     caplog.clear()
 

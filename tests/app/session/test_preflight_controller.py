@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent
+from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
@@ -16,11 +16,14 @@ from study_app.app.session import preflight_controller
 from study_app.app.session.preflight_controller import Appraisal, Preflight
 from study_app.errors import DeviceLost
 from study_app.evaluation.appraisal import Costs, Errors
+from study_app.evaluation.appraisal_worker import Question
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
-from study_app.protocol.trials.task import Stroke
+from study_app.protocol.trials.tasks.explore import Explore
+from study_app.protocol.trials.tasks.reach import Reach
+from study_app.protocol.trials.tasks.stroke import Stroke
 from study_app.session.preflight import Facts, Screen
 from study_app.session.request import NewSession
 from study_app.session.start import Ready
@@ -51,9 +54,10 @@ class Answering:
         self.works = True
         self.devices: list[Dynamics] = []
 
-    def ask(self, _scene: Any, stroke: Any, dynamics: Dynamics) -> int:
-        assert stroke.speed_mps > 0
-        self.devices.append(dynamics)
+    def order(self, question: Question) -> int:
+        assert question.stroke is not None
+        assert question.stroke.speed_mps > 0
+        self.devices.append(question.dynamics)
         self.asked += 1
         return self.asked
 
@@ -83,7 +87,7 @@ class Machine:
 
 @pytest.fixture
 def machine(monkeypatch: Any) -> Machine:
-    monkeypatch.setattr(preflight_controller, "Appraiser", Answering)
+    monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
     return Machine()
 
 
@@ -103,7 +107,7 @@ def test_a_device_that_is_lost_meanwhile_is_told_once(asked: Preflight, machine:
     machine.servo.lost = True
     with qtbot.waitSignal(asked.failed, timeout=3000):
         pass
-    assert not asked._timer.isActive()
+    assert not asked.findChild(QTimer).isActive()
     assert [str(error) for error in told] == ["the device 'falcon' does not answer any more; the force is zero"]
 
 
@@ -116,8 +120,8 @@ def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, m
         return FACTS
 
     monkeypatch.setattr(preflight_controller, "measured", slow)
-    asked._again()
-    measuring = asked._measuring
+    asked.window.again_asked.emit()
+    measuring = asked.measuring
     assert measuring is not None
     assert begun.wait(5)
     asked.close()
@@ -131,13 +135,13 @@ def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_c
     found = replace(FACTS, dynamics=Dynamics(0.0004, 20e-6, 0.3), delay_ticks=1)
     screen = QGuiApplication.primaryScreen()
     made = Preflight(CHOSEN, load("demo"), Ready(machine, found), screen, "Participant P001", LIGHT)
-    first: Any = made._appraisal._appraiser
+    first: Any = made.appraisal.appraiser
     assert first.devices == [Dynamics(0.001, 20e-6, 0.3)]
     slower = replace(found, delay_ticks=3)
     monkeypatch.setattr(preflight_controller, "measured", lambda *_words, **_named: slower)
-    with qtbot.waitSignal(made._measured):
-        made._again()
-    again: Any = made._appraisal._appraiser
+    made.window.again_asked.emit()
+    qtbot.waitUntil(lambda: made.measuring is None)
+    again: Any = made.appraisal.appraiser
     assert again.devices == [Dynamics(0.003, 20e-6, 0.3)]
     assert not first.works
     made.close()
@@ -152,9 +156,9 @@ def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
 
     monkeypatch.setattr(preflight_controller, "measured", broken)
     with qtbot.waitSignal(asked.failed) as failed:
-        asked._again()
+        asked.window.again_asked.emit()
     assert isinstance(failed.args[0], ValueError)
-    assert asked._measuring is None
+    assert asked.measuring is None
 
 
 @pytest.mark.parametrize(
@@ -166,10 +170,10 @@ def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
     ],
 )
 def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: Any, largest: float | None) -> None:
-    monkeypatch.setattr(preflight_controller, "Appraiser", Answering)
+    monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
     monkeypatch.setattr(Answering, "given", told)
     protocol = load("demo")
-    asked = preflight_controller._scenes(protocol)[0]
+    asked = preflight_controller.study_scenes(protocol)[0]
     appraisal = Appraisal([asked, asked], UNKNOWN)
     while not appraisal.over:
         appraisal.look()
@@ -178,9 +182,9 @@ def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: A
 
 
 def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its_tasks(monkeypatch: Any) -> None:
-    monkeypatch.setattr(preflight_controller, "Appraiser", Answering)
+    monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
     protocol = load("rek2024")
-    asked = preflight_controller._scenes(protocol)
+    asked = preflight_controller.study_scenes(protocol)
     assert {one.liquid for one in asked} == set(protocol.liquids)
     assert {one.stroke for one in asked if one.liquid == "honey"} == {Stroke(5.0, 0.03)}  # it is explored
     monkeypatch.setattr(Answering, "given", tuple(Errors(0.0, 0.0, 0.0, (), 0.01 * (n + 1)) for n in range(len(asked))))
@@ -195,9 +199,9 @@ def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its
 
 
 def test_of_several_shares_of_a_liquid_the_largest_counts(monkeypatch: Any) -> None:
-    monkeypatch.setattr(preflight_controller, "Appraiser", Answering)
+    monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
     monkeypatch.setattr(Answering, "given", (Errors(0.0, 0.0, 0.0, (), 0.04), Errors(0.0, 0.0, 0.0, (), 0.02)))
-    asked = preflight_controller._scenes(load("demo"))[0]
+    asked = preflight_controller.study_scenes(load("demo"))[0]
     appraisal = Appraisal([asked, asked], UNKNOWN)
     while not appraisal.over:
         appraisal.look()
@@ -210,12 +214,13 @@ def test_of_the_strokes_of_several_tasks_the_fastest_counts(monkeypatch: Any, or
     blocks = list(protocol.blocks.values())
     strokes = [Stroke(float(hz), 0.03) for hz in range(1, 1 + len(blocks))][::order]
     given = iter(strokes)
-    monkeypatch.setattr(preflight_controller, "fastest_stroke", lambda *_words: next(given))
+    for kind in (Explore, Reach):
+        monkeypatch.setattr(kind, "fastest_stroke", lambda *_words: next(given))
     thin = [
         stroke
         for stroke, block in zip(strokes, blocks, strict=True)
         if any(protocol.scene_for(it).liquids[0].id == "thin" for it in block.conditions)
     ]
     assert len(thin) > 1
-    found = {one.stroke for one in preflight_controller._scenes(protocol) if one.liquid == "thin"}
+    found = {one.stroke for one in preflight_controller.study_scenes(protocol) if one.liquid == "thin"}
     assert found == {max(thin, key=lambda stroke: stroke.speed_mps)}

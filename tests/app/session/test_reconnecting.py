@@ -10,9 +10,11 @@ from PySide6.QtCore import Qt
 from study_app.errors import DeviceNotFound
 from study_app.session.pages import PausePage, TaskPage
 from study_app.session.transitions.events import EndAsked
-from tests.app.session.world import begin_trial
+from tests.app.world import begin_trial
 
-FAULT = "the device 'memory' stopped answering"
+pytestmark = pytest.mark.slow
+
+FAULT = "the device 'memory' stopped responding"
 
 
 class Device:
@@ -42,7 +44,7 @@ def lost(make, world, device):
     bridge = make(reconnect=device)
     begin_trial(bridge, world)
     world.fault = FAULT
-    bridge._frame()
+    bridge.draw_frame()
     assert bridge.operator.banner.reconnect.isVisible()
     return bridge
 
@@ -78,7 +80,7 @@ def test_why_it_failed_is_told_and_it_can_be_tried_again(lost, device, qtbot, ca
     lost.operator.reconnect_asked.emit()
     settled(lost, qtbot)
     assert str(error) in lost.operator.banner.then.text()
-    assert "was not connected again" in caplog.text
+    assert "was not reconnected" in caplog.text
     caplog.clear()
     device.error = None
     lost.operator.reconnect_asked.emit()
@@ -88,7 +90,7 @@ def test_why_it_failed_is_told_and_it_can_be_tried_again(lost, device, qtbot, ca
 
 def test_a_session_that_ends_meanwhile_stays_ended(lost, device, world, qtbot):
     lost.operator.reconnect_asked.emit()
-    lost._event(EndAsked(world.now_s, "aborted", "cable"))
+    lost.participant.event.emit(EndAsked(world.now_s, "aborted", "cable"))
     device.go_on.set()
     settled(lost, qtbot)
     assert lost.view().over

@@ -11,7 +11,9 @@ from study_app.app.session.bridge import SessionBridge
 from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.operator.plot_cards import HiddenForceCard
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
-from tests.app.session.world import World, begin_trial
+from tests.app.world import World, begin_trial
+
+pytestmark = pytest.mark.slow
 
 
 def pushes(world: World, count: int = 400) -> Any:
@@ -20,7 +22,7 @@ def pushes(world: World, count: int = 400) -> Any:
     world.now_s += count / 1000
     samples.tick = np.arange(count)
     samples.time_ns = round(world.now_s * 1e9) - np.arange(count)[::-1] * 1_000_000
-    samples.scene = world._serial
+    samples.scene = world.serial
     samples.fresh = 1
     samples.device_force_n = (1.5, 0.0, np.sqrt(9 - 1.5**2))
     samples.wake_mps = (0.3, 0.0, 0.4)
@@ -40,9 +42,9 @@ def rows(bridge: SessionBridge) -> dict[str, str]:
 def looked(bridge: SessionBridge, world: World) -> None:
     begin_trial(bridge, world)
     world.samples = pushes(world)
-    bridge._frame()
-    bridge._traces()
-    bridge._tiles()
+    bridge.draw_frame()
+    bridge.show_traces()
+    bridge.show_tiles()
 
 
 def test_force_wake_share_and_limiters_are_seen(make: Any, world: World) -> None:
@@ -74,7 +76,7 @@ def test_the_participant_sees_the_same_in_both(make: Any, world: World) -> None:
         bridge = make(blinding=blinding, force_limit_n=limit_n)
         looked(bridge, world)
         seen.append((repr(bridge.participant.page), bridge.participant.grab().toImage()))
-        bridge._leave()
+        bridge.leave_now()
         world.samples = records(SAMPLE, 0)
     assert seen[0][0] == seen[1][0]
     assert seen[0][1] == seen[1][1]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.session.transitions.events import ForceStopped, ResumeAsked
-from tests.app.session.world import begin_trial
+from tests.app.world import begin_trial
+
+pytestmark = pytest.mark.slow
 
 
 def test_stop_force_reaches_the_servo_before_the_disk(bridge, world):
@@ -38,18 +41,18 @@ def test_when_there_is_space_again_the_session_goes_on_paused_with_nothing_lost(
     world.full = True
     bridge.operator.mark_set.emit()
     bridge.operator.note_written.emit("dropped while the disk is full")
-    assert "Make room" in bridge.operator.banner.then.text()
+    assert "Free disk space" in bridge.operator.banner.then.text()
     assert bridge.operator.device.chip.word == "Ready"
     world.full = False
     world.now_s += 2.0
-    bridge._frame()
+    bridge.draw_frame()
     assert isinstance(bridge.participant.page, PausePage)
     assert not bridge.operator.banner.isVisible()
     assert ("note", {"kind": "mark", "text": ""}) in world.done
     bridge.operator.fade_in_asked.emit()
     assert isinstance(bridge.participant.page, TaskPage)
     assert world.force_is_on
-    assert "takes data again" in caplog.text
+    assert "accepts data again" in caplog.text
     caplog.clear()
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
 from PySide6.QtCore import Qt
 from shiboken6 import isValid
 
 from study_app.session.pages import EndPage
-from tests.app.session.world import begin_trial
+from tests.app.world import begin_trial
+
+pytestmark = pytest.mark.slow
 
 
 def test_ending_closes_the_journal_with_status_and_reason_and_waits_to_be_closed(bridge, world, qtbot):
@@ -85,8 +88,8 @@ def test_windows_answer_while_recordings_are_written_and_close_after_it(make, wo
     bridge.runner.poll()
     assert isinstance(bridge.participant.page, EndPage)
     assert bridge.runner.ending
-    bridge._close()
-    assert not bridge._gone, "the end is still to be written"
+    bridge.operator.close_asked.emit()
+    assert not bridge.participant.may_close, "the end is still to be written"
     recorder.on_disk = True
     with qtbot.waitSignal(bridge.done):
         bridge.runner.poll()

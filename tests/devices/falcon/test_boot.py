@@ -375,4 +375,4 @@ def test_without_any_reply_the_round_trip_is_all_the_time_there_was():
     emulator, transport = falcon(running=True)
     configure(transport)
     emulator.power(False)
-    assert measure_round_trip(transport) == booting._PROBE_S
+    assert measure_round_trip(transport) == booting.PROBE_S

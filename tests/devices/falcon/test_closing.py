@@ -19,6 +19,8 @@ from study_app.haptics.runtime import thread
 from study_app.haptics.runtime.servo import Servo
 from tests.devices.falcon.support.scripted_bridge import BULK_CALL, torques_in
 
+pytestmark = pytest.mark.slow
+
 
 class HangingBridge:
     """Takes packets; a read from it does not end before ``release`` is set."""
@@ -48,16 +50,16 @@ def test_a_loop_that_hangs_finds_its_bridge_as_it_was_and_ends_the_force(monkeyp
     device.open()
     servo = Servo(device)
     servo.prepare()
-    device._falcon.transfer = bridge.address
+    device.falcon.transfer = bridge.address
     servo.start()
     assert bridge.entered.wait(30)
     bridge.sent.clear()
-    turning = servo._loop.thread
-    with pytest.raises(ServoFault, match="switch it off"):
+    turning = servo.loop.thread
+    with pytest.raises(ServoFault, match="turn it off"):
         servo.stop()
     device.close()
-    assert device._falcon.transfer == bridge.address, "what the loop calls next"
-    device._transport.write(b"", 0.1)  # and its transport is open
+    assert device.falcon.transfer == bridge.address, "what the loop calls next"
+    device.transport.write(b"", 0.1)  # and its transport is open
     assert bridge.sent == []
     bridge.release.set()
     turning.join(30)
@@ -65,5 +67,5 @@ def test_a_loop_that_hangs_finds_its_bridge_as_it_was_and_ends_the_force(monkeyp
     assert torques_in(bridge.sent[-1]) == [0, 0, 0]
     servo.stop()
     device.close()
-    assert device._transport is None
-    assert device.read.ctypes(device.context, 0, device._reading.ctypes.data) == READ_LOST
+    assert device.transport is None
+    assert device.read.ctypes(device.context, 0, device.reading.ctypes.data) == READ_LOST

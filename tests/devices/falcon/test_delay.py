@@ -11,15 +11,15 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.emulator import Emulator
-from study_app.devices.falcon.wire.replies import FASTER_READS, GIVEN_UP_READS, RETEST_TURNS, SLOWER_READS
+from study_app.devices.falcon.wire.replies import FASTER_READS, GIVEN_UP_READS, RETEST_TICKS, SLOWER_READS
 from study_app.haptics.kernels.c_functions import READ_NEW
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
-from tests.devices.falcon.support.scripted_bridge import Turns, reply
+from tests.devices.falcon.support.scripted_bridge import Ticks, reply
 
 
-class Link(Turns):
-    """Turns whose packets are answered ``delay`` reads later, each reply lost or sent twice by chance."""
+class Link(Ticks):
+    """Ticks whose packets are answered ``delay`` reads later, each reply lost or sent twice by chance."""
 
     def __init__(self, lost=0.0, twice=0.0):
         super().__init__()
@@ -27,17 +27,17 @@ class Link(Turns):
         self._due: list[int] = []
         self.open_gate()
 
-    def run(self, turns, delay, swinging_n=0.0):
+    def run(self, ticks, delay, swinging_n=0.0):
         """Return the delay reported at each of so many reads, -1 where there was nothing new."""
         told = []
-        for _ in range(turns):
+        for _ in range(ticks):
             now = self.now_ns // 10**6
             before = len(self.bridge.sent)
             came = [reply()] * sum(due <= now for due in self._due)
             self._due = [due for due in self._due if due > now]
             self.reading[0].delay_ticks = -1
             force_n = swinging_n * np.array([1.0, 0.0, 0.0]) * (1 + now % 2)
-            answer, _ = self.turn(*came[:3], force_n=tuple(force_n))
+            answer, _ = self.tick(*came[:3], force_n=tuple(force_n))
             told.append(int(self.reading[0].delay_ticks) if answer == READ_NEW else -1)
             if len(self.bridge.sent) > before and self._random.random() >= self._lost:
                 self._due += [now + delay] * (1 + (self._random.random() < self._twice))
@@ -66,7 +66,7 @@ def test_a_link_that_becomes_quicker_again_is_seen():
     link = Link()
     link.run(200, 3)
     told = link.run(2 * FASTER_READS, 1)
-    assert told.index(1) <= FASTER_READS + RETEST_TURNS
+    assert told.index(1) <= FASTER_READS + RETEST_TICKS
     assert set(told[told.index(1) :]) <= {1, -1}
 
 
@@ -78,17 +78,19 @@ def test_a_link_slower_than_any_stable_loop_gives_no_positions_until_it_recovers
     assert set(link.run(200, 2)[-20:]) == {2}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [1, 2, 3])
 @pytest.mark.parametrize(("lost", "twice"), [(0.02, 0.0), (0.1, 0.0), (0.0, 0.05), (0.03, 0.03)])
 def test_lost_and_doubled_replies_are_told_from_late_ones(delay, lost, twice):
     link = Link(lost, twice)
     told = np.array(link.run(4000, delay)[100:])
     fresh = told[told > 0]
-    assert len(fresh) > 3900 * (1.0 - 1.2 * lost - 1.2 * delay / RETEST_TURNS)
+    assert len(fresh) > 3900 * (1.0 - 1.2 * lost - 1.2 * delay / RETEST_TICKS)
     assert (fresh == delay).mean() > 0.9
     assert (fresh >= delay).mean() > 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("delay_s", "ticks"), [(0.0, 1), (1e-3, 2), (2e-3, 3), (3e-3, 4)])
 def test_a_falcon_whose_replies_come_late_is_believed_to_be_late(delay_s, ticks):
     with EmulatedFalcon(emulator=Emulator(running=True, tremor_m=0.0)) as device:

@@ -29,19 +29,21 @@ from study_app.haptics.model.layout import BUTTON_STOP, new_reading
 from tests.devices.contract import write
 from tests.devices.falcon.test_firmware import stream
 
+pytestmark = pytest.mark.slow
+
 MS = 1_000_000
 
 
-class Turns:
-    """Turns an open device as the servo would."""
+class Ticks:
+    """Ticks an open device as the servo would."""
 
     def __init__(self, device, start_ns=5_000 * MS):
         self.device, self.now_ns = device, start_ns
         self.reading = new_reading()
 
-    def after(self, turns, force_n=(0.0, 0.0, 0.0)):
+    def after(self, ticks, force_n=(0.0, 0.0, 0.0)):
         """Return what the last of so many reads answered."""
-        for _ in range(turns):
+        for _ in range(ticks):
             self.now_ns += MS
             answer = self.device.read.ctypes(self.device.context, self.now_ns, self.reading.ctypes.data)
             write(self.device, force_n)
@@ -100,9 +102,9 @@ class TestOpening:
         assert opened.hand.highest_torque == 0
 
     def test_the_grip_is_back_in_the_middle(self, opened):
-        turns = Turns(opened)
-        assert turns.after(2) == READ_NEW
-        assert np.abs(turns.position_m).max() < 1e-3
+        ticks = Ticks(opened)
+        assert ticks.after(2) == READ_NEW
+        assert np.abs(ticks.position_m).max() < 1e-3
 
     def test_the_quicker_way_of_the_bridge_is_kept_and_both_are_told(self, opened):
         described = opened.describe()
@@ -112,7 +114,7 @@ class TestOpening:
     def test_a_falcon_that_was_switched_on_is_given_its_program(self, tmp_path, told):
         file = tmp_path / "secret-folder-firmware.bin"
         file.write_bytes(stream())
-        with open_device("falcon-emulated", firmware=file, tell=told.append) as device:
+        with open_device("falcon-emulated", options={"firmware": file}, progress=told.append) as device:
             assert device.hand.running
             assert device.hand.homed == 0b111
             described = json.dumps(device.describe())
@@ -125,8 +127,8 @@ class TestOpening:
         digest = hashlib.sha256(stream()).hexdigest()
         for name in (None, "nvent_firmware.bin"):
             if name is not None:
-                monkeypatch.setitem(firmware._KNOWN, (digest[:16], digest[-8:]), name)
-            with open_device("falcon-emulated", firmware=file, tell=told.append):
+                monkeypatch.setitem(firmware.KNOWN, (digest[:16], digest[-8:]), name)
+            with open_device("falcon-emulated", options={"firmware": file}, progress=told.append):
                 loading = [line for line in told if line.startswith("Loading")]
         assert len(loading) == 2
         assert f"SHA-256 {digest[:16]}…, which is none of those that are known to work" in loading[0]
@@ -143,10 +145,10 @@ class TestOpening:
 
     def test_a_firmware_that_is_not_there_or_is_none_is_told(self, tmp_path, told):
         with pytest.raises(DeviceError, match=r"nowhere\.bin cannot be read"):
-            open_device("falcon-emulated", firmware=tmp_path / "nowhere.bin")
+            open_device("falcon-emulated", options={"firmware": tmp_path / "nowhere.bin"})
         (tmp_path / "page.bin").write_text("<!DOCTYPE html><html>")
         with pytest.raises(DeviceError, match="web page"):
-            open_device("falcon-emulated", firmware=tmp_path / "page.bin", tell=told.append)
+            open_device("falcon-emulated", options={"firmware": tmp_path / "page.bin"}, progress=told.append)
         assert told == []
 
     @pytest.mark.parametrize("fault", ["access_denied", "not_supported", "busy", "unplugged"])
@@ -231,10 +233,10 @@ class TestHoming:
 
 class TestForce:
     def test_it_comes_in_over_half_a_second_and_is_never_there_before_homing(self, opened):
-        turns = Turns(opened)
+        ticks = Ticks(opened)
         pushes = []
         for _ in range(700):
-            turns.after(1, (0.0, 0.0, 2.0))
+            ticks.after(1, (0.0, 0.0, 2.0))
             pushes.append(opened.hand.force_n[2])
         assert np.diff(pushes).max() < 0.02
         assert pushes[249] == pytest.approx(1.0, abs=0.05)
@@ -248,38 +250,38 @@ class TestForce:
         random = Random(5)  # noqa: S311
         errors = []
         with EmulatedFalcon(emulator=still(geometry=name), geometry=name) as device:
-            turns = Turns(device)
-            turns.after(600, (0.0, 0.0, 0.01))
+            ticks = Ticks(device)
+            ticks.after(600, (0.0, 0.0, 0.01))
             for x, y, z in places_in_the_box(GEOMETRIES[name]):
                 push_n = np.array([random.uniform(-1, 1) for _ in range(3)])
                 push_n *= random.uniform(1.0, 2.5) / np.linalg.norm(push_n)
                 device.hand.reach_to(*(np.array([x, y, z - centre]) - push_n / STIFFNESS_NPM))
-                turns.after(1000, tuple(push_n))
-                assert turns.position_m == pytest.approx((x, y, z - centre), abs=5e-4)
+                ticks.after(1000, tuple(push_n))
+                assert ticks.position_m == pytest.approx((x, y, z - centre), abs=5e-4)
                 errors.append(np.linalg.norm(device.hand.force_n - push_n) / np.linalg.norm(push_n))
             assert device.counters["shortened"] == 0
         assert len(errors) > 40
         assert max(errors) < 0.005
 
     def test_closing_takes_it_away_for_good(self, opened):
-        turns = Turns(opened)
-        turns.after(600, (1.0, 1.0, 1.0))
+        ticks = Ticks(opened)
+        ticks.after(600, (1.0, 1.0, 1.0))
         assert opened.hand.torques != (0, 0, 0)
         opened.close()
         assert opened.hand.torques == (0, 0, 0)
         assert opened.hand.lights == 0
         assert opened.hand.homed == 0b111  # and stays so, for whoever opens it next
-        assert turns.after(1, (1.0, 1.0, 1.0)) == READ_LOST
+        assert ticks.after(1, (1.0, 1.0, 1.0)) == READ_LOST
         assert opened.hand.torques == (0, 0, 0)
         opened.close()
 
     @pytest.mark.parametrize("interrupted", ["quiet", "close"])
     def test_an_end_that_is_interrupted_leaves_the_rest_to_the_guard(self, opened, monkeypatch, interrupted):
         guard = Guard()
-        opened._guard = guard
-        transport = opened._transport
-        turns = Turns(opened)
-        turns.after(600, (1.0, 1.0, 1.0))
+        opened.guard = guard
+        transport = opened.transport
+        ticks = Ticks(opened)
+        ticks.after(600, (1.0, 1.0, 1.0))
         close = transport.close
 
         def interrupt(*_):
@@ -295,16 +297,16 @@ class TestForce:
         assert guard.orders == (["release"] if interrupted == "quiet" else ["stand_down"])
         with pytest.raises(FalconLost):
             transport.write(b"", 1.0)
-        assert turns.after(1) == READ_LOST
+        assert ticks.after(1) == READ_LOST
 
     def test_a_calibration_of_this_one_is_used_and_told(self):
         calibration.save("OWN", Calibration("zm-redux", 9000.0, 0.05, measured="2026-11-20"))
         emulator = still(geometry="zm-redux", serial="OWN", units_per_nm=9000.0, arm_offset_rad=(0.05, 0.05, 0.05))
         with EmulatedFalcon(emulator=emulator) as device:
-            turns = Turns(device)
-            turns.after(700, (0.5, -1.0, 1.5))
+            ticks = Ticks(device)
+            ticks.after(700, (0.5, -1.0, 1.5))
             assert emulator.force_n == pytest.approx((0.5, -1.0, 1.5), abs=0.01)
-            assert turns.position_m == pytest.approx(emulator.position_m, abs=1e-4)
+            assert ticks.position_m == pytest.approx(emulator.position_m, abs=1e-4)
             described = device.describe()
         assert described["geometry"] == "zm-redux"
         assert described["calibration"]["measured"] == "2026-11-20"
@@ -325,50 +327,50 @@ class TestForce:
 
 class TestInUse:
     def test_buttons_are_those_of_the_grip_and_the_last_one_stops(self, opened):
-        turns = Turns(opened)
-        turns.after(3)
+        ticks = Ticks(opened)
+        ticks.after(3)
         opened.hand.press(0b1000)
-        turns.after(3)
-        assert turns.reading[0].buttons == BUTTON_STOP
+        ticks.after(3)
+        assert ticks.reading[0].buttons == BUTTON_STOP
         opened.hand.release()
-        turns.after(3)
-        assert turns.reading[0].buttons == 0
+        ticks.after(3)
+        assert ticks.reading[0].buttons == 0
 
     def test_a_cable_that_is_pulled_is_lost_until_it_is_opened_again(self, opened):
-        turns = Turns(opened)
-        turns.after(600, (0.0, 1.0, 0.0))
+        ticks = Ticks(opened)
+        ticks.after(600, (0.0, 1.0, 0.0))
         opened.hand.faults.on("unplugged")
-        assert turns.after(1) == READ_LOST
+        assert ticks.after(1) == READ_LOST
         assert write(opened)[0] == READ_LOST
         opened.close()
         opened.hand.faults.off("unplugged")
         opened.open()
         assert opened.hand.torques == (0, 0, 0)
-        again = Turns(opened, turns.now_ns)
+        again = Ticks(opened, ticks.now_ns)
         assert again.after(3) == READ_NEW
 
     @pytest.mark.parametrize(("push_n", "order"), [(1.0, "leave"), (0.0, "stand_down")])
     def test_a_cable_pulled_while_it_pushes_leaves_the_guard_waiting_for_it(self, opened, push_n, order):
-        guard = opened._guard = Guard()
-        turns = Turns(opened)
-        turns.after(600, (0.0, push_n, 0.0))
+        guard = opened.guard = Guard()
+        ticks = Ticks(opened)
+        ticks.after(600, (0.0, push_n, 0.0))
         opened.hand.faults.on("unplugged")
-        turns.after(1)
+        ticks.after(1)
         opened.close()
         assert guard.orders == [order]
 
     def test_a_mains_adapter_that_fails_gives_no_more_positions(self, opened):
-        turns = Turns(opened)
-        assert turns.after(3) == READ_NEW
+        ticks = Ticks(opened)
+        assert ticks.after(3) == READ_NEW
         opened.hand.power(False)
-        assert turns.after(60, (1.0, 0.0, 0.0)) == READ_NOTHING_NEW
+        assert ticks.after(60, (1.0, 0.0, 0.0)) == READ_NOTHING_NEW
         opened.hand.power(True)
-        assert turns.after(60, (1.0, 0.0, 0.0)) == READ_NOTHING_NEW
+        assert ticks.after(60, (1.0, 0.0, 0.0)) == READ_NOTHING_NEW
 
-    def test_turns_without_faults_are_all_fresh(self, opened):
-        turns = Turns(opened)
-        turns.after(1000)
+    def test_ticks_without_faults_are_all_fresh(self, opened):
+        ticks = Ticks(opened)
+        ticks.after(1000)
         counters = opened.counters
-        assert counters["turns"] == 1000
+        assert counters["ticks"] == 1000
         assert counters["fresh"] == 999
         assert counters["cut_short"] == counters["read_errors"] == counters["write_errors"] == 0

@@ -11,21 +11,23 @@ from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.homing import PULL_OUT
 from study_app.errors import DeviceLost
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
-from tests.devices.falcon.test_device import Turns, still
+from tests.devices.falcon.test_device import Ticks, still
+
+pytestmark = pytest.mark.slow
 
 
 def test_without_its_guard_it_does_not_push():
     device = EmulatedFalcon(emulator=still())
     device.guarded = True
     with device:
-        turns = Turns(device)
-        assert turns.after(600, (1.0, 1.0, 1.0)) == READ_NEW
+        ticks = Ticks(device)
+        assert ticks.after(600, (1.0, 1.0, 1.0)) == READ_NEW
         assert device.hand.torques != (0, 0, 0)
         device.check()
-        guard = device._guard
-        guard._child.kill()
-        guard._listener.join()
-        assert turns.after(2, (1.0, 1.0, 1.0)) == READ_LOST  # a packet takes its time
+        guard = device.guard
+        guard.child.kill()
+        guard.listener.join()
+        assert ticks.after(2, (1.0, 1.0, 1.0)) == READ_LOST  # a packet takes its time
         assert device.hand.torques == (0, 0, 0)
         with pytest.raises(DeviceLost, match="guard process has died"):
             device.check()
@@ -33,7 +35,7 @@ def test_without_its_guard_it_does_not_push():
             Grip(device, virtual=True)
     with device:  # opened anew it has a guard again
         device.check()
-        assert Turns(device, turns.now_ns).after(600, (1.0, 1.0, 1.0)) == READ_NEW
+        assert Ticks(device, ticks.now_ns).after(600, (1.0, 1.0, 1.0)) == READ_NEW
         assert device.hand.torques != (0, 0, 0)
     device.check()  # which was dismissed, and did not die
 
@@ -43,8 +45,8 @@ def test_a_guard_that_dies_while_it_is_homed_ends_that():
     device.guarded = True
 
     def kill():
-        device._guard._child.kill()
-        device._guard._listener.join()
+        device.guard.child.kill()
+        device.guard.listener.join()
 
     with pytest.raises(DeviceLost, match="guard process has died"):
         device.open()

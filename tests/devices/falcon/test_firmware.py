@@ -47,14 +47,14 @@ def test_a_whole_stream_is_told():
 
 def test_a_known_one_is_named(monkeypatch):
     digest = hashlib.sha256(stream()).hexdigest()
-    monkeypatch.setattr(firmware, "_KNOWN", {(digest[:16], digest[-8:]): "novint.bin"})
+    monkeypatch.setattr(firmware, "KNOWN", {(digest[:16], digest[-8:]): "novint.bin"})
     assert check(stream()).name == "novint.bin"
     assert check(stream(entry=0x3F8004)).name is None
 
 
 def test_the_hash_of_the_usual_one_is_that_which_was_published():
     published = "1119e39c39fab1f37678ea62dfc715b23dd86ee7f13d78f88f707d9f09b896a1"
-    assert firmware._KNOWN[published[:16], published[-8:]] == "nvent_firmware.bin"
+    assert firmware.KNOWN[published[:16], published[-8:]] == "nvent_firmware.bin"
 
 
 @pytest.mark.parametrize("cut", [*range(1, 60), 300, 622, 623, 624, 625, 642])

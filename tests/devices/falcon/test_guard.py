@@ -19,6 +19,8 @@ from study_app.devices.falcon.wire.constants import FLAG_HOMING, quiet_packet
 from study_app.errors import DeviceError
 from tests.devices.falcon.support.bridges import Server, compiled, warm
 
+pytestmark = pytest.mark.slow
+
 QUIET = [quiet_packet(FLAG_HOMING)] * PACKETS
 PUSHING = b"<PPPAPPPAPPPABA>"  # 4095 on every motor, homing on
 
@@ -60,7 +62,7 @@ def ended(running):
 
 
 def guard_of(guard):
-    return guard._child
+    return guard.child
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGABRT])
@@ -106,7 +108,7 @@ def test_a_program_that_says_the_word_has_done_it_itself(server):
 
 
 def test_the_guard_waits_until_the_falcon_is_let_go(server):
-    answer, busy = server._answer, 5
+    answer, busy = server.answer, 5
 
     def answer_busy(kind):
         nonlocal busy
@@ -120,7 +122,7 @@ def test_the_guard_waits_until_the_falcon_is_let_go(server):
 
     guard = Guard(server.bridge)
     guard.start()
-    server._answer = answer_busy
+    server.answer = answer_busy
     guard.release()
     assert server.sent() == QUIET
     assert [request[0] for request in server.requests].count(DESCRIPTOR) == 6
@@ -210,7 +212,7 @@ def test_patience_ends(monkeypatch, tmp_path):
     monkeypatch.setattr(time, "monotonic", lambda: float(next(seconds)))
     monkeypatch.setattr(time, "sleep", naps.append)
     with pytest.raises(FalconNotFound):
-        guarding._open_patiently(f"falcon-socket:{tmp_path / 'none'}")
+        guarding.open_patiently(f"falcon-socket:{tmp_path / 'none'}")
     assert len(naps) == guarding.PATIENCE_S
 
 

@@ -14,6 +14,8 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 
+pytestmark = pytest.mark.slow
+
 RESTS_S = 0.6  # until the force has faded in
 PERIOD_S = 0.5
 AMPLITUDE_M = 0.03
@@ -28,12 +30,12 @@ def falcon():
     """Return an emulated Falcon, its hand, its handle, and what gives the force that acts on that [N]."""
     device = EmulatedFalcon(emulator=Emulator(running=True, tremor_m=0.0))
     device.open()
-    return device, device.hand, device.hand._state.handle, lambda: device.hand.force_n
+    return device, device.hand, device.hand.state.handle, lambda: device.hand.force_n
 
 
 def scripted(count_m):
     device = ScriptedDevice(tremor_m=0.0, quantum_m=count_m)
-    handle = device._state.handle
+    handle = device.state.handle
     handle.delay = 1  # as late as a Falcon is
     return device, device, handle, lambda: handle.force_n
 

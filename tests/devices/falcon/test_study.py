@@ -23,9 +23,12 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.exploration import exploration
+from study_app.session.simulated.rehearsed_session import RehearsedSession
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify
+
+pytestmark = pytest.mark.slow
 
 STUDY = "rek2024"
 HALF_M = (0.05, 0.03, 0.03)
@@ -118,12 +121,12 @@ class TestTheThesisStudy:
             path_m, seen_m = by_script[POSITION].to_numpy(), by_falcon[POSITION].to_numpy()
             fresh = by_falcon["fresh"].to_numpy()
             assert np.linalg.norm(seen_m - path_m, axis=1)[fresh].max() < 60e-6
-            # a path that begins elsewhere takes a tied hand there within a turn, which is not believed at first
+            # a path that begins elsewhere takes a tied hand there within a tick, which is not believed at first
             (leaps,) = np.nonzero(np.linalg.norm(np.diff(path_m, axis=0), axis=1) > 1e-3)
             assert (~fresh).sum() <= 2 * len(leaps) <= 4
 
     def test_forces_are_those_of_the_path(self, tied):
-        """Trial by trial in the mean; a single turn differs as much as encoders of a finite count make it."""
+        """Trial by trial in the mean; a single tick differs as much as encoders of a finite count make it."""
         for row, other in zip(*(table(folder.sessions()[0].table(STUDY, "trials")) for folder in tied), strict=True):
             force_n = float(row["force_mean_n"])
             assert float(other["force_mean_n"]) == pytest.approx(force_n, abs=max(0.05 * force_n, 0.05))
@@ -165,7 +168,7 @@ def test_in_a_thick_liquid_the_force_is_that_of_the_path_all_along(monkeypatch):
 
 
 @pytest.mark.parametrize("condition", ["water", "honey"])
-def test_a_minute_with_faulty_packets_has_no_jump_of_force_and_no_turn_unaccounted_for(condition):
+def test_a_minute_with_faulty_packets_has_no_jump_of_force_and_no_tick_unaccounted_for(condition):
     scene = load(STUDY).scene_for(condition)
     with EmulatedFalcon(Random(5)) as device:  # noqa: S311
         for fault in ("drop", "truncate", "corrupt", "duplicate"):
@@ -175,10 +178,10 @@ def test_a_minute_with_faulty_packets_has_no_jump_of_force_and_no_turn_unaccount
         servo.load(scene)
         device.hand.follow(*exploration(Random(9).random, HALF_M, 60.0))  # noqa: S311
         given_n, rows = np.zeros((60_000, 3)), []
-        for turn in range(60_000):
+        for tick in range(60_000):
             servo.advance(1)
-            given_n[turn] = device.hand.force_n
-            if turn % 500 == 499:
+            given_n[tick] = device.hand.force_n
+            if tick % 500 == 499:
                 rows.append(np.asarray(touch.read()).copy())
         counters = device.counters
         servo.stop()
@@ -188,28 +191,28 @@ def test_a_minute_with_faulty_packets_has_no_jump_of_force_and_no_turn_unaccount
     assert (samples["status"] == STATUS_OK).all()
     for forces_n in (samples["device_force_n"], given_n):  # asked for, and made of it by the emulator's mechanics
         assert np.linalg.norm(forces_n, axis=1).max() > 2.0
-        assert np.linalg.norm(np.diff(forces_n, axis=0), axis=1).max() <= most_n + 0.02  # the mechanism turns, too
+        assert np.linalg.norm(np.diff(forces_n, axis=0), axis=1).max() <= most_n + 0.02  # the mechanism ticks, too
     happened = {fault: device.hand.faults.happened(fault) for fault in ("drop", "truncate", "corrupt", "duplicate")}
     assert min(happened.values()) > 100
-    assert counters["turns"] == 60_000
+    assert counters["ticks"] == 60_000
     assert counters["fresh"] == samples["fresh"].sum() > 0.98 * 60_000
     assert counters["fresh"] + counters["missing"] + counters["late"] + counters["refused"] == 60_000
     assert counters["written_off"] - counters["surplus"] <= sum(happened.values())
 
 
 def test_a_cable_pulled_in_a_trial_keeps_the_data_marks_the_trial_and_lets_it_go_on(tmp_path, monkeypatch):
-    look, looks = rehearsal.Rehearsal._see, []
+    look, looks = RehearsedSession.look, []
 
     def pull_the_cable(self, senses):
-        looks.append(self._page.trial)
+        looks.append(self.page.trial)
         if looks.count(2) == 40:
-            self._machine.hand.faults.on("unplugged")
+            self.machine.device.hand.faults.on("unplugged")
         return look(self, senses)
 
     folder = StudyFolder(tmp_path / "demo")
     with monkeypatch.context() as patch:
-        patch.setattr(rehearsal.Rehearsal, "_see", pull_the_cable)
-        with pytest.raises(SessionError, match="'falcon-emulated' stopped answering"):
+        patch.setattr(RehearsedSession, "look", pull_the_cable)
+        with pytest.raises(SessionError, match="'falcon-emulated' stopped responding"):
             rehearsal.rehearse("demo", participants=1, seed=1, device="falcon-emulated", results=folder.path)
     (session,) = folder.sessions()
     rows = table(session.table("demo", "trials"))

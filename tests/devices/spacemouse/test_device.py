@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices.registry import is_simulated, list_devices, moves_by_itself
+from study_app.devices.registry import descriptor_of, list_devices
 from study_app.devices.spacemouse import hid as spacemouse_hid
 from study_app.devices.spacemouse.device import SpaceMouseDevice
 from study_app.devices.spacemouse.hid import find_space_mice
@@ -200,7 +200,7 @@ class TestComingAndGoing:
         with Servo(device, clock=VirtualClock()) as servo:
             servo.advance(10)
             hid.gone.set()
-            device._thread.join(10)
+            device.thread.join(10)
             servo.advance(10)
             with pytest.raises(DeviceLost, match="spacemouse"):
                 servo.check()
@@ -264,8 +264,8 @@ class TestComingAndGoing:
 
 def test_a_participant_holds_it():
     assert "spacemouse" in list_devices()
-    assert not is_simulated("spacemouse")
-    assert not moves_by_itself("spacemouse")
+    assert not descriptor_of("spacemouse").simulated
+    assert not descriptor_of("spacemouse").moves_by_itself
 
 
 def test_the_receipt_says_which_it_was():

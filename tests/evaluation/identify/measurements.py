@@ -6,8 +6,10 @@ import math
 import numpy as np
 
 from study_app.haptics.model import paths
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Body, Drag, Liquid, Scene, Wake
+from study_app.haptics.model.scene import Body, Liquid, Scene
 from study_app.haptics.runtime.offline import simulate
 
 TANK = Scene(

@@ -11,9 +11,10 @@ from study_app.errors import StudyError
 from study_app.evaluation.identify import measured_force, parameters, search
 from study_app.evaluation.identify.fit import fit
 from study_app.haptics.model import paths
+from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
-from study_app.haptics.model.scene import Box, Liquid, LocalWake, Scene
+from study_app.haptics.model.scene import Box, Liquid, Scene
 from tests.evaluation.identify.measurements import (
     BALL,
     OIL,
@@ -28,7 +29,7 @@ from tests.evaluation.identify.measurements import (
 )
 from tests.haptics.scenes import COMPILED
 
-pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")]
 
 
 def test_known_parameters_of_a_wake_are_found_again_in_noise():
@@ -217,7 +218,7 @@ def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
     lacking = override_all(OIL, {"effects": ("drag",)})
     found = fit(lacking, "oil", ["viscosity_pa_s"], REACH, noisy(OIL, REACH, 0.01))
     assert found.following > 0.9
-    assert any("follow one another" in warning for warning in found.warnings)
+    assert any("are autocorrelated" in warning for warning in found.warnings)
     white = fit(OIL, "oil", ["viscosity_pa_s"], REACH, noisy(OIL, REACH, 0.01))
     widths = [upper - lower for lower, upper in (found.intervals["viscosity_pa_s"], white.intervals["viscosity_pa_s"])]
     assert widths[0] > 20 * widths[1]
@@ -262,11 +263,11 @@ def test_parameters_are_set_where_simulate_would_set_them():
     [
         ([], "no parameter is named"),
         (["drag_coeficient"], "did you mean 'drag_coefficient'"),
-        (["viscosity_pa_s"], "gives no viscosity_pa_s to start from"),
+        (["viscosity_pa_s"], "has no initial value of viscosity_pa_s"),
         (["breaking_angle_deg"], "is a threshold"),
-        (["alpha"], "nothing to fit is called 'alpha'"),
-        (["axes"], "nothing to fit is called 'axes'"),
-        (["reach_m"], "nothing to fit is called 'reach_m'"),
+        (["alpha"], "no parameter is called 'alpha'"),
+        (["axes"], "no parameter is called 'axes'"),
+        (["reach_m"], "no parameter is called 'reach_m'"),
         (["length", "wake.length"], "are the same parameter"),
     ],
 )
@@ -281,7 +282,7 @@ def test_what_cannot_be_fitted_is_said(names, said):
         (lambda m, f: (m, 0 * f), "zero throughout"),
         (lambda m, f: (m, f[:-1]), r"finite and \(n, 3\)"),
         (lambda m, f: (m, f * math.nan), "finite"),
-        (lambda m, f: slowed(m, f, [0]), "one row is no motion"),
+        (lambda m, f: slowed(m, f, [0]), "one row is not a motion"),
         (lambda m, f: slowed(m, f, [0, 1, 2, 99, 100]), "row 4 comes 0.097 s after the one before"),
     ],
 )

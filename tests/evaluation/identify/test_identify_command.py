@@ -5,11 +5,12 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.evaluation.identify import figure, measured_force, preset
+from study_app.evaluation.identify import fit_figure, measured_force, preset
 from study_app.evaluation.identify.fit import fit
 from study_app.haptics.model import paths
+from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.overrides import override_all
-from study_app.haptics.model.scene import Box, Kalman, Liquid, Scene, Uniform
+from study_app.haptics.model.scene import Box, Kalman, Liquid, Scene
 from study_app.protocol.load import load_scene
 from tests.evaluation.identify.measurements import OIL, REACH, REVERSE, TANK, force_of, noisy, write_csv
 from tests.haptics.scenes import COMPILED
@@ -26,6 +27,7 @@ def fitted(tmp_path_factory):
     return fit(start, "tank", ["drag_coefficient", "scaling"], REVERSE, force_n), path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "scene",
     [
@@ -68,6 +70,7 @@ def test_the_preset_says_how_sure_its_numbers_are(fitted):
     assert lines[0].startswith("# Fitted to tank.csv (SHA-256 ")
 
 
+@pytest.mark.slow
 def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
     found, path = fitted
     written = preset.write(found, tmp_path / "new", path)
@@ -81,7 +84,7 @@ def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
 
 def test_the_figure_is_whole_and_shows_the_residual(fitted):
     found, _ = fitted
-    drawn = figure.draw(found)
+    drawn = fit_figure.draw(found)
     drawn.draw_without_rendering()
     frame = drawn.bbox
     boxes = [axes.get_tightbbox() for axes in drawn.axes] + [it.get_window_extent() for it in drawn.texts]
@@ -100,6 +103,7 @@ def identify(*words):
     return CliRunner().invoke(commands, ["identify", *map(str, words)], catch_exceptions=False)
 
 
+@pytest.mark.slow
 def test_from_a_file_to_a_preset(tmp_path):
     true = override_all(load_scene("rek2024", "honey"), {"drag_coefficient": 0.61})
     path = write_csv(tmp_path / "honey.csv", REACH, noisy(true, REACH, 0.02), comment="# by hand\n")
@@ -132,6 +136,7 @@ def test_a_motion_along_one_line_is_read_from_its_velocities(tmp_path):
     assert np.array_equal(read.force_n, force_n * [1, 0, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -142,7 +147,7 @@ def test_a_motion_along_one_line_is_read_from_its_velocities(tmp_path):
         ("t_s,velocity_mps,force_n\n0,1\n", "line 2: has 2 fields"),
         ("t_s,velocity_mps,force_n\n0,1,2\n0,1,2\n", "time must increase"),
         ("t_s,velocity_mps,force_n\n0,1,2\n9,1,2\n", "row 2 comes 9 s after"),
-        (b"\xff\xfe", "no UTF-8 text"),
+        (b"\xff\xfe", "not UTF-8 text"),
         (None, "cannot read"),
     ],
 )

@@ -13,6 +13,7 @@ import random
 import shutil
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 from study_app.analysis.export.export import export
@@ -73,7 +74,10 @@ def main(protocol: str, folder: str, seed: str) -> None:
             before = hashes(into)
             after_s = None if number < 0 else draw.uniform(earliest, 1.0) * lasts_s
             began = time.perf_counter()
-            code = forked(lambda command=command, into=into: run(command, study, into), after_s)
+            code = forked(
+                lambda command=command, into=into: run(command, study, into),
+                None if after_s is None else partial(time.sleep, after_s),
+            )
             lasts_s = lasts_s or time.perf_counter() - began
             held = hashes(into)
             again = 0 if number < 0 else forked(lambda command=command, into=into: run(command, study, into))

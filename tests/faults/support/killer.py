@@ -16,6 +16,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from study_app.session.simulated import rehearsal
@@ -24,8 +25,8 @@ from study_app.store.sessions.rebuild import rebuild
 SEED = 7
 
 
-def forked(task: Callable[[], object], kill_after_s: float | None = None) -> int:
-    """Do ``task`` in a fork, killed after a while; return its exit code, negative where a signal ended it."""
+def forked(task: Callable[[], object], until: Callable[[], object] | None = None) -> int:
+    """Do ``task`` in a fork, killed when ``until`` returns; return its exit code, negative where a signal ended it."""
     child = os.fork()
     if child == 0:
         code = 1
@@ -36,8 +37,8 @@ def forked(task: Callable[[], object], kill_after_s: float | None = None) -> int
             traceback.print_exc()
         finally:
             os._exit(code)
-    if kill_after_s is not None:
-        time.sleep(kill_after_s)
+    if until is not None:
+        until()
         os.kill(child, signal.SIGKILL)
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
@@ -46,19 +47,28 @@ def session(protocol: str, folder: Path) -> None:
     rehearsal.rehearse(protocol, participants=1, seed=SEED, results=folder)
 
 
-def main(protocol: str, folder: str, count: str, seed: str) -> None:
+def grown(path: Path, size: int) -> None:
+    """Wait until a file has this size."""
+    while not path.exists() or path.stat().st_size < size:
+        time.sleep(0.0002)
+
+
+def main(protocol: str, folder: str, count: str, seed: str, at: str = "moments") -> None:
+    """Kill sessions at random moments, or where their journals have grown to random sizes (``at`` is "bytes")."""
     whole, scratch = Path(folder) / "whole", Path(folder) / "scratch"
     session(protocol, whole)
     began = time.perf_counter()
     assert forked(lambda: session(protocol, scratch)) == 0
     lasts_s = time.perf_counter() - began
+    size = (whole / "data" / "sub-P001" / "ses-01" / "journal.jsonl").stat().st_size
     draw = random.Random(int(seed))  # noqa: S311 - moments, not secrets
     for number in range(int(count)):
         killed = Path(folder) / f"killed-{number:02d}"
         place = killed / "data" / "sub-P001" / "ses-01"
-        after_s = draw.uniform(0, lasts_s)
-        code = forked(lambda killed=killed: session(protocol, killed), after_s)
-        journal = place / "journal.jsonl"
+        journal, share = place / "journal.jsonl", draw.random()
+        after_s = share * lasts_s
+        until = partial(grown, journal, round(share * size)) if at == "bytes" else partial(time.sleep, after_s)
+        code = forked(lambda killed=killed: session(protocol, killed), until)
         held = journal.read_text(encoding="utf-8") if journal.exists() else ""
         resumed = None
         if code == -signal.SIGKILL and '"session_ended"' in held:

@@ -7,12 +7,13 @@ from typing import Any, TypeVar
 
 from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.session.pages import EndPage, QuestionnairePage, TextPage
+from study_app.session.pages import ChoicePage, EndPage, QuestionnairePage, TextPage
 
 W = TypeVar("W", bound=QWidget)
 
@@ -27,11 +28,11 @@ def answer(participant: ParticipantWindow, page: QuestionnairePage) -> None:
     widget = participant.widget
     assert isinstance(widget, QuestionnaireWidget)
     points = len(page.labels)
-    for number, row in enumerate(widget.rows):
+    for number, row in enumerate(widget.fields):
         if not row.isVisible():  # on the next part of the page
             QTest.keyClick(participant.focusWidget(), Qt.Key.Key_Return)
         if number % 2:
-            QTest.mouseClick(row.cells[number % points], Qt.MouseButton.LeftButton)
+            QTest.mouseClick(row.options[number % points], Qt.MouseButton.LeftButton)
         else:
             QTest.keyClick(row, Qt.Key(Qt.Key.Key_1 + number % points))
     QTest.keyClick(widget, Qt.Key.Key_Return)
@@ -65,5 +66,32 @@ class Person(QObject):
         elif isinstance(page, QuestionnairePage) and page is not self._answered:
             self._answered = page
             answer(participant, page)
+        elif isinstance(page, ChoicePage) and page is not self._answered:
+            self._answered = page
+            QTest.keyClick(participant.focusWidget(), Qt.Key.Key_1)
         elif isinstance(page, EndPage):
             QTest.mouseClick(operator.buttons.close_session, Qt.MouseButton.LeftButton)
+
+
+def words_of(top: QWidget) -> set[str]:
+    """Return all that a window says: titles, texts, tips and names for those who cannot see."""
+    found = {top.windowTitle()}
+    for widget in (top, *top.findChildren(QWidget)):
+        found |= {widget.accessibleName(), widget.accessibleDescription(), widget.toolTip(), widget.windowTitle()}
+        found |= {widget.objectName(), widget.statusTip(), widget.whatsThis()}
+        text = getattr(widget, "text", None)
+        if callable(text):
+            found.add(str(text()))
+    return found
+
+
+def traces_of(operator: OperatorWindow) -> set[str]:
+    """Return names and labels of all that is plotted, and what stands where the force would be."""
+    named = set()
+    plots = [operator.lateness.plot, operator.position.plot]
+    if isinstance(operator.force, ForceCard):
+        plots += [operator.force.plot, operator.force.wake]
+    for plot in plots:
+        for item in plot.items():
+            named |= {str(getattr(item, "toPlainText", str)()), str(getattr(item, "labelText", ""))}
+    return named | {label.text() for label in operator.force.findChildren(QLabel)}

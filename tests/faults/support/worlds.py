@@ -11,7 +11,7 @@ from study_app.session.runner import Runner
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, ResumeAsked, Submitted
 from study_app.session.transitions.state import Phase
 from study_app.store.clock import SessionClock
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from tests.session import small
 from tests.session.fakes import World
@@ -28,13 +28,15 @@ class StoredWorld(World):
             folder,
             small.protocol(),
             b"small",
-            participant,
-            seed=1,
-            operator="AK",
-            language="en",
-            device={"name": "memory"},
-            screens={},
-            simulated=False,
+            SessionStart(
+                participant,
+                seed=1,
+                operator="AK",
+                language="en",
+                device={"name": "memory"},
+                screens={},
+                simulated=False,
+            ),
             clock=SessionClock(self.servo.now_ns),
         )
         plan = small.opened().plan

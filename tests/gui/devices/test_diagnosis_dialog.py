@@ -10,15 +10,17 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QLabel
 
 from study_app.devices.doctor_report import Report
-from study_app.devices.falcon.diagnosis import MODES, UDEV_RULE
+from study_app.devices.doctor_worker import start_examination
 from study_app.devices.falcon.doctor.failure_report import findings_of
-from study_app.devices.falcon.doctor.worker import Examination
-from study_app.devices.falcon.failure_modes import OPEN, Facts
-from study_app.errors import StudyError
+from study_app.devices.falcon.facts import OPEN, Facts
+from study_app.devices.falcon.failure_modes import MODES, UDEV_RULE
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.devices.failure_rows import Paste, capital
 from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.workers.messages import Refused
 from tests.compiled import needs_servo
+
+pytestmark = pytest.mark.slow
 
 REFUSED = Report(("opened",), findings_of(Facts(platform="linux", usb="access")), "this account may not open it")
 WELL = Report((), findings_of(Facts(platform="linux", usb=OPEN)), None)
@@ -27,14 +29,18 @@ WELL = Report((), findings_of(Facts(platform="linux", usb=OPEN)), None)
 class Examined:
     """An examination that says what it is given."""
 
-    def __init__(self, name, firmware):
-        self.name, self.firmware = name, firmware
+    def __init__(self, name, options):
+        self.name, self.options = name, options
         self.told = []
         self.closed = False
 
-    def said(self):
+    @property
+    def ended(self):
+        return self.closed
+
+    def answers(self):
         told, self.told = self.told, []
-        return told
+        return [(1, one) for one in told]
 
     def close(self):
         self.closed = True
@@ -47,8 +53,8 @@ def begun():
 
 @pytest.fixture
 def dialog(qtbot, begun):
-    def begin(name, firmware):
-        begun.append(Examined(name, firmware))
+    def begin(name, options):
+        begun.append(Examined(name, options))
         return begun[-1]
 
     made = DiagnosisDialog(None, LIGHT, "falcon", begin=begin)
@@ -117,7 +123,7 @@ def test_others_say_why_when_they_are_asked(dialog, begun, qtbot):
 
 
 def test_what_cannot_be_examined_is_said_in_a_sentence(dialog, begun, qtbot):
-    begun[0].told = [StudyError("'mouse' is none")]
+    begun[0].told = [Refused("'mouse' is none")]
     with qtbot.waitSignal(dialog.over):
         pass
     assert dialog.step.text() == "'mouse' is none."
@@ -161,15 +167,16 @@ def test_a_fault_of_an_emulated_falcon_is_found_by_the_real_examination(qtbot, f
         None,
         DARK,
         "falcon-emulated",
-        begin=lambda name, firmware: Examination(name, firmware=firmware, faults=(fault,)),
+        begin=lambda name, options: start_examination(name, options=options, faults=(fault,)),
     )
     qtbot.addWidget(made)
+    assert all(row.chip.theme is DARK for row in made.rows)
     with qtbot.waitSignal(made.over, timeout=120_000):
         pass
     assert [row.finding.id for row in made.rows if row.found] == [mode]
     made.close()
-    made._leaving.join(20)
-    assert not made._leaving.is_alive()
+    made.leaving.wait_until_ended()
+    assert made.leaving.ended
 
 
 def test_a_zip_for_whoever_helps_is_saved_with_the_report_and_a_failure_is_a_sentence(dialog, begun, qtbot, tmp_path):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from PySide6.QtCore import QPoint, QSize, Qt
 from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel
 
-from study_app.devices.backends import NONE, NOT_HERE, READY, Backend
+from study_app.devices.descriptor import NONE, NOT_AVAILABLE, READY, Backend
 from study_app.gui.devices.view import NO_FILE, DevicesPlace
 from study_app.gui.theme.theme import DARK
 from study_app.gui.theme.themed import wear
@@ -15,7 +17,7 @@ from study_app.viewmodels.device_list import devices_shown
 FOUND = [
     Backend("mouse", "the window", READY, "seen, not felt"),
     Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug it in"),
-    Backend("falcon", "ftd2xx", NOT_HERE, "the same", "for Windows alone"),
+    Backend("falcon", "ftd2xx", NOT_AVAILABLE, "the same", "for Windows alone"),
     Backend("falcon-emulated", "the program", READY, "moves by itself"),
     Backend("falcon-socket:PATH", "a Unix socket", READY, "another program's"),
 ]
@@ -46,7 +48,7 @@ def test_every_device_has_a_row_with_its_state(place):
     assert rows(place)["mouse"].chip.word == "Ready"
     falcon = rows(place)["falcon"]
     assert (falcon.chip.word, falcon.why.text()) == ("Not connected", "Plug it in.")
-    assert "ftd2xx: not here" in falcon.by.text()
+    assert "ftd2xx: not available" in falcon.by.text()
     assert "Not connected" in falcon.title.accessibleName()
 
 
@@ -89,16 +91,17 @@ def test_entering_and_refresh_look_again_and_rows_stay(place, qtbot):
 
 
 def test_a_falcons_firmware_is_chosen_and_forgotten(place, qtbot, monkeypatch):
-    assert place.firmware.file.accessibleName() == NO_FILE
-    assert not place.firmware.forget.isEnabled()
+    firmware = place.options["firmware"]
+    assert firmware.file.accessibleName() == NO_FILE
+    assert not firmware.forget.isEnabled()
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: ("/there/firmware.bin", ""))
-    with qtbot.waitSignal(place.firmware_chosen) as chosen:
-        qtbot.mouseClick(place.firmware.choose, Qt.MouseButton.LeftButton)
-    assert chosen.args == ["/there/firmware.bin"]
-    place.show_firmware("/there/firmware.bin")
-    with qtbot.waitSignal(place.firmware_chosen) as chosen:
-        qtbot.mouseClick(place.firmware.forget, Qt.MouseButton.LeftButton)
-    assert chosen.args == [None]
+    with qtbot.waitSignal(place.option_chosen) as chosen:
+        qtbot.mouseClick(firmware.choose, Qt.MouseButton.LeftButton)
+    assert chosen.args == ["firmware", "/there/firmware.bin"]
+    place.show_options({"firmware": Path("/there/firmware.bin")})
+    with qtbot.waitSignal(place.option_chosen) as chosen:
+        qtbot.mouseClick(firmware.forget, Qt.MouseButton.LeftButton)
+    assert chosen.args == ["firmware", None]
 
 
 @pytest.mark.parametrize("size", [QSize(952, 640), QSize(1294, 768), QSize(1704, 1080)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QTimer
 
 from study_app.gui.display.frame_clock import LEAD_NS, STALE_REFRESHES, Frames
 
@@ -16,6 +17,7 @@ class Screen:
     def __init__(self, refresh_hz):
         self.now_ns = 10**9
         self.frames = Frames(refresh_hz, now_ns=lambda: self.now_ns)
+        self.timer = self.frames.findChild(QTimer)
         self.drawn_ns = []
         self.takes_ns = 0
         self.frames.due.connect(self.draw)
@@ -29,8 +31,8 @@ class Screen:
         end_ns = self.now_ns + round(seconds * 1e9)
         while self.frames.next_ns < end_ns:
             self.now_ns = max(self.now_ns, self.frames.next_ns - early_ns + late_ns)
-            self.frames._timer.stop()
-            self.frames._draw()
+            self.timer.stop()
+            self.timer.timeout.emit()
         self.now_ns = max(self.now_ns, end_ns)
 
 

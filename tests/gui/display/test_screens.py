@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.display.screens import place
+
+pytestmark = pytest.mark.slow
 
 
 def shown_in(qtbot, size, least):

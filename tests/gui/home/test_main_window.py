@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics
-from PySide6.QtWidgets import QPushButton, QVBoxLayout
+from PySide6.QtWidgets import QApplication, QPushButton, QVBoxLayout
 
 from study_app.gui.home.main_window import FULL, LEAST, MainWindow
 from study_app.gui.home.navigation import DESTINATIONS, NARROW_RAIL, WIDE_RAIL
@@ -69,7 +69,7 @@ def test_the_window_closes_by_the_keyboard_where_no_frame_has_a_way(main, qtbot)
 def test_a_place_may_ask_for_another_and_have_something_said(main):
     main.place("home").go_asked.emit("devices")
     assert main.here == "devices"
-    main.place("devices").told.emit("It did not work", "The cable is out.")
+    main.place("devices").message.emit("It did not work", "The cable is out.")
     assert main.notice.isVisible()
     main.notice.accept()
 
@@ -107,6 +107,19 @@ def test_the_rail_gives_way(main, size, place, width):
     assert main.rail.width() == width
 
 
+def test_whoever_goes_on_before_a_prepared_place_is_shown_gets_where_they_asked_to(qtbot):
+    window = MainWindow({"home": Place, "lab": Place, "devices": Place}, prepares={"lab": lambda: True})
+    qtbot.addWidget(window)
+    window.show()
+    window.go("lab")
+    window.go("devices")
+    for _ in range(3):
+        QApplication.processEvents()
+    assert window.here == "devices"
+    window.close()
+
+
+@pytest.mark.slow
 def test_the_words_of_a_narrow_rail_stay_whole_in_another_theme(main, qtbot):
     main.resize(LEAST)
     main.rail.theme_asked.emit()
@@ -135,8 +148,21 @@ def test_a_place_that_is_not_prepared_never_freezes_the_window(qtbot):
     ready.append(True)
     window.prepared("lab")
     assert made == ["lab"]
-    assert window.stack.currentWidget() is window.place("lab") is not waits
+    assert window.stack.currentWidget() is waits, "it is made by one event and shown by the next"
+    qtbot.waitUntil(lambda: window.stack.currentWidget() is window.place("lab"))
     window.go("home")
     window.rest()
     window.come_back()
     window.close()
+
+
+@pytest.mark.parametrize("name", ["home", "results"])
+def test_the_rail_shows_which_button_has_the_keyboard(main, qtbot, name):
+    button = main.rail.buttons[name]
+    main.activateWindow()
+    main.centralWidget().setFocus()
+    without = button.grab().toImage()
+    button.setFocus(Qt.FocusReason.TabFocusReason)
+    ring = button.grab().toImage()
+    assert without.pixelColor(button.width() // 2, 1) != ring.pixelColor(button.width() // 2, 1)
+    assert ring.pixelColor(button.width() // 2, 1).name() == main.theme.accent.lower()

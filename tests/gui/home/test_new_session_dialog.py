@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,9 +13,12 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.home import new_session_dialog
 from study_app.gui.home.new_session_dialog import NewSessionDialog
+from study_app.gui.widgets.background import Background
 from study_app.session.request import MAX_SEED, draw_seed
+from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.workstation import MachineSettings
 from study_app.viewmodels.home import study_facts
+from tests.protocol.groups.grouped import STUDY
 
 # The platform without a screen cannot limit or raise windows, and says so.
 
@@ -64,7 +68,7 @@ def test_what_another_program_began_meanwhile_is_refused(dialog, results, qtbot)
 
 def settle(qtbot, dialog):
     """Wait until the folder was read again."""
-    qtbot.waitUntil(lambda: not dialog._reader.busy)
+    qtbot.waitUntil(lambda: not dialog.findChild(Background).busy)
 
 
 def files(folder: Path) -> list[Path]:
@@ -127,6 +131,21 @@ def test_a_pilot_is_in_a_window_apart_and_may_have_an_id_kept_for_it(dialog, res
     assert chosen.results.name == f"{dialog.facts.protocol.study.name}-pilot"
     dialog.pilot.setChecked(False)
     assert not dialog.begin.isEnabled()
+
+
+def test_a_study_whose_conditions_were_changed_since_is_refused_with_what_to_do(qtbot, results):
+    facts = study_facts("demo")
+    (results / "demo" / "data" / "sub-P001" / "ses-01").mkdir(parents=True)
+    (results / "demo" / "data" / "sub-P001" / "ses-01" / "checksums.sha256").touch()
+    open_or_draw_key(results / "demo", facts.protocol)
+    liquids = facts.protocol.liquids
+    unused = next(iter(liquids.values())).model_copy(update={"id": "unused"})
+    changed = facts.protocol.model_copy(update={"liquids": {**liquids, "unused": unused}})
+    made = NewSessionDialog(replace(facts, protocol=changed), results)
+    qtbot.addWidget(made)
+    assert not made.begin.isEnabled()
+    assert "undo that change" in made.verdict.text()
+    assert made.participant.text() == "P002"
 
 
 def test_a_folder_of_another_study_is_refused(dialog, tmp_path):
@@ -216,12 +235,12 @@ def test_a_session_begins_with_what_is_set_for_this_machine(qtbot, results, tmp_
     set_here = {"device": "falcon", "screen": "B", "screen_number": 2, "firmware": str(firmware), "operator": "AK"}
     made = begun_with(qtbot, results, **set_here)
     assert made.chosen().operator == "AK"
-    assert made.firmware.isVisible()
+    assert made.device_options.fields["firmware"].isVisible()
     chosen = made.chosen()
-    assert (chosen.device, chosen.screen, chosen.firmware) == ("falcon", 2, firmware)
+    assert (chosen.device, chosen.screen, chosen.device_options) == ("falcon", 2, {"firmware": firmware})
     made.device.setCurrentIndex(made.device.findData("mouse"))
-    assert not made.firmware.isVisible()
-    assert made.chosen().firmware is None
+    assert not made.device_options.fields["firmware"].isVisible()
+    assert made.chosen().device_options == {}
 
 
 def test_a_falcon_by_its_serial_number_can_be_preferred_and_nobody_knows_a_hammer(qtbot, results):
@@ -234,9 +253,9 @@ def test_firmware_that_is_not_there_is_refused_as_it_is_typed(qtbot, results, tm
     made = begun_with(qtbot, results, device="falcon", firmware=str(tmp_path / "gone.bin"))
     assert not made.begin.isEnabled()
     assert "gone.bin" in made.verdict.text()
-    made.firmware.clear()
+    made.device_options.fields["firmware"].clear()
     assert made.begin.isEnabled()
-    assert made.chosen().firmware is None
+    assert made.chosen().device_options == {}
 
 
 def test_enter_presses_the_button_that_has_the_keyboard_and_no_other(dialog, qtbot):
@@ -269,3 +288,16 @@ def test_the_foot_stays_on_a_small_screen_and_every_question_is_reached(dialog, 
         qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
         at = QApplication.focusWidget()
         assert at.visibleRegion().boundingRect() == at.rect()
+
+
+def test_a_session_beyond_the_last_is_refused(qtbot, tmp_path):
+    source = tmp_path / "grouped.toml"
+    source.write_text(STUDY.replace("format = 2\n", 'format = 2\nsequences = [["hello", "thin"], ["thick", "end"]]\n'))
+    made = NewSessionDialog(study_facts(str(source)), tmp_path / "results")
+    qtbot.addWidget(made)
+    made.session.setValue(2)
+    settle(qtbot, made)
+    assert made.begin.isEnabled()
+    made.session.setValue(3)
+    assert not made.begin.isEnabled()
+    assert "permitted: 1 to 2" in made.verdict.text()

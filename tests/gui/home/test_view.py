@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QProcess, Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAccessible, QFontMetrics
-from PySide6.QtWidgets import QPushButton
+from PySide6.QtWidgets import QApplication, QPushButton
 
-from study_app.devices.backends import NONE, Backend
+from study_app.devices.descriptor import NONE, Backend
 from study_app.gui.home.main_window import LEAST, MainWindow
 from study_app.gui.home.rehearsal_dialog import RehearsalDialog
 from study_app.gui.home.study_cards import BrokenCard, StudyCard
@@ -17,7 +17,7 @@ from study_app.gui.widgets.row_table import GAP
 from study_app.protocol.load import load, source_bytes
 from study_app.store.exclusions import exclude
 from study_app.store.folders import rehearsal_folder
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import MachineSettings
 from study_app.viewmodels.device_list import devices_shown
 from study_app.viewmodels.home import study_facts
@@ -30,13 +30,9 @@ def hold(folder, participant, *, simulated=False):
         folder,
         load("demo"),
         source_bytes("demo"),
-        participant,
-        seed=1,
-        operator="",
-        language="en",
-        device={"name": "mouse"},
-        screens={},
-        simulated=simulated,
+        SessionStart(
+            participant, seed=1, operator="", language="en", device={"name": "mouse"}, screens={}, simulated=simulated
+        ),
     ) as store:
         store.finish("completed")
 
@@ -204,10 +200,19 @@ def test_the_theme_changes(home, qtbot):
     assert rail.switch.text() == "Light theme"
 
 
+def test_three_studies_and_the_sessions_fit_in_a_small_screen(qtbot, results, monkeypatch):
+    monkeypatch.setattr("study_app.gui.home.view.sources", lambda: ("rek2024", "physical_liquids", "demo"))
+    home = open_home(qtbot, results, QSize(1366, 768))
+    (mouse,) = devices_shown([Backend("mouse", "", NONE, "seen: the ball moves as it would in the liquid", "")])
+    home.show_machine(MachineSettings(device="mouse"), mouse)
+    QApplication.processEvents()
+    assert home.area.verticalScrollBar().maximum() == 0
+
+
 def test_a_small_window_cuts_nothing_off_sideways(home, qtbot):
     window = home.main
     window.resize(LEAST)
-    inside, seen = home._area.widget(), home._area.viewport()
+    inside, seen = home.area.widget(), home.area.viewport()
 
     def fits():
         """One round of events need not lay out what the new size asks for: other events may come first."""
@@ -230,15 +235,21 @@ def test_rehearsals_get_a_folder_of_their_own(tmp_path):
     assert rehearsal_folder(tmp_path, "demo").name == "demo-rehearsal-2"
 
 
-def test_a_failed_rehearsal_says_why_and_stays(qtbot, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("task", "said"),
+    [("fail", "no room left"), ("end", "the process ended with exit code 7; the terminal may show why")],
+)
+def test_a_failed_rehearsal_says_why_and_stays(qtbot, tmp_path, monkeypatch, task, said):
     dialog = RehearsalDialog(study_facts("demo"), tmp_path)
     qtbot.addWidget(dialog)
     dialog.open()
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", "import sys; sys.exit('no room left')"))
-    with qtbot.waitSignal(dialog.process.finished, timeout=20_000):
-        qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", f"tests.gui.home.rehearsal_tasks:{task}")
+    qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: dialog.cancel.text() == "Close", timeout=20_000)
     assert dialog.isVisible()
-    assert dialog.said.text() == "no room left"
+    assert dialog.said.text() == said
+    qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
+    assert not dialog.isVisible()
 
 
 def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot, tmp_path, monkeypatch):
@@ -246,14 +257,14 @@ def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot, tmp_pat
     qtbot.addWidget(dialog)
     dialog.open()
     dialog.participants.setValue(2)
-    said = "print('R1: 8 responses (simulated)', flush=True); input(); print('R2: 8 responses (simulated)')"
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", said))
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", "tests.gui.home.rehearsal_tasks:two")
     qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: dialog.progress.value() == 1, timeout=20_000)
     assert dialog.said.text() == "1 of 2: R1: 8 responses (simulated)"
     assert (dialog.progress.minimum(), dialog.progress.maximum()) == (0, 2)
-    with qtbot.waitSignal(dialog.process.finished, timeout=20_000):
-        dialog.process.write(b"\n")
+    dialog.worker.stop()
+    qtbot.waitUntil(lambda: dialog.over, timeout=20_000)
+    assert dialog.progress.value() == 2
     assert dialog.isVisible()
     assert str(dialog.folder) in dialog.said.text()
     assert dialog.start.text() == "Open results"
@@ -267,13 +278,13 @@ def test_enter_begins_the_rehearsal_wherever_the_keyboard_is(qtbot, tmp_path, mo
     qtbot.addWidget(dialog)
     dialog.open()
     qtbot.waitUntil(dialog.isActiveWindow)
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", "import time; time.sleep(600)"))
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", "tests.gui.home.rehearsal_tasks:endless")
     pressed = dialog if at == "dialog" else getattr(dialog, at)
     pressed.setFocus()
-    with qtbot.waitSignal(dialog.process.started, timeout=20_000):
-        qtbot.keyClick(pressed, Qt.Key.Key_Return)
+    qtbot.keyClick(pressed, Qt.Key.Key_Return)
+    assert dialog.worker.works
     dialog.end()
-    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+    assert dialog.worker.ended
 
 
 def test_enter_on_cancel_cancels(qtbot, tmp_path):
@@ -284,20 +295,20 @@ def test_enter_on_cancel_cancels(qtbot, tmp_path):
     dialog.cancel.setFocus()
     qtbot.keyClick(dialog.cancel, Qt.Key.Key_Return)
     assert not dialog.isVisible()
-    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+    assert dialog.worker is None
 
 
 def test_cancelling_a_rehearsal_stops_it(qtbot, tmp_path, monkeypatch):
     dialog = RehearsalDialog(study_facts("demo"), tmp_path)
     qtbot.addWidget(dialog)
     dialog.open()
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", "import time; time.sleep(600)"))
-    with qtbot.waitSignal(dialog.process.started, timeout=20_000):
-        qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", "tests.gui.home.rehearsal_tasks:endless")
+    qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    assert dialog.worker.works
     with qtbot.waitSignal(dialog.rejected):
         qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
         assert dialog.isVisible()  # and nobody waits
-    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+    assert dialog.worker.ended
     assert not dialog.isVisible()
 
 
@@ -305,36 +316,37 @@ def test_a_rehearsal_that_does_not_listen_is_killed(qtbot, tmp_path, monkeypatch
     dialog = RehearsalDialog(study_facts("demo"), tmp_path)
     qtbot.addWidget(dialog)
     dialog.open()
-    deaf = (
-        "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True); time.sleep(600)"
-    )
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", deaf))
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.PATIENCE_MS", 50)
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", "tests.gui.home.rehearsal_tasks:deaf")
+    monkeypatch.setattr("study_app.workers.client.PATIENCE_S", 0.05)
     dialog.start.click()
-    qtbot.waitUntil(lambda: dialog.said.text() == "0 of 5: deaf", timeout=20_000)
+    qtbot.waitUntil(lambda: dialog.said.text() == "1 of 5: deaf", timeout=20_000)
     with qtbot.waitSignal(dialog.rejected):
         dialog.close()
-    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+    assert dialog.worker.ended
 
 
 def test_a_rehearsal_that_cannot_be_run_says_so(qtbot, tmp_path, monkeypatch):
     dialog = RehearsalDialog(study_facts("demo"), tmp_path)
     qtbot.addWidget(dialog)
     dialog.open()
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.sys.executable", str(tmp_path / "nothing"))
+
+    def none(*_args, **_named):
+        raise OSError("no more processes")
+
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.WorkerClient", none)
     dialog.start.click()
     qtbot.waitUntil(lambda: dialog.cancel.text() == "Close")
-    assert dialog.said.text() not in ("", "Rehearsing …")
+    assert dialog.said.text() == "no more processes"
 
 
 def test_the_end_of_the_program_ends_a_rehearsal(home, qtbot, monkeypatch):
-    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", "import time; time.sleep(600)"))
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.TASK", "tests.gui.home.rehearsal_tasks:endless")
     home.ask_for_rehearsal(study_facts("demo"))
     dialog = home.dialog
-    with qtbot.waitSignal(dialog.process.started, timeout=20_000):
-        dialog.start.click()
+    dialog.start.click()
+    assert dialog.worker.works
     home.end()
-    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+    assert dialog.worker.ended
 
 
 def test_the_preferred_device_is_shown_as_it_was_found_and_sessions_begin_with_it(home, qtbot):
@@ -346,3 +358,24 @@ def test_the_preferred_device_is_shown_as_it_was_found_and_sessions_begin_with_i
     qtbot.mouseClick(study_cards(home)[0].new, Qt.MouseButton.LeftButton)
     assert home.dialog.chosen().device == "falcon"
     home.dialog.reject()
+
+
+def test_tab_goes_through_home_as_it_is_read(home, qtbot):
+    home.window().activateWindow()
+    home.show_studies()
+    qtbot.waitUntil(lambda: all(card.isVisible() for card in home.grid.cards))
+    home.open_protocol.setFocus()
+    names = []
+    while home.focusWidget() is not home.lab.open:
+        assert len(names) < 40
+        names.append(home.focusWidget().accessibleName())
+        home.focusNextChild()
+    begun = [name for name in names if name.startswith("New session")]
+    assert len(begun) == len(home.grid.cards)
+    assert max(map(names.index, begun)) < names.index("Sessions shown") < names.index("Sessions")
+
+
+def test_cards_in_a_row_need_no_more_than_the_window_has(home):
+    for width in range(400, 1800, 10):
+        home.grid.arrange(width)
+        assert home.grid.minimumSizeHint().width() <= width

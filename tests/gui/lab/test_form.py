@@ -14,6 +14,8 @@ from study_app.lab.parameters import sections
 from study_app.viewmodels.lab import LabView, form
 from tests.gui.lab.sample import still_view, workbench
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def told(place: Any, still: LabView) -> list[tuple[Any, ...]]:
@@ -96,7 +98,7 @@ def test_what_is_no_number_is_said_in_one_line_and_stays(place: Any, told: Any, 
     QTest.keyClick(row.field, Qt.Key.Key_Return)
     assert told == []
     assert row.why.isVisible()
-    assert "“0.5.5” is no number" in row.why.text()
+    assert "“0.5.5” is not a number" in row.why.text()
     place.show_view(dataclasses.replace(still, measuring=True))
     assert row.field.text() == "0.5.5"
     assert row.field.state == "refused"

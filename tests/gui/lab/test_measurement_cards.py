@@ -33,7 +33,7 @@ def plot(qtbot: Any) -> CurvePlot:
 
 
 def top(plot: CurvePlot) -> float:
-    return max(place for place, _ in plot.axes["left"]._tickLevels[0])
+    return max(place for place, _ in plot.ticks["left"])
 
 
 def test_the_height_grows_at_once_and_shrinks_only_by_half(plot: CurvePlot) -> None:
@@ -60,7 +60,7 @@ def test_numbers_of_the_axis_do_not_touch_and_are_inside(plot: CurvePlot, height
     plot.resize(300, height)
     QApplication.processEvents()
     plot.show_curves(np.array([0.0]), (np.array([7.3]), np.array([0.0])), limit=8.0)
-    ticks = sorted(place for place, _ in plot.axes["left"]._tickLevels[0])
+    ticks = sorted(place for place, _ in plot.ticks["left"])
     pixels = [plot.box.mapViewToDevice(plot.box.viewRect().topLeft().__class__(0, place)).y() for place in ticks]
     steps = -np.diff(pixels)
     assert steps.min() >= 14
@@ -103,9 +103,9 @@ def test_both_forces_are_drawn_and_named(place: Any, moved: LabView) -> None:
 def test_costs_are_bars_of_the_dearest_and_absent_ones_say_why(place: Any, still: LabView) -> None:
     place.show_view(still)
     card = place.cost
-    assert [(line.name._whole, line.ns.text()) for line in card.lines][:2] == [("Wake", "84 ns"), ("Safety", "31 ns")]
+    assert [(line.name.whole, line.ns.text()) for line in card.lines][:2] == [("Wake", "84 ns"), ("Safety", "31 ns")]
     assert [line.bar.share for line in card.lines][:2] == [1.0, pytest.approx(31 / 84)]
-    assert (card.absent[0].name.text(), card.absent[0].why._whole) == ("Buoyancy", "out, 0.00 N")
+    assert (card.absent[0].name.text(), card.absent[0].why.whole) == ("Buoyancy", "out, 0.00 N")
     assert card.sum.text() == "161 ns of 1 ms"
     assert card.aside.text() == "A, measured"
     place.show_view(dataclasses.replace(still, cost=(CostRow("Drag", 20.0),), tick_ns=None, measuring=True))
@@ -113,7 +113,7 @@ def test_costs_are_bars_of_the_dearest_and_absent_ones_say_why(place: Any, still
     assert (card.sum.text(), card.aside.text()) == ("20 ns of 1 ms", "A, measuring …")
     place.show_view(dataclasses.replace(still, cost=(), errors=()))
     assert card.sum.text() == "not measured yet"
-    assert [line[0]._whole for line in place.error.lines if line[0].isVisible()] == ["Not measured yet"]
+    assert [line[0].whole for line in place.error.lines if line[0].isVisible()] == ["Not measured yet"]
 
 
 def test_nothing_jumps_while_a_slider_is_dragged(place: Any, still: LabView) -> None:
@@ -128,7 +128,7 @@ def test_nothing_jumps_while_a_slider_is_dragged(place: Any, still: LabView) -> 
     assert {line.ns.text() for line in place.cost.lines} == {"–"}
     assert {value.text() for _, value in place.error.lines} == {"–"}
     assert place.cost.sum.text() == "–"
-    assert place.cost.lines[0].accessibleName() == "Wake: being measured"
+    assert place.cost.lines[0].accessibleName() == "Wake: measuring"
     place.show_view(still)
     assert [line.ns.text() for line in place.cost.lines][:2] == ["84 ns", "31 ns"]
     assert place.error.lines[0][1].text() == "4e−15"

@@ -5,13 +5,16 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
-from study_app.gui.widgets.escape_key import HOLD_MS
+from study_app.gui.widgets.escape_key import HOLD_MS, EscapeAnywhere
 from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import blind, heard, settle
+
+pytestmark = pytest.mark.slow
 
 
 def test_stop_force_speaks_at_the_press(place: Any, still: LabView) -> None:
@@ -79,7 +82,7 @@ def test_esc_held_elsewhere_asks_nothing_of_a_lab_that_was_left(place: Any, stil
     place.show_view(still)
     said = heard(place, "stop_asked")
     place.hide()
-    place._escape.held.emit()
+    place.findChild(EscapeAnywhere).held.emit()
     assert said == []
 
 

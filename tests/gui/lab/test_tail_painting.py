@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPointF
 
-from study_app.gui.lab.tail_painting import SHADES, STEP_PX, THICKEST_PX, THINNEST_PX, _look, tail_places
+from study_app.gui.lab.tail_painting import SHADES, STEP_PX, THICKEST_PX, THINNEST_PX, shade_style, tail_places
 from study_app.gui.participant.tank.camera import Box, Camera
 from study_app.viewmodels.lab import Floats, LabView
 
@@ -60,7 +60,7 @@ def test_runs_join_and_get_newer() -> None:
 
 
 def test_newer_is_brighter_and_thicker() -> None:
-    looks = [_look(shade) for shade in range(SHADES)]
+    looks = [shade_style(shade) for shade in range(SHADES)]
     widths = [width for _, width in looks]
     lights = [ink.lightnessF() * ink.alphaF() for ink, _ in looks]
     assert widths == sorted(widths, reverse=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtGui import QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLabel, QLineEdit, QSlider, QWidget
@@ -20,6 +20,8 @@ from study_app.gui.theme.themed import wear
 from study_app.lab.ab_comparison import Workbench
 from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import blind, heard, settle, still_view, workbench
+
+pytestmark = pytest.mark.slow
 
 
 def shown(place: Any) -> list[QWidget]:
@@ -123,7 +125,7 @@ def test_waiting_is_told_after_300_ms_and_can_be_cancelled(place: Any, still: La
     busy = dataclasses.replace(still, busy="Opening the Falcon")
     place.show_view(busy)
     assert not place.note.isVisible()
-    assert place.note._wait.interval() == SHOWN_AFTER_MS
+    assert place.note.findChild(QTimer).interval() == SHOWN_AFTER_MS
     qtbot.waitUntil(place.note.isVisible)
     assert place.note.words.text() == "Opening the Falcon\u00a0…"
     place.note.cancel.click()
@@ -163,7 +165,7 @@ def test_a_long_trouble_is_read_whole(place: Any, still: LabView, size: tuple[in
 def test_what_is_quick_is_not_told(place: Any, still: LabView) -> None:
     place.show_view(dataclasses.replace(still, busy="Opening the mouse"))
     place.show_view(still)
-    assert not place.note._wait.isActive()
+    assert not place.note.findChild(QTimer).isActive()
 
 
 def test_while_blind_nothing_tells_the_settings_apart(place: Any, moved: LabView) -> None:
@@ -301,11 +303,11 @@ def test_the_pointer_is_the_ball_only_while_the_mouse_leads(place: Any, still: L
 def test_a_ball_that_grows_leaves_the_glass_where_it_is(place: Any, moved: LabView) -> None:
     place.show_view(moved)
     settle()
-    glass = place.tank._camera, place.tank._box
+    glass = place.tank.camera, place.tank.box
     small = place.tank.grab().toImage()
     place.show_view(dataclasses.replace(moved, body_radius_m=0.006))
     settle()
-    assert (place.tank._camera, place.tank._box) == glass
+    assert (place.tank.camera, place.tank.box) == glass
     assert place.tank.grab().toImage() != small
 
 

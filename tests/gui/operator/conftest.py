@@ -11,10 +11,12 @@ import pytest
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Schedule, build_schedule
+from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
+from study_app.store.progress import Progress
 from study_app.viewmodels.operator import OperatorView, Session, operator_view
 from study_app.viewmodels.servo_health import ServoHealth
-from study_app.viewmodels.session_stages import SessionProgress, stages
+from study_app.viewmodels.session.stages import stages
 
 
 @dataclass
@@ -24,26 +26,27 @@ class Told:
     protocol: Protocol
     schedule: Schedule
     session: Session
-    progress: SessionProgress = field(init=False)
+    progress: Progress = field(default_factory=Progress)
     now_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        self.progress = SessionProgress(self.protocol, self.schedule)
 
     def tell(self, event: str, after_s: float = 0.0, **fields: Any) -> None:
         self.now_s += after_s
-        self.progress = self.progress.after(event, self.now_s, fields)
+        self.progress.take({"event": event, "t_s": self.now_s, **fields})
 
     def welcome(self) -> None:
-        self.tell("session_started")
+        self.tell("session_started", limits=self.protocol.limits.model_dump())
         self.tell("page_shown", 1.0, page="welcome")
 
     def make_single_blind(self) -> None:
         """Let the operator see forces."""
         study = self.protocol.study.model_copy(update={"blinding": "single"})
-        self.progress = replace(self.progress, protocol=self.protocol.model_copy(update={"study": study}))
+        self.session = replace(self.session, protocol=self.protocol.model_copy(update={"study": study}))
 
     def start(self, number: int, attempt: int = 1) -> None:
+        """Start a trial; the steps before it are passed over."""
+        trial = self.schedule.trials[number - 1]
+        for step in self.schedule.steps[self.progress.here + 1 : self.schedule.steps.index(trial)]:
+            self.tell("passed_over", **({"trial": step.number} if isinstance(step, Trial) else {"page": step.page_id}))
         self.tell("trial_started", 10.0, trial=number, attempt=attempt)
 
     def end(self, number: int, outcome: str = "complete", **measured: float) -> None:
@@ -64,13 +67,14 @@ def told() -> Told:
     schedule = build_schedule(protocol, "P007", 357711)
     session = Session(
         protocol=protocol,
+        schedule=schedule,
         stages=stages(protocol, schedule),
         who="Participant P007  ·  session 1  ·  seed 357711",
         expected_s=180.0,
-        answers_of=protocol.responses_per_participant(),
+        answers_of=orders_of(protocol).answers,
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
         device_name="Mouse",
-        device_kind="mouse",
+        device_icon="mouse",
         device_rows=(("Priority", "normal"),),
     )
     return Told(protocol, schedule, session)

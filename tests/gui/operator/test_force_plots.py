@@ -65,10 +65,10 @@ def test_the_scale_narrows_when_the_push_has_passed_and_the_limit_is_seen_where_
     assert card.plot.limits[0].isVisible()
     assert card.plot.limit_name is not None
     assert card.plot.limit_name.isVisible()
-    wide = card.plot._reach
+    wide = card.plot.reach
     assert wide >= LIMIT_N
     show(card, pushed(0.4))
-    assert card.plot._reach < wide / 4
+    assert card.plot.reach < wide / 4
     assert not card.plot.limits[0].isVisible()
     assert "limit 8" in card.findChildren(QLabel)[1].text()
 
@@ -77,7 +77,7 @@ def test_a_scale_that_fits_stays(card: ForceCard) -> None:
     seen = set()
     for peak_n in (1.9, 1.8, 1.95, 1.7, 2.0):
         show(card, pushed(peak_n))
-        seen.add(card.plot._reach)
+        seen.add(card.plot.reach)
     assert len(seen) == 1
 
 
@@ -103,9 +103,9 @@ def test_the_four_names_do_not_touch(card: ForceCard, height: int) -> None:
 def test_the_wake_has_a_line_above_zero_at_every_speed(card: ForceCard) -> None:
     for speed in (0.0, 0.05, 0.28, 0.49, 1.3, 6.0):
         show(card, pushed(1.0, speed))
-        rows, step = card.wake._ticks
+        rows, step = card.wake.rows_and_step
         assert rows >= 1
-        assert rows * step <= card.wake._reach + 1e-9
+        assert rows * step <= card.wake.reach + 1e-9
         assert max(speed, 0.1) <= card.wake.box.viewRange()[1][1]
 
 
@@ -125,6 +125,7 @@ def test_strokes_are_as_wide_on_a_screen_of_twice_the_density(card: ForceCard, m
     assert card.plot.curves[0].opts["pen"].widthF() == 2 * STROKE
 
 
+@pytest.mark.slow
 def test_repainting_keeps_no_reference_to_none(card: ForceCard) -> None:
     forces = pushed(2.0)
     for _ in range(5):

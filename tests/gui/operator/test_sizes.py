@@ -20,6 +20,8 @@ from study_app.gui.widgets.labels import Elided
 from study_app.haptics.model.layout import LIMITER_NORM, SAMPLE, records
 from study_app.viewmodels.force_traces import Forces
 
+pytestmark = pytest.mark.slow
+
 SIZES = (
     (1024, 640),
     (1180, 704),
@@ -66,7 +68,7 @@ def force_off(told: Any) -> dict[str, Any]:
 
 def trouble(told: Any) -> dict[str, Any]:
     running(told)
-    what = "the device 'falcon' stopped answering or lost its guard; switch it off if it pushes, plug it in again"
+    what = "the device 'falcon' stopped responding or lost its guard; turn it off if it pushes, and reconnect it"
     told.tell("broke", what=what)
     return {"force_on": False, "device_ready": False, "faults": 2}
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from itertools import pairwise
 
 import pyqtgraph as pg
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.current_step import Tally
 from study_app.gui.operator.stop_panel import LEAST_HEIGHT, LEAST_WIDTH
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.escape_key import HOLD_MS
@@ -41,14 +43,14 @@ def running(window, told, health):
     return window
 
 
-def test_a_view_becomes_texts(running):
+def test_a_view_becomes_texts(running, told, health):
     assert running.header.study.text() == "demo"
     assert running.header.state.word == "Running"
     assert running.header.trials.text() == "0 of 4 trials"
     assert running.rail.heading.text() == "Trial 1 of 4"
     assert running.rail.now.elapsed.text() == "0:00 of 0:30"
     assert [card.value.text() for card in running.tiles.cards[:2]] == ["1000.0", "15"]
-    assert len(running.rail.lines) == len(running._view.steps)
+    assert len(running.rail.lines) == len(told.view(health).steps)
     assert running.stop.word.text() == "Force is on"
 
 
@@ -139,13 +141,14 @@ def test_after_a_stop_the_panel_says_so_and_offers_the_way_back(running, told, h
         qtbot.mouseClick(running.stop.fade_in, Qt.MouseButton.LeftButton)
 
 
+@pytest.mark.slow
 def test_escape_held_stops_the_force_and_a_tap_does_not(running, qtbot):
     handle = running.windowHandle()
     asked = []
     running.stop_asked.connect(lambda: asked.append(True))
     QTest.keyPress(handle, Qt.Key.Key_Escape)
     QTest.keyRelease(handle, Qt.Key.Key_Escape)
-    assert not running.escape._timer.isActive()
+    assert not running.escape.findChild(QTimer).isActive()
     assert asked == []
     with qtbot.waitSignal(running.stop_asked, timeout=HOLD_MS * 5):
         QTest.keyPress(handle, Qt.Key.Key_Escape)
@@ -190,7 +193,7 @@ def test_a_question_about_a_trial_goes_with_the_trial(running, told, health, qtb
 def test_ending_asks_first_and_says_status_and_reason(running, qtbot):
     qtbot.mouseClick(running.buttons.end, Qt.MouseButton.LeftButton)
     question = running.question
-    question._choices.button(0).click()
+    question.choices.button(0).click()
     question.reason.setText("felt unwell")
     with qtbot.waitSignal(running.end_asked) as asked:
         qtbot.mouseClick(question.go_on, Qt.MouseButton.LeftButton)
@@ -206,7 +209,7 @@ def test_leaving_out_asks_what_and_why(running, qtbot):
         question.go_on.click()
     assert asked.args == [1, "talked during the trial"]
     running.buttons.exclude.click()
-    running.question._choices.button(1).setChecked(True)
+    running.question.choices.button(1).setChecked(True)
     running.question.reason.setText("no consent")
     with qtbot.waitSignal(running.exclude_asked) as asked:
         running.question.go_on.click()
@@ -236,6 +239,7 @@ def test_no_question_keeps_a_hand_from_the_force_stop(running, qtbot):
     assert running.question is not None
 
 
+@pytest.mark.slow
 def test_escape_held_over_a_question_stops_the_force_too(running, qtbot):
     running.ask_to_end()
     handle = running.question.windowHandle()
@@ -285,9 +289,9 @@ def test_closing_is_left_to_who_listens_until_the_session_is_over(running, told,
 
 
 def test_trouble_stands_above_everything_and_leaves_the_end(running, told, health):
-    running.show_view(told.view(health, trouble="the device 'mouse' stopped answering"))
+    running.show_view(told.view(health, trouble="the device 'mouse' stopped responding"))
     assert running.banner.isVisible()
-    assert "stopped answering" in running.banner.what.text()
+    assert "stopped responding" in running.banner.what.text()
     QApplication.processEvents()
     assert running.arrangement.middle_area.verticalScrollBar().maximum() == 0
     assert running.buttons.end.isEnabled()
@@ -318,13 +322,13 @@ def test_names_stand_at_the_newest_ends_and_never_touch(running, health):
     plot = running.position.plot
     heights = sorted(end.pos().y() for end in plot.ends)
     assert [end.isVisible() for end in plot.ends] == [True, True, True]
-    assert min(b - a for a, b in pairwise(heights)) > 0.1 * plot._reach
+    assert min(b - a for a, b in pairwise(heights)) > 0.1 * plot.reach
 
 
 def test_a_hand_beyond_the_plot_widens_it(running, health):
     health.hand(100.0, (0.09, 0.0, 0.0))
     running.show_traces(health, 100.0)
-    assert running.position.plot._reach >= 90.0
+    assert running.position.plot.reach >= 90.0
 
 
 def test_the_histogram_shows_limit_and_percentile(running, health):
@@ -335,6 +339,7 @@ def test_the_histogram_shows_limit_and_percentile(running, health):
     assert "2" in plot.limit_name.textItem.toPlainText()
 
 
+@pytest.mark.slow
 def test_repainting_the_live_plots_keeps_no_reference_to_none(running, health):
     """The PySide pin: from 6.10 on this count drifts with every repaint until the interpreter aborts."""
     for _ in range(5):
@@ -348,3 +353,14 @@ def test_repainting_the_live_plots_keeps_no_reference_to_none(running, health):
             running.show_lateness(health)
         running.position.plot.viewport().repaint()
     assert abs(sys.getrefcount(None) - before) < 100
+
+
+def test_the_state_of_a_track_is_shown_where_there_is_one(running, told, health):
+    tally = running.findChild(Tally)
+    assert not tally.track.isVisible()
+    lines = ("Track V1: 9 of at most 24 answered", "longest run 8: check")
+    running.show_view(replace(told.view(health), track=lines))
+    assert tally.track.isVisible()
+    assert tally.track.text() == "Track V1: 9 of at most 24 answered  ·  longest run 8: check"
+    running.show_view(told.view(health))
+    assert not tally.track.isVisible()

@@ -12,6 +12,8 @@ import pytest
 
 from tests.real_windows import needs_display, virtual_display
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[3]
 STEP_PX, STEPS = 300, 4
 
@@ -44,7 +46,7 @@ for _ in range({STEPS}):
 turn(0.3)
 middle = window.mapToGlobal(window.rect().center())
 left = QCursor.pos() - middle
-print(json.dumps({{"moved": (places[-1] - places[0]) / capture._gain, "left": [left.x(), left.y()]}}))
+print(json.dumps({{"moved": (places[-1] - places[0]) / capture.gain, "left": [left.x(), left.y()]}}))
 """
 
 

@@ -8,7 +8,7 @@ from datetime import datetime
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication, QLabel, QScrollArea
 
 from study_app.gui.preflight import PreflightWindow
 from study_app.gui.preflight.window import LEAST
@@ -17,6 +17,7 @@ from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.session.masking import Masking
 from study_app.session.preflight import Facts, Screen, checks
 from study_app.viewmodels.preflight import WAITING, histogram, preflight_view, resumed_rows
 
@@ -57,7 +58,7 @@ def window(qtbot):
 def test_every_check_has_a_row_with_its_value(window):
     said = {row.check.name: row.accessibleName() for row in window.rows}
     assert said["Servo rate"].startswith("Servo rate, passed, 1000.0 Hz")
-    assert "146 ns a tick" in said["Cost of the scenes"]
+    assert "146 ns per tick" in said["Cost of the scenes"]
     assert len(said) == len(checks(WELL, load("rek2024")))
 
 
@@ -75,10 +76,21 @@ def test_the_button_says_what_is_accepted_by_it(window, facts, passed, words, ab
     assert (window.chip.word, window.start.text(), window.start.isEnabled()) == (passed, words, able)
 
 
+def test_every_check_fits_in_a_small_screen(qtbot):
+    made = PreflightWindow(1000.0)
+    qtbot.addWidget(made)
+    made.show_view(view_of(replace(SCALED, withheld=dict.fromkeys(load("rek2024").liquids, 0.002))))
+    assert len(made.rows) == 12
+    made.resize(1200, 768)
+    made.show()
+    QApplication.processEvents()
+    assert made.findChild(QScrollArea).verticalScrollBar().maximum() == 0
+
+
 def test_a_warning_says_what_to_do(window):
     window.show_view(view_of(SCALED))
     row = next(row for row in window.rows if row.check.name == "Screen")
-    assert any("Use 100 %" in part.text() for part in row.findChildren(QLabel))
+    assert any("100 % scaling" in part.text() for part in row.findChildren(QLabel))
 
 
 @pytest.mark.parametrize("key", [Qt.Key.Key_Return, Qt.Key.Key_Enter])
@@ -135,10 +147,10 @@ def test_finishing_is_not_going_back(window):
 def test_what_will_run_and_how_true_it_is(window):
     rows = dict(view_of(WELL).rows)
     assert rows["Answers"] == "62"
-    assert rows["Force off the definition"] == WAITING
-    assert dict(view_of(WELL, error_n=0.004).rows)["Force off the definition"] == "< 0.01 N"
-    assert dict(view_of(WELL, error_n=0.031).rows)["Force off the definition"] == "0.03 N"
-    assert "Force off the definition" not in dict(view_of(WELL, asked_error=False).rows)
+    assert rows["Expected force error"] == WAITING
+    assert dict(view_of(WELL, error_n=0.004).rows)["Expected force error"] == "< 0.01 N"
+    assert dict(view_of(WELL, error_n=0.031).rows)["Expected force error"] == "0.03 N"
+    assert "Expected force error" not in dict(view_of(WELL, asked_error=False).rows)
     assert datetime.strptime(rows["Ends about"], "%H:%M").hour == 14
 
 
@@ -193,7 +205,25 @@ def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
         {"event": "trial_started", "trial": second, "attempt": 1},
     )
     rows = resumed_rows(protocol, schedule, [{**line, "t_s": float(at)} for at, line in enumerate(happened)])
-    assert rows == (("Goes on at", "Liquid setting 2, attempt\u00a02"), ("Kept", "2 of 8 answers"))
+    assert rows == (("Continues at", "Liquid setting 2, attempt\u00a02"), ("Kept", "2 of 8 answers"))
     window.show_view(view_of(WELL, goes_on=rows))
     assert {value.text() for value in window.values()} >= {"Liquid setting 2, attempt\u00a02", "2 of 8 answers"}
     assert "Kept" not in dict(view_of(WELL).rows)
+
+
+def test_a_haptic_device_is_asked_whether_its_motors_are_masked(qtbot) -> None:
+    assert PreflightWindow(2000.0).masking is None
+    window = PreflightWindow(2000.0, asks_masking=True)
+    qtbot.addWidget(window)
+    window.show()
+    asked = window.masking
+    assert asked is not None
+    assert asked.answer() == Masking("no")
+    assert not asked.noise_db.isVisible()
+    for _ in range(2):
+        qtbot.keyClick(asked.means, Qt.Key.Key_Down)
+    assert asked.noise_db.isVisible()
+    asked.noise_db.setValue(64)
+    assert asked.answer() == Masking("noise", 64)
+    qtbot.keyClick(asked.means, Qt.Key.Key_Up)
+    assert asked.answer().entry == {"means": "headphones", "noise_db": None}

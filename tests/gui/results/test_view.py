@@ -124,7 +124,7 @@ def test_leaving_out_wants_a_name_and_a_reason(place, qtbot):
     click(qtbot, place.exclusions.leave_out)
     dialog = place.dialog
     assert [dialog.trial.itemText(at) for at in range(3)] == [
-        "The whole session", "Trial 2: Part 1, L2", "Trial 3: Part 1, L1"
+        "Whole session", "Trial 2: Part 1, L2", "Trial 3: Part 1, L1"
     ]  # fmt: skip
     dialog.trial.setCurrentIndex(2)
     click(qtbot, dialog.go_on)
@@ -142,7 +142,7 @@ def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
     dialog = place.dialog
     said = " ".join(one.text() for one in dialog.findChildren(QLabel))
     assert "1 session is not complete" in said
-    assert "cannot be taken back" in said
+    assert "cannot be undone" in said
     dialog.by.setText("AK")
     qtbot.keyClick(dialog.by, Qt.Key.Key_Return)
     assert "reason" in dialog.missing.text()
@@ -167,7 +167,7 @@ def test_what_is_left_out_is_listed_the_last_first_with_its_reason(place, qtbot)
 def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
     place.show_view(replace(view(), left_out=(LEFT_OUT,)))
     back = place.exclusions.lines[0].findChild(ActionButton)
-    assert back.accessibleName() == "Take back: P003, trial 4"
+    assert back.accessibleName() == "Include again: P003, trial 4"
     click(qtbot, back)
     dialog = place.dialog
     click(qtbot, dialog.go_on)
@@ -251,7 +251,7 @@ def test_trouble_is_one_sentence_and_one_button(place, qtbot, remedy):
 
 def test_with_no_study_there_is_a_way_home_and_nothing_to_press_in_vain(qtbot):
     empty = replace(view(), studies=(), chosen=None, sessions=(), figures=(), sealed=None)
-    place = opened(qtbot, shown=replace(empty, trouble=Trouble("No study yet", "The first …", "Go to home", "home")))
+    place = opened(qtbot, shown=replace(empty, trouble=Trouble("No studies yet", "The first …", "Go to Home", "home")))
     assert not place.export.isEnabled()
     assert not place.report.isEnabled()
     assert not place.study.isVisible()
@@ -295,14 +295,16 @@ def test_a_figure_drawn_again_keeps_its_card_and_its_caption_can_be_read(place, 
 def test_figures_take_the_colours_of_the_theme(place, qtbot):
     drawing = place.figures.cards[0].drawing
     place.main.rail.theme_asked.emit()
-    qtbot.waitUntil(lambda: drawing.settled and drawing._image.pixelColor(3, 3).name() == DARK.surface.lower())
+    qtbot.waitUntil(
+        lambda: drawing.settled and drawing.grab().toImage().pixelColor(3, 3).name() == DARK.surface.lower()
+    )
 
 
 @pytest.mark.parametrize("size", [LEAST, QSize(1366, 768), QSize(1920, 1080)])
 def test_nothing_is_cut_off_sideways_and_figures_keep_their_proportions(qtbot, size):
     by = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed")
     place = opened(qtbot, size, replace(view(), opened=by, left_out=(LEFT_OUT,)))
-    inside, seen = place._area.widget(), place._area.viewport()
+    inside, seen = place.area.widget(), place.area.viewport()
 
     def fits():
         assert inside.width() <= seen.width()

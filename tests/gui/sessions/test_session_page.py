@@ -17,9 +17,11 @@ from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.begin import begin
-from study_app.viewmodels.session_record import MOTION_HIDDEN, read_record
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.viewmodels.session.record import MOTION_HIDDEN, read_record
 from study_app.viewmodels.sessions import sessions
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -38,14 +40,19 @@ def study(whole, tmp_path):
 def measured(study):
     """Hold a session with a trial that kept the limits and one that broke two, and a note on it."""
     with begin(
-        study, load("demo"), source_bytes("demo"), "P007", seed=1, operator="AK", language="en",
-        device={"name": "mouse"}, screens={}, simulated=False,
-    ) as store:  # fmt: skip
+        study,
+        load("demo"),
+        source_bytes("demo"),
+        SessionStart(
+            "P007", seed=1, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=False
+        ),
+    ) as store:
         which = {"block": "feeling", "phase": "main", "part": 1, "of": 2}
         for trial, (gap_ms, late_ms) in enumerate(((3.0, 0.2), (41.26, 2.5)), start=1):
             store.append("trial_started", trial=trial, attempt=1, index=trial, code=f"L{trial}", **which)
             fields = {"worst_gap_ms": gap_ms, "lateness_p99_ms": late_ms, "first_frame_gap_ms": 12.0}
             store.append("trial_ended", trial=trial, attempt=1, outcome="complete", **fields)
+        store.append("recording_lost", trial=1, attempt=1, reason="its thread ended")
         store.append("note", kind="note", text="phone rang")
         store.finish("completed")
     return StudyFolder(study).session("P007", 1).path
@@ -75,12 +82,17 @@ def test_a_page_says_which_trial_broke_which_limit_and_what_out_of_limits_means(
     assert page.limits.text().startswith("Out of limits: 1 of 2 measured trials broke a limit of the study.")
     assert "still count" in page.limits.text()
     assert [said(page, row, 3) for row in range(2)] == ["Valid", "Out of limits"]
+    page.trials.selectRow(0)
+    assert page.trial.text() == "Trial 1: within all limits. The recording was lost: its thread ended."
+    assert said(page, 0, 5) == "recording lost"
     page.trials.selectRow(1)
     assert page.trial.text() == (
         "Trial 2: lateness of ticks (99th percentile): 2.5 ms, limit 2 ms; "
         "longest time between two ticks: 41.3 ms, limit 20 ms."
     )
-    assert page.notes.text().endswith("trial 2: phone rang")
+    assert page.notes.text().endswith("trial 2: phone rang"), (
+        "though the loss of the recording before was reported later"
+    )
     assert "journal.jsonl" in page.files.text()
     page.folder.click()
     assert page.opened == [page.facts.folder]
@@ -88,9 +100,11 @@ def test_a_page_says_which_trial_broke_which_limit_and_what_out_of_limits_means(
 
 def test_choices_that_were_not_confirmed_stay_visible(qtbot, tmp_path):
     with begin(
-        tmp_path / "demo", load("demo"), source_bytes("demo"), "P007", seed=1, operator="", language="en",
-        device={"name": "mouse"}, screens={}, simulated=False,
-    ) as store:  # fmt: skip
+        tmp_path / "demo",
+        load("demo"),
+        source_bytes("demo"),
+        SessionStart("P007", seed=1, operator="", language="en", device={"name": "mouse"}, screens={}, simulated=False),
+    ) as store:
         which = {"block": "feeling", "phase": "main", "part": 1, "of": 2}
         for trial in (1, 2):
             store.append("trial_started", trial=trial, attempt=1, index=trial, code=f"L{trial}", **which)
@@ -105,7 +119,7 @@ def test_choices_that_were_not_confirmed_stay_visible(qtbot, tmp_path):
     page = page_of(qtbot, tmp_path / "demo")
     assert [said(page, row, 4) for row in range(2)] == ["1", "0 + 1?"]
     page.trials.selectRow(1)
-    assert page.trial.text().endswith("Chosen and not confirmed, so in no table: feels_liquid: 5.")
+    assert page.trial.text().endswith("Chosen but not confirmed, so not in any table: feels_liquid: 5.")
 
 
 def test_a_page_shows_the_motion_of_a_trial_once_it_may_be_seen(qtbot, study):

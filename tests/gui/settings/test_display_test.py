@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
-from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtCore import QPoint, QSize, Qt, QTimer
 from PySide6.QtGui import QColor
 
 from study_app.gui.participant.tank.photodiode_patch import PATCH
@@ -65,7 +65,7 @@ def test_the_patch_is_where_and_as_large_as_in_the_tank(test_page, qtbot):
     tank = TankWidget(task_page(), words("en"))
     qtbot.addWidget(tank)
     tank.resize(test_page.size())
-    tank._patch.lit = test_page.lit = True
+    tank.patch.lit = test_page.lit = True
     black = round(PATCH[0])
     area = (test_page.width() - black, test_page.height() - black, black, black)
     assert test_page.grab().toImage().copy(*area) == tank.grab().toImage().copy(*area)
@@ -84,6 +84,7 @@ def test_frames_are_counted_when_they_are_painted(test_page, clock):
     assert figures_words(None, 60.0) == ("–",) * 4
 
 
+@pytest.mark.slow
 def test_frames_are_asked_for_while_it_is_shown_and_no_longer(qtbot):
     made = DisplayTest("Screen 1", 60.0, least_s=0.05)
     qtbot.addWidget(made)
@@ -92,8 +93,8 @@ def test_frames_are_asked_for_while_it_is_shown_and_no_longer(qtbot):
     qtbot.waitUntil(lambda: made.times.figures() is not None)
     with qtbot.waitSignal(made.left):
         qtbot.keyClick(made, Qt.Key.Key_Escape)
-    assert not made.frames._timer.isActive()
-    assert not made.told.isActive()
+    assert not made.frames.findChild(QTimer).isActive()
+    assert not made.report_timer.isActive()
 
 
 def test_the_interval_is_typed_and_one_out_of_range_is_refused(test_page, qtbot):
@@ -132,7 +133,7 @@ def test_an_offset_that_cannot_be_is_refused_with_what_can(test_page, qtbot, mea
 
 def test_an_offset_of_another_screen_is_said_not_to_count():
     assert offset_words(OFFSET, "DP-1") == "23.5 ± 1.2 ms by photodiode, 2026-11-20."
-    assert "does not count here" in offset_words(OFFSET, "HDMI-1")
+    assert "not used here" in offset_words(OFFSET, "HDMI-1")
     assert offset_words(None, "DP-1").startswith("Not measured")
 
 
@@ -168,7 +169,7 @@ def test_nothing_stands_in_the_patchs_corner_and_no_word_is_cut(test_page, qtbot
     test_page.resize(size)
 
     def apart():
-        patch = test_page._patch()
+        patch = test_page.patch_area()
         for one in (*test_page.values, test_page.leave, test_page.offset, test_page.interval):
             place = one.geometry()
             place.moveTopLeft(one.mapTo(test_page, QPoint()))

@@ -69,7 +69,7 @@ def test_the_distance_is_typed_and_the_words_grow(place, qtbot):
     assert place.seen.sample.scale == 1.0
     show(place, MachineSettings(viewing_distance_mm=600))
     assert place.seen.sample.scale == pytest.approx(1.747, abs=0.001)
-    assert "1.75 times as designed" in place.seen.said.text()
+    assert "1.75 times the default size" in place.seen.said.text()
 
 
 def test_an_x_of_the_sample_is_as_high_as_the_settings_reckon(qapp):

@@ -83,8 +83,8 @@ def test_every_plot_has_a_name_and_a_sentence(qtbot, make):
 def test_a_motion_says_its_range(qtbot):
     plot = MotionPlot()
     qtbot.addWidget(plot)
-    plot.show_sentence("No recording of this trial.")
-    assert told_of(plot).text(QAccessible.Text.Description) == "No recording of this trial."
+    plot.show_sentence("This trial has no recording.")
+    assert told_of(plot).text(QAccessible.Text.Description) == "This trial has no recording."
 
 
 def test_a_chosen_answer_is_announced_as_checked(participant, monkeypatch):
@@ -98,7 +98,7 @@ def test_a_chosen_answer_is_announced_as_checked(participant, monkeypatch):
     monkeypatch.setattr(screen_reader.QAccessible, "updateAccessibility", update)
     participant.open_on()
     participant.show_page(questionnaire())
-    row = participant.widget.rows[0]
+    row = participant.widget.fields[0]
     QTest.keyClick(row, Qt.Key.Key_3)
     assert (QAccessible.Event.Focus, "3 Somewhat disagree", True) in told
     participant.close()

@@ -38,7 +38,7 @@ def test_the_labs_tank_is_painted_beside_the_window(qtbot, monkeypatch):
     qtbot.addWidget(tank)
     tank.resize(500, 301)
     tank.show()
-    qtbot.waitUntil(lambda: tank._still is not None)
+    qtbot.waitUntil(lambda: tank.still is not None)
     QApplication.processEvents()
     assert threads
     assert threading.main_thread() not in threads

@@ -59,7 +59,7 @@ def test_the_numbers_of_the_decades_do_not_touch(qtbot: Any, width: int, decades
     metrics = QFontMetricsF(axis.style["tickFont"])
     spans = [
         (plot.box.mapViewToScene(QPointF(at, 0)).x(), metrics.horizontalAdvance(text))
-        for at, text in axis._tickLevels[0]
+        for at, text in plot.ticks["bottom"]
     ]
     assert len(spans) >= 3
     for (left, wide), (right, next_wide) in itertools.pairwise(spans):

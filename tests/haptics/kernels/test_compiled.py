@@ -20,6 +20,8 @@ from study_app.haptics.kernels.compiled import (
 )
 from tests.haptics.scenes import COMPILED
 
+pytestmark = pytest.mark.slow
+
 about_compiled_code = pytest.mark.skipif(not COMPILED, reason="about compiled code")
 
 
@@ -85,7 +87,7 @@ def test_a_cache_that_a_program_begins_with_meanwhile_is_given_back(tmp_path: Pa
     (path,) = caches(tmp_path, [UNUSED_S * 9])
     seen_at = path.stat().st_mtime
     os.utime(path)
-    compiled._remove_cache(path, seen_at)
+    compiled.remove_cache(path, seen_at)
     assert (path / "haptics" / "tick.nbi").read_bytes() == b"x"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -154,7 +156,7 @@ def test_a_cache_that_cannot_be_written_is_kept_in_the_users_folder_with_a_word(
     at, said = said_at_start(tmp_path, {"NUMBA_CACHE_DIR": str(nowhere), "XDG_CACHE_HOME": str(tmp_path)})
     assert Path(at).parent == tmp_path / "liquid-study"
     assert Path(at).is_dir()
-    assert said == f"{nowhere} cannot be written: what is compiled is kept in {tmp_path / 'liquid-study'}\n"
+    assert said == f"{nowhere} cannot be written: compiled code is stored in {tmp_path / 'liquid-study'}\n"
 
 
 @about_user_cache
@@ -162,7 +164,7 @@ def test_where_nothing_can_be_kept_the_program_works_and_says_what_to_do(tmp_pat
     at, said = said_at_start(tmp_path, {"NUMBA_CACHE_DIR": str(nowhere), "XDG_CACHE_HOME": str(nowhere)})
     assert at == "None"
     assert len(said.splitlines()) == 1
-    assert "every start compiles anew" in said
+    assert "every start compiles again" in said
     assert "NUMBA_CACHE_DIR" in said
 
 

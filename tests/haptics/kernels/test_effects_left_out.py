@@ -9,7 +9,7 @@ from tests.haptics.scenes import ALL_EFFECTS, COMPILED, PLACES, POOL, Hand, scen
 TICKS = 1000 if COMPILED else 60
 ROWS = {"wake": ("elements", "segments"), "local_wake": ("cells",), "history": ("intervals", "exponentials")}
 THROUGH_DRAG = {"wake", "local_wake", "current"}
-EFFECTS = (*ALL_EFFECTS, "local_wake")
+EFFECTS = (*ALL_EFFECTS, "local_wake", "unsteady_drag")
 
 
 def without(effect):
@@ -22,7 +22,7 @@ def without(effect):
 def records_of(model, effect):
     """Return all memory of an effect."""
     records = [rows[effect] for rows in (model.liquids, model.liquid_states) if effect in rows.dtype.names]
-    return records + [getattr(model, name) for name in ROWS.get(effect, ())]
+    return records + [getattr(model.rows, name) for name in ROWS.get(effect, ())]
 
 
 def poison(record):
@@ -47,6 +47,7 @@ def test_the_memory_of_every_effect_is_known():
     assert all(records_of(pack(scene(POOL)), effect) for effect in EFFECTS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refilled", [False, True], ids=["packed", "refilled"])
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_an_effect_left_out_is_neither_read_nor_written(effect, refilled):
@@ -59,7 +60,7 @@ def test_an_effect_left_out_is_neither_read_nor_written(effect, refilled):
     for record in memory:
         poison(record)
     for place in stroke(TICKS):
-        felt_now, expected = hand.turn(place), clean.turn(place)
+        felt_now, expected = hand.tick(place), clean.tick(place)
         assert felt_now.tobytes() == expected.tobytes()
         assert np.isfinite(felt_now.force_n).all()
     assert any(sample.any() for sample in (felt_now.force_n, felt_now.velocity_mps))
@@ -69,7 +70,7 @@ def test_an_effect_left_out_is_neither_read_nor_written(effect, refilled):
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_an_effect_left_out_owns_no_rows(effect):
     model = pack(scene(without(effect)))
-    assert all(len(getattr(model, name)) == 0 for name in ROWS.get(effect, ()))
+    assert all(len(getattr(model.rows, name)) == 0 for name in ROWS.get(effect, ()))
 
 
 @pytest.mark.skipif(not COMPILED, reason="the servo exists compiled only")
@@ -83,7 +84,7 @@ def test_not_even_by_a_servo_that_has_memory_for_it(effect):
     servo = Servo(device, clock=VirtualClock())
     reader = servo.telemetry.reader()
     servo.load(scene(without(effect)))
-    model = servo._loop._slots[1]  # the spare one, which the first tick takes
+    model = servo.loop.slots[1]  # the spare one, which the first tick takes
     assert model.liquids[0].effects
     memory = records_of(model, effect)
     for record in memory:

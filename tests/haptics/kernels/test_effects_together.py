@@ -5,8 +5,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
+from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Channel, Drag, Uniform, Vortex
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import (
     COMPILED,
@@ -26,8 +27,8 @@ LAWS = ("constant", "schiller-naumann", "haider-levenspiel", "brown-lawler")
 
 def turned(vector, angle):
     """Return vectors (n, 3) turned about the vertical."""
-    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
-    return np.asarray(vector) @ turn.T
+    tick = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    return np.asarray(vector) @ tick.T
 
 
 @pytest.mark.skipif(not COMPILED, reason="seconds of motion are for compiled code")
@@ -49,6 +50,7 @@ def test_half_and_double_the_rate_feel_the_same(felt, rate_hz):
     assert np.quantile(error, 0.98 if len(felt.liquids) > 1 else 1.0) <= 0.02 * largest
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(30), deadline=None)
 @given(angle=st.floats(0, 2 * np.pi), seed=st.integers(0, 2**32 - 1), law=st.sampled_from(LAWS))
 @example(angle=np.pi / 2, seed=0, law="brown-lawler")
@@ -86,7 +88,9 @@ def test_turning_everything_about_the_vertical_turns_the_force(places, kind, ang
 @given(
     velocity=st.tuples(*[st.sampled_from([0.0, 5e-324, 1e-310, 1e-160, 1e-9, -1.0, 100.0])] * 3),
     law=st.sampled_from(LAWS),
-    effects=st.sampled_from([("drag",), ("drag", "added_mass", "history"), ("drag", "wake"), ("drag", "local_wake")]),
+    effects=st.sampled_from(
+        [("drag",), ("unsteady_drag",), ("drag", "added_mass", "history"), ("drag", "wake"), ("drag", "local_wake")]
+    ),
 )
 def test_the_smallest_and_the_fastest_motions_have_a_finite_force(velocity, law, effects):
     fields = {"effects": effects, "drag": Drag(law=law), "wake": POOL.wake, "local_wake": POOL.local_wake}

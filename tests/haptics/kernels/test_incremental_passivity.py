@@ -12,13 +12,13 @@ from study_app.haptics.kernels.incremental_passivity import (
     observe_incremental,
 )
 from study_app.haptics.kernels.passivity import HALVING_J, reduce_gain, reset_observer
-from study_app.haptics.model.layout import ACCOUNT, LIMITER_ENERGY, PARAMETERS, SAMPLE, records
+from study_app.haptics.model.layout import LIMITER_ENERGY, PARAMETERS, PASSIVITY, SAMPLE, records
 from tests.haptics.scenes import HONEY, Hand
 
 
 def balances(force_n, velocity_mps, period_s=1e-3):
     """Return the balance [J] after each of some samples along one axis."""
-    fast = records(ACCOUNT, 1)[0].fast
+    fast = records(PASSIVITY, 1)[0].fast
     begin_incremental(fast)
     found = []
     for one_n, one_mps in zip(force_n, velocity_mps, strict=True):
@@ -35,8 +35,8 @@ def test_a_force_along_a_fast_motion_owes_the_filtered_power(frequency_hz, perio
     omega = 2 * np.pi * frequency_hz
     wave = np.sin(omega * t_s)
     found = balances(2.0 * wave, 0.1 * wave, period_s)
-    kept, turn = np.exp(-CORNER_RADPS * period_s), np.exp(-1j * omega * period_s)
-    passed = np.abs(kept * (1 - turn) / (1 - kept * turn)) ** 4
+    kept, tick = np.exp(-CORNER_RADPS * period_s), np.exp(-1j * omega * period_s)
+    passed = np.abs(kept * (1 - tick) / (1 - kept * tick)) ** 4
     power_w = (found[len(t_s) // 2] - found[-1]) / 0.5
     assert power_w == pytest.approx(0.5 * 2.0 * 0.1 * passed - FORGIVEN_W, rel=0.02)
 
@@ -59,14 +59,14 @@ def test_a_swing_is_owed_for_although_the_motion_pays_more():
 
 
 def test_a_debt_beyond_the_allowance_lowers_the_gain():
-    parameters, account, sample = records(PARAMETERS, 1)[0], records(ACCOUNT, 1)[0], records(SAMPLE, 1)[0]
-    reset_observer(account)
+    parameters, passivity, sample = records(PARAMETERS, 1)[0], records(PASSIVITY, 1)[0], records(SAMPLE, 1)[0]
+    reset_observer(passivity)
     sample.device_force_n[0] = 4.0
-    account.fast.balance_j = -ALLOWANCE_J
-    reduce_gain(parameters, account, sample)
+    passivity.fast.balance_j = -ALLOWANCE_J
+    reduce_gain(parameters, passivity, sample)
     assert (sample.device_force_n[0], sample.limiters) == (4.0, 0)
-    account.fast.balance_j = -ALLOWANCE_J - HALVING_J
-    reduce_gain(parameters, account, sample)
+    passivity.fast.balance_j = -ALLOWANCE_J - HALVING_J
+    reduce_gain(parameters, passivity, sample)
     assert sample.device_force_n[0] == pytest.approx(2.0)
     assert sample.limiters == LIMITER_ENERGY
 
@@ -75,6 +75,6 @@ def test_the_tick_observes_the_force_of_one_tick_more_than_the_loop_is_late():
     hand = Hand(HONEY)
     hand.safety[0].delay_ticks = 1
     places = 0.005 * np.cos(200 * np.arange(60) * 1e-3)
-    sent = [hand.turn((place, 0.0, 0.0)).device_force_n[0] for place in places]
-    assert hand.safety[0].account.fast.force_n[0] == pytest.approx(sent[-4])
-    assert hand.safety[0].account.fast.velocity_mps[0] == pytest.approx((places[-1] - places[-2]) / 1e-3)
+    sent = [hand.tick((place, 0.0, 0.0)).device_force_n[0] for place in places]
+    assert hand.safety[0].passivity.fast.force_n[0] == pytest.approx(sent[-4])
+    assert hand.safety[0].passivity.fast.velocity_mps[0] == pytest.approx((places[-1] - places[-2]) / 1e-3)

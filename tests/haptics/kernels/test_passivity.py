@@ -19,9 +19,9 @@ STOKES_LAYER_KG = 3 * np.pi * 0.034**2 * np.sqrt(2 * 10.0 * 1400 / (2 * np.pi))
 SCENES = {**THESIS, "strong": STRONG}
 
 
-def account(hand):
-    """Return the energy account of a hand's servo."""
-    return hand.safety[0].account
+def passivity(hand):
+    """Return the passivity controller of a hand's servo."""
+    return hand.safety[0].passivity
 
 
 def storage_j(hand, sent_n, share=1 / 3, *, clamped=1.0):
@@ -41,9 +41,9 @@ def test_a_filtered_damper_gives_back_what_its_filter_stores_and_no_more():
         hand = Hand(scene(liquid(1000 if not viscous else 1.0, **drag), scale=1))
         hand.sweep(0.2, 300)
         sent_n = hand.sample[0].device_force_n.copy()
-        account(hand).balance_j = 10.0
-        hand.turn((0.2 * 0.301, 0.0, 0.0))
-        stored_j = account(hand).balance_j
+        passivity(hand).balance_j = 10.0
+        hand.tick((0.2 * 0.301, 0.0, 0.0))
+        stored_j = passivity(hand).balance_j
         assert stored_j == pytest.approx(storage_j(hand, sent_n, share), rel=1e-6)
         # v = v̂ + τ dv̂/dt: what F(v̂) takes beyond ∫F v̂ dt while v̂ rises from 0 is the storage
         speeds = np.linspace(0.0, hand.model.state[0].estimate_mps[0], 1001)
@@ -52,40 +52,41 @@ def test_a_filtered_damper_gives_back_what_its_filter_stores_and_no_more():
         assert stored_j == pytest.approx(9e-3 * np.trapezoid(forces, speeds), rel=2e-3)
 
 
-def test_the_account_is_the_work_of_the_force_really_sent_over_the_steps_of_the_hand():
+def test_the_balance_is_the_work_of_the_force_really_sent_over_the_steps_of_the_hand():
     hand = Hand(HONEY)
     places = np.array([[0.03 * np.cos(9 * t), 0.0, 0.03 * np.sin(9 * t)] for t in np.arange(0, 1, 1e-3)])
     balance_j, sent = 0.0, np.zeros(3)
     for k, place in enumerate(places):
-        clamped = account(hand).norm_share
-        sample = hand.turn(place)
+        clamped = passivity(hand).norm_share
+        sample = hand.tick(place)
         if k > 0:
             balance_j = min(balance_j - sent @ (place - places[k - 1]), storage_j(hand, sent, clamped=clamped))
-        assert account(hand).balance_j == pytest.approx(balance_j, abs=1e-15)
+        assert passivity(hand).balance_j == pytest.approx(balance_j, abs=1e-15)
         sent = sample.device_force_n.copy()
 
 
 def test_over_a_gap_the_mean_of_the_forces_sent_meanwhile_counts():
     hand = Hand(HONEY, faded_in=False)
     hand.sweep(0.2, 100)
-    account(hand).balance_j = 0.0
-    forces = [hand.turn((0.02, 0.0, 0.0)).device_force_n.copy()]
-    forces += [hand.turn(None).device_force_n.copy() for _ in range(3)]
-    hand.turn((0.0195, 0.0, 0.0))
-    assert account(hand).balance_j == pytest.approx(-np.mean(forces, axis=0)[0] * -0.0005)
-    assert account(hand).balance_j < 0
+    passivity(hand).balance_j = 0.0
+    forces = [hand.tick((0.02, 0.0, 0.0)).device_force_n.copy()]
+    forces += [hand.tick(None).device_force_n.copy() for _ in range(3)]
+    hand.tick((0.0195, 0.0, 0.0))
+    assert passivity(hand).balance_j == pytest.approx(-np.mean(forces, axis=0)[0] * -0.0005)
+    assert passivity(hand).balance_j < 0
 
 
+@pytest.mark.compiled
 def test_what_a_wake_can_return_is_four_27ths_of_c_u_cubed_over_its_length():
     hand = Hand(WATER)
     hand.sweep(0.3, 1000)
-    account(hand).balance_j = 1.0
+    passivity(hand).balance_j = 1.0
     sent_n = hand.sample[0].device_force_n.copy()
-    sample = hand.turn((0.3, 0.0, 0.0))
+    sample = hand.tick((0.3, 0.0, 0.0))
     u = np.linalg.norm(sample.wake_mps)
     reserve_j = 4 / 27 * 0.5 * 1000 * 0.47 * np.pi * 0.034**2 * u**3 * 1.7 / 10
     assert reserve_j > 0.1
-    assert account(hand).balance_j == pytest.approx(reserve_j + storage_j(hand, sent_n), rel=1e-9)
+    assert passivity(hand).balance_j == pytest.approx(reserve_j + storage_j(hand, sent_n), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -99,22 +100,22 @@ def test_what_a_wake_can_return_is_four_27ths_of_c_u_cubed_over_its_length():
 def test_what_moving_liquid_can_return_is_its_kinetic_energy(effects, inertia_kg):
     hand = Hand(scene(liquid(1400, viscosity_pa_s=10.0, effects=("drag", *effects)), scale=3))
     hand.sweep(0.3, 300)
-    account(hand).balance_j = 10.0
+    passivity(hand).balance_j = 10.0
     sent_n = hand.sample[0].device_force_n.copy()
-    v = hand.turn((0.09, 0.0, 0.0)).velocity_mps[0]
-    assert account(hand).balance_j == pytest.approx(0.5 * inertia_kg * v**2 / 3 + storage_j(hand, sent_n), rel=1e-9)
+    v = hand.tick((0.09, 0.0, 0.0)).velocity_mps[0]
+    assert passivity(hand).balance_j == pytest.approx(0.5 * inertia_kg * v**2 / 3 + storage_j(hand, sent_n), rel=1e-9)
 
 
 def test_a_wake_of_a_viscous_liquid_returns_a_quarter_of_its_resistance():
     viscous = liquid(1400, viscosity_pa_s=10.0, wake={"length": 500, "scaling": 600}, drag={"law": "brown-lawler"})
     hand = Hand(scene(viscous, scale=3))
     hand.sweep(0.1, 300)
-    account(hand).balance_j = 10.0
+    passivity(hand).balance_j = 10.0
     sent_n = hand.sample[0].device_force_n.copy()
-    u = np.linalg.norm(hand.turn((0.03, 0.0, 0.0)).wake_mps)
+    u = np.linalg.norm(hand.tick((0.03, 0.0, 0.0)).wake_mps)
     resistance_nspm = 3 * np.pi * 10 * 0.068 * laws.brown_lawler(1400 * u * 0.068 / 10)
     wake_j = 0.25 * resistance_nspm * u**2 * 0.5 / 3
-    assert account(hand).balance_j == pytest.approx(wake_j + storage_j(hand, sent_n, share=1 / 2), rel=1e-9)
+    assert passivity(hand).balance_j == pytest.approx(wake_j + storage_j(hand, sent_n, share=1 / 2), rel=1e-9)
 
 
 def test_the_reserve_is_that_of_the_last_sample_though_samples_were_lost():
@@ -122,46 +123,47 @@ def test_the_reserve_is_that_of_the_last_sample_though_samples_were_lost():
     hand.safety[0].delay_ticks = 0
     hand.sweep(0.2, 300)
     for _ in range(20):
-        hand.turn(None)
+        hand.tick(None)
     for k in range(1, 12):
-        hand.turn((0.06 + 1e-5 * k, 0.0, 0.0))
-    assert account(hand).stored_j.max() < 0.1 * storage_j(hand, (-8.0, 0.0, 0.0))
-    newest = [account(hand).stored_j[account(hand).turn - before] for before in (1, 2)]  # late by a tick at least
-    assert account(hand).reserve_j == pytest.approx(max(newest), rel=1e-9)
+        hand.tick((0.06 + 1e-5 * k, 0.0, 0.0))
+    assert passivity(hand).stored_j.max() < 0.1 * storage_j(hand, (-8.0, 0.0, 0.0))
+    newest = [passivity(hand).stored_j[passivity(hand).row - before] for before in (1, 2)]  # late by a tick at least
+    assert passivity(hand).reserve_j == pytest.approx(max(newest), rel=1e-9)
 
 
 def test_buoyancy_only_lends():
     ball = Body(density_kg_m3=300.0)
     hand = Hand(scene(liquid(1000, effects=("buoyancy",)), body=ball))
     for k in range(1, 500):
-        sample = hand.turn((0.0, 1e-4 * k, 0.0))
+        sample = hand.tick((0.0, 1e-4 * k, 0.0))
     assert sample.device_force_n[1] > 1.0
-    assert account(hand).balance_j == pytest.approx(0.0, abs=1e-12)
+    assert passivity(hand).balance_j == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.compiled
 def test_a_hand_that_drifts_with_a_current_does_no_work():
     river = liquid(1000, effects=("drag", "current"), current={"kind": "uniform", "velocity_mps": (1.0, 0.0, 0.0)})
     hand = Hand(scene(river, scale=10))
-    held = [hand.turn((0.0, 0.0, 0.0)) for _ in range(100)]
+    held = [hand.tick((0.0, 0.0, 0.0)) for _ in range(100)]
     assert held[-1].device_force_n[0] > 0.5
     hand.sweep(0.1, 300)
-    assert not any(hand.turn((0.03 + 2e-5 * k, 0.0, 0.0)).limiters & LIMITER_ENERGY for k in range(500))
-    assert account(hand).balance_j <= 0.2e-3
+    assert not any(hand.tick((0.03 + 2e-5 * k, 0.0, 0.0)).limiters & LIMITER_ENERGY for k in range(500))
+    assert passivity(hand).balance_j <= 0.2e-3
 
 
 def test_without_a_wake_and_a_filter_nothing_is_kept_for_later():
     hand = Hand(HONEY.model_copy(update={"velocity": Raw()}))
     hand.sweep(0.3, 500)
-    assert account(hand).balance_j == 0.0
+    assert passivity(hand).balance_j == 0.0
 
 
 def test_a_new_scene_owes_nothing_and_is_owed_nothing():
     hand = Hand(WATER)
     hand.sweep(0.3, 500)
-    assert account(hand).balance_j > 0
+    assert passivity(hand).balance_j > 0
     begin_scene(hand.safety[0])
     fresh = Hand(WATER)
-    assert account(hand).tobytes() == account(fresh).tobytes()
+    assert passivity(hand).tobytes() == passivity(fresh).tobytes()
 
 
 def pushed():
@@ -169,7 +171,7 @@ def pushed():
     hand = Hand(WATER)
     hand.sweep(0.3, 600)
     for _ in range(60):
-        hand.turn((0.18, 0.0, 0.0))
+        hand.tick((0.18, 0.0, 0.0))
     assert hand.sample[0].device_force_n[0] > 1.0
     return hand
 
@@ -178,16 +180,16 @@ def pushed():
 def test_a_debt_is_paid_by_damping_past_the_slew_limit_within_what_the_loop_bears(debt_j):
     hand = pushed()
     for k in range(20):
-        hand.turn((0.18 + 6e-5 * k, 0.0, 0.0))
-    account(hand).balance_j = -1e-3 - debt_j
-    account(hand).strongest_n, account(hand).longest_m = 8.0, 0.01
-    sent_n = hand.turn((0.18 + 6e-5 * 20, 0.0, 0.0)).device_force_n[0]
+        hand.tick((0.18 + 6e-5 * k, 0.0, 0.0))
+    passivity(hand).balance_j = -1e-3 - debt_j
+    passivity(hand).strongest_n, passivity(hand).longest_m = 8.0, 0.01
+    sent_n = hand.tick((0.18 + 6e-5 * 20, 0.0, 0.0)).device_force_n[0]
     assert hand.sample[0].limiters & LIMITER_ENERGY
-    owed_j = -1e-3 - min(account(hand).balance_j, account(hand).late_balance_j)
-    v = account(hand).velocity_mps[0]
+    owed_j = -1e-3 - min(passivity(hand).balance_j, passivity(hand).late_balance_j)
+    v = passivity(hand).velocity_mps[0]
     assert v == pytest.approx(0.06, rel=1e-3)
-    assert account(hand).gain == pytest.approx(0.125e-3 / (0.125e-3 + owed_j))
-    brake_n = min(owed_j / (1e-3 * v), 0.5 * account(hand).gain * 53 * v)
+    assert passivity(hand).gain == pytest.approx(0.125e-3 / (0.125e-3 + owed_j))
+    brake_n = min(owed_j / (1e-3 * v), 0.5 * passivity(hand).gain * 53 * v)
     slewed_n = hand.safety[0].slewed_n[0]
     assert slewed_n > 0
     assert sent_n == pytest.approx(slewed_n - (v / 0.04 - 1) * (slewed_n + brake_n), rel=1e-6)
@@ -196,43 +198,44 @@ def test_a_debt_is_paid_by_damping_past_the_slew_limit_within_what_the_loop_bear
 def test_a_brake_is_let_go_and_told_even_where_a_scene_begins_in_between():
     hand = pushed()
     for k in range(20):
-        hand.turn((0.18 + 1e-4 * k, 0.0, 0.0))
-    account(hand).balance_j = -1.1e-3
-    account(hand).strongest_n, account(hand).longest_m = 8.0, 0.01
-    braked_n = hand.turn((0.18 + 1e-4 * 20, 0.0, 0.0)).device_force_n[0]
+        hand.tick((0.18 + 1e-4 * k, 0.0, 0.0))
+    passivity(hand).balance_j = -1.1e-3
+    passivity(hand).strongest_n, passivity(hand).longest_m = 8.0, 0.01
+    braked_n = hand.tick((0.18 + 1e-4 * 20, 0.0, 0.0)).device_force_n[0]
     assert hand.safety[0].slewed_n[0] - braked_n > 0.5
     begin_scene(hand.safety[0])
-    after = hand.turn((0.18 + 1e-4 * 21, 0.0, 0.0))
+    after = hand.tick((0.18 + 1e-4 * 21, 0.0, 0.0))
     assert after.limiters & LIMITER_ENERGY
     assert abs(after.device_force_n[0] - hand.safety[0].slewed_n[0]) < 1e-12
-    assert hand.turn((0.18 + 1e-4 * 22, 0.0, 0.0)).limiters & LIMITER_ENERGY == 0
+    assert hand.tick((0.18 + 1e-4 * 22, 0.0, 0.0)).limiters & LIMITER_ENERGY == 0
 
 
 def test_what_is_left_is_not_spent_within_10_ms():
     hand = pushed()
     for k in range(20):
-        hand.turn((0.18 + 1e-4 * k, 0.0, 0.0))
-    account(hand).balance_j = account(hand).late_balance_j = -0.95e-3
-    sent_n = hand.turn((0.18 + 1e-4 * 20, 0.0, 0.0)).device_force_n[0]
-    left_j = 1e-3 + min(account(hand).balance_j, account(hand).late_balance_j)
+        hand.tick((0.18 + 1e-4 * k, 0.0, 0.0))
+    passivity(hand).balance_j = passivity(hand).late_balance_j = -0.95e-3
+    sent_n = hand.tick((0.18 + 1e-4 * 20, 0.0, 0.0)).device_force_n[0]
+    left_j = 1e-3 + min(passivity(hand).balance_j, passivity(hand).late_balance_j)
     assert left_j > 0
-    assert sent_n == pytest.approx(left_j / (0.02 * account(hand).velocity_mps[0]), rel=1e-6)
+    assert sent_n == pytest.approx(left_j / (0.02 * passivity(hand).velocity_mps[0]), rel=1e-6)
 
 
+@pytest.mark.compiled
 def test_a_swinging_loop_keeps_a_low_gain_for_seconds():
     hand = Hand(HONEY)
     whole_n = hand.sweep(0.05, 100)[-1].device_force_n[0]
-    account(hand).balance_j = -1e-3 - 0.375e-3
-    account(hand).strongest_n, account(hand).longest_m = 8.0, 0.01
-    hand.turn((0.005 + 5e-5, 0.0, 0.0))
-    account(hand).balance_j = account(hand).late_balance_j = 0.0
-    shares = [hand.turn((0.005 + 5e-5 * k, 0.0, 0.0)).device_force_n[0] / whole_n for k in range(2, 2502)]
+    passivity(hand).balance_j = -1e-3 - 0.375e-3
+    passivity(hand).strongest_n, passivity(hand).longest_m = 8.0, 0.01
+    hand.tick((0.005 + 5e-5, 0.0, 0.0))
+    passivity(hand).balance_j = passivity(hand).late_balance_j = 0.0
+    shares = [hand.tick((0.005 + 5e-5 * k, 0.0, 0.0)).device_force_n[0] / whole_n for k in range(2, 2502)]
     assert shares[10] == pytest.approx(0.25, rel=0.05)
     assert shares[1400] == pytest.approx(0.5, rel=0.05)
     assert all(before <= after + 1e-9 for before, after in itertools.pairwise(shares[20:]))
 
 
-def test_a_force_that_acts_late_is_accounted_late():
+def test_a_force_that_acts_late_is_counted_late():
     hand = Hand(HONEY)
     hand.safety[0].delay_ticks = 3
     places = np.array([0.005 * np.cos(200 * t) for t in np.arange(0, 0.1, 1e-3)])
@@ -242,47 +245,48 @@ def test_a_force_that_acts_late_is_accounted_late():
             late_n = sent[k - 4] if k >= 4 else 0.0
             balance_j = min(balance_j + 1e-6, -1e-3) if balance_j < -1e-3 else balance_j
             balance_j -= late_n * (place - places[k - 1])
-        clamped, before_n = account(hand).norm_share, (sent[k - 1] if k else 0.0, 0.0, 0.0)
-        gain = account(hand).gain  # this fast, a loop with such a delay is observed to swing
-        sent.append(hand.turn((place, 0.0, 0.0)).device_force_n[0])
+        clamped, before_n = passivity(hand).norm_share, (sent[k - 1] if k else 0.0, 0.0, 0.0)
+        gain = passivity(hand).gain  # this fast, a loop with such a delay is observed to swing
+        sent.append(hand.tick((place, 0.0, 0.0)).device_force_n[0])
         stored.append(gain * storage_j(hand, before_n, clamped=clamped))
         balance_j = min(balance_j, max(stored[k], stored[max(k - 3, 0)]))
-        assert account(hand).late_balance_j == pytest.approx(balance_j, abs=1e-12)
-    assert account(hand).late_balance_j < account(hand).balance_j
+        assert passivity(hand).late_balance_j == pytest.approx(balance_j, abs=1e-12)
+    assert passivity(hand).late_balance_j < passivity(hand).balance_j
 
 
-def test_a_loop_that_is_believed_not_to_be_late_is_accounted_as_one_that_is_late_by_a_tick():
+def test_a_loop_that_is_believed_not_to_be_late_is_counted_as_one_that_is_late_by_a_tick():
     hands = [Hand(HONEY), Hand(HONEY)]
     for hand, believed in zip(hands, (0, 1), strict=True):
         hand.safety[0].delay_ticks = believed
         for t in np.arange(0, 0.1, 1e-3):
-            hand.turn((0.005 * np.cos(200 * t), 0.0, 0.0))
-    late, later = ([getattr(account(hand), name) for hand in hands] for name in ("late_balance_j", "later_balance_j"))
+            hand.tick((0.005 * np.cos(200 * t), 0.0, 0.0))
+    late, later = ([getattr(passivity(hand), name) for hand in hands] for name in ("late_balance_j", "later_balance_j"))
     assert late[0] == late[1] > later[0] == later[1]
-    assert late[0] < account(hands[0]).balance_j
+    assert late[0] < passivity(hands[0]).balance_j
 
 
 def test_a_liquid_that_resists_enough_pays_its_debt_unchanged():
     hand = Hand(HONEY)
     felt = hand.sweep(0.2, 300)[-1].force_n[0]
-    account(hand).balance_j = -1e-3 + 0.0002 * felt * 0.999
-    sample = hand.turn((0.0602, 0.0, 0.0))
+    passivity(hand).balance_j = -1e-3 + 0.0002 * felt * 0.999
+    sample = hand.tick((0.0602, 0.0, 0.0))
     assert sample.device_force_n[0] == sample.force_n[0]
     assert sample.limiters == 0
-    hand.turn((0.0604, 0.0, 0.0))
-    assert account(hand).balance_j > -1e-3
+    hand.tick((0.0604, 0.0, 0.0))
+    assert passivity(hand).balance_j > -1e-3
 
 
 def test_in_debt_nothing_pushes_the_hand_on():
     hand = pushed()
     for k in range(20):
-        hand.turn((0.18 + 1e-4 * k, 0.0, 0.0))
+        hand.tick((0.18 + 1e-4 * k, 0.0, 0.0))
     assert hand.sample[0].device_force_n[0] > 0.0
-    account(hand).balance_j = -1.5e-3
-    hand.turn((0.18 + 1e-4 * 20, 0.0, 0.0))
+    passivity(hand).balance_j = -1.5e-3
+    hand.tick((0.18 + 1e-4 * 20, 0.0, 0.0))
     assert hand.sample[0].device_force_n[0] < 0.0
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("name", THESIS)
 @pytest.mark.parametrize("speed_mps", [0.05, 0.1, 0.2, 0.3] if COMPILED else [0.3])
 @pytest.mark.parametrize("motion", ["reach", "circle", "stop"])
@@ -300,12 +304,13 @@ def test_it_never_acts_where_people_move_as_they_do(name, speed_mps, motion):
         assert not (simulate(felt, measured).limiters & LIMITER_ENERGY).any()
 
 
+@pytest.mark.slow
 def test_no_hand_gets_more_than_one_steps_work_whatever_it_does_and_the_liquid_is_felt_again_after():
     """A hand that always goes where it is pushed, with steps of the greatest size that the door lets through."""
     hand = Hand(WATER)
     hand.sweep(0.3, 600)
     place, longest_m, strongest_n = np.array([0.18, 0.0, 0.0]), 0.0003, 0.0
-    strongest_n = account(hand).strongest_n
+    strongest_n = passivity(hand).strongest_n
     for _ in range(3000 if COMPILED else 300):
         sent = hand.sample[0].device_force_n
         size_n = np.linalg.norm(sent)
@@ -313,30 +318,31 @@ def test_no_hand_gets_more_than_one_steps_work_whatever_it_does_and_the_liquid_i
         step = 0.0099 * sent / size_n if size_n > 0 else np.zeros(3)
         place = place + step
         longest_m = max(longest_m, np.linalg.norm(step))
-        hand.turn(place)
-        assert account(hand).balance_j >= -1e-3 - strongest_n * longest_m
+        hand.tick(place)
+        assert passivity(hand).balance_j >= -1e-3 - strongest_n * longest_m
     felt_n = 0.0
     for k in range(16_000 if COMPILED else 0):
         place = place + np.array([0.0, 0.0, 0.0003 if k // 200 % 2 else -0.0003])
-        felt_n = np.linalg.norm(hand.turn(place).device_force_n)
-    assert account(hand).balance_j > -1e-3 or not COMPILED
+        felt_n = np.linalg.norm(hand.tick(place).device_force_n)
+    assert passivity(hand).balance_j > -1e-3 or not COMPILED
     assert felt_n > 1.0 or not COMPILED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 @settings(max_examples=examples(80), deadline=None)
 @given(data=st.data())
-def test_on_any_path_the_account_stays_above_minus_1_mj_and_the_work_of_one_step(name, data):
+def test_on_any_path_the_balance_stays_above_minus_1_mj_and_the_work_of_one_step(name, data):
     hand = Hand(SCENES[name], faded_in=data.draw(st.booleans()))
     span_m = data.draw(st.sampled_from([1e-5, 1e-4, 1e-3, 9e-3]))
     coordinate = st.floats(-1, 1)
     moves = st.tuples(coordinate, coordinate, coordinate, st.sampled_from(["wherever", "along", "against", "nothing"]))
     place, strongest_n, longest_m = np.zeros(3), 0.0, 0.0
-    last = hand.turn(place).device_force_n.copy()
+    last = hand.tick(place).device_force_n.copy()
     for x, y, z, kind in data.draw(st.lists(moves, min_size=1, max_size=80)):
         after_ns = data.draw(st.sampled_from([1_000_000, 1_000_000, 300_000, 4_000_000]))
         if kind == "nothing":
-            sample = hand.turn(None, after_ns=after_ns)
+            sample = hand.tick(None, after_ns=after_ns)
         else:
             step = span_m * np.array([x, y, z]) / 2
             if kind != "wherever" and np.linalg.norm(last) > 1e-9:
@@ -344,8 +350,8 @@ def test_on_any_path_the_account_stays_above_minus_1_mj_and_the_work_of_one_step
                     (np.linalg.norm(step) if kind == "along" else -np.linalg.norm(step)) * last / np.linalg.norm(last)
                 )
             place = place + step
-            sample = hand.turn(place, after_ns=after_ns)
-            longest_m = max(longest_m, account(hand).longest_m)
+            sample = hand.tick(place, after_ns=after_ns)
+            longest_m = max(longest_m, passivity(hand).longest_m)
         last = sample.device_force_n.copy()
-        assert account(hand).balance_j >= -1e-3 - strongest_n * longest_m - 1e-12
+        assert passivity(hand).balance_j >= -1e-3 - strongest_n * longest_m - 1e-12
         strongest_n = max(strongest_n, np.linalg.norm(last))

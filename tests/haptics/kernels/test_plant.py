@@ -241,7 +241,7 @@ def test_a_regular_pace_is_regular():
     assert [next_tick(pace) for _ in range(5)] == [1e-3] * 5
 
 
-def test_a_turn_is_late_but_its_deadlines_stay():
+def test_a_tick_is_late_but_its_deadlines_stay():
     pace = new_schedule(2e-3, jitter_s=0.5e-3)
     late_s = np.cumsum([next_tick(pace) for _ in range(5000)]) - 2e-3 * np.arange(1, 5001)
     assert late_s.min() >= -1e-12
@@ -250,12 +250,12 @@ def test_a_turn_is_late_but_its_deadlines_stay():
     assert late_s.std() == pytest.approx(0.5e-3 / math.sqrt(12), rel=0.05)
 
 
-def test_a_share_of_the_turns_does_not_come():
+def test_a_share_of_the_ticks_does_not_come():
     pace = new_schedule(1e-3, missed=0.2)
-    turns = np.array([next_tick(pace) for _ in range(5000)]) / 1e-3
-    assert turns == pytest.approx(np.rint(turns))
-    assert turns.mean() == pytest.approx(1 / 0.8, rel=0.03)
-    assert turns.max() > 2
+    ticks = np.array([next_tick(pace) for _ in range(5000)]) / 1e-3
+    assert ticks == pytest.approx(np.rint(ticks))
+    assert ticks.mean() == pytest.approx(1 / 0.8, rel=0.03)
+    assert ticks.max() > 2
 
 
 def test_another_seed_is_another_pace_and_the_same_seed_the_same():

@@ -9,6 +9,8 @@ from study_app.haptics.model.layout import STATUS_NON_FINITE
 from study_app.haptics.model.scene import Ewma, Foaw, Line, Raw
 from tests.haptics.scenes import BED, COMPILED, EVERYTHING, PLACES, POOL, THESIS, TICK_NS, Hand, examples, liquid, scene
 
+pytestmark = pytest.mark.slow
+
 ALL = {**THESIS, **EVERYTHING}
 ESTIMATORS = {"ewma": Ewma(), "line": Line(), "foaw": Foaw(), "raw": Raw()}
 LEG_TICKS = 40 if COMPILED else 8
@@ -43,7 +45,7 @@ def test_any_bytes_at_any_time_give_a_finite_force_within_the_limit(name, todo, 
     hand = Hand(ALL[name].model_copy(update={"velocity": ESTIMATORS[estimator]}), faded_in=faded_in)
 
     def turn(place, after_ns):
-        sample = hand.turn(place, after_ns=after_ns)
+        sample = hand.tick(place, after_ns=after_ns)
         assert np.isfinite(sample.device_force_n).all()
         assert np.linalg.norm(sample.device_force_n) <= 8 * (1 + 1e-12)
         assert sample.status != STATUS_NON_FINITE
@@ -92,7 +94,7 @@ def test_turning_a_hands_path_about_the_vertical_turns_all_that_is_felt(name, an
     felt = ROUND[name].model_copy(update={"velocity": ESTIMATORS[estimator]})
     straight, round_ = Hand(felt), Hand(felt)
     for place, other in zip(places, turned(places, angle), strict=True):
-        one, same = straight.turn(place), round_.turn(other)
+        one, same = straight.tick(place), round_.tick(other)
         assert same.limiters == one.limiters
         for field in ("velocity_mps", "wake_mps", "force_n", "device_force_n"):
             size = max(np.linalg.norm(one[field]), 1e-3)
@@ -120,6 +122,6 @@ STILL = {name: scene(liquid(wake=None, id=name)) for name in ("plain",)} | {
 def test_a_hand_that_has_not_moved_feels_nothing(name, place, after_ns, estimator):
     hand = Hand(STILL[name].model_copy(update={"velocity": ESTIMATORS[estimator]}))
     for ns in after_ns:
-        sample = hand.turn(place, after_ns=ns)
+        sample = hand.tick(place, after_ns=ns)
         for vector in (sample.velocity_mps, sample.wake_mps, sample.force_n, sample.device_force_n):
             assert not vector.any()

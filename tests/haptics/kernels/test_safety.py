@@ -20,7 +20,7 @@ from study_app.haptics.model.limits import (
     KALMAN_SLEW,
     LIGHTER,
     SLEW_N,
-    bearable,
+    damping_limits,
     refuses,
     slew_limit_n,
     slope_limit,
@@ -122,11 +122,12 @@ def test_the_table_has_every_estimator_period_and_delay_and_falls_with_delay():
     for entry in table():
         if entry.delay_ticks > 1:
             velocity = ESTIMATORS[entry.estimator] if entry.alpha is None else Ewma(alpha=entry.alpha)
-            before = bearable(entry.period_s, entry.delay_ticks - 1, velocity)
-            assert entry.bearable.drag_nspm <= before.drag_nspm
-        assert entry.bearable.inertia_nspm < entry.bearable.drag_nspm
+            before = damping_limits(entry.period_s, entry.delay_ticks - 1, velocity)
+            assert entry.limits.drag_nspm <= before.drag_nspm
+        assert entry.limits.inertia_nspm < entry.limits.drag_nspm
 
 
+@pytest.mark.compiled
 def test_added_mass_and_history_are_weakened_where_the_loop_bears_less():
     inert = scene(liquid(1400, viscosity_pa_s=10.0, effects=("added_mass", "history")), scale=3)
     t_s = np.arange(400) / 1000
@@ -142,16 +143,16 @@ def test_added_mass_and_history_are_weakened_where_the_loop_bears_less():
     assert (felt.limiters[100:] & LIMITER_SLOPE != 0).all()
 
 
-def test_the_slew_limit_does_not_remember_what_the_energy_account_added():
+def test_the_slew_limit_does_not_remember_what_the_passivity_controller_added():
     hand = Hand(WATER)
     hand.sweep(0.3, 600)
-    hand.safety[0].account.balance_j = -5e-3
-    hand.safety[0].account.longest_m = 0.01
-    braked = [hand.turn((0.18 - 0.0003 * k, 0.0, 0.0)) for k in range(1, 12)]
+    hand.safety[0].passivity.balance_j = -5e-3
+    hand.safety[0].passivity.longest_m = 0.01
+    braked = [hand.tick((0.18 - 0.0003 * k, 0.0, 0.0)) for k in range(1, 12)]
     assert any(size(sample.device_force_n) > size(hand.safety[0].slewed_n) for sample in braked[-1:])
-    hand.safety[0].account.balance_j = hand.safety[0].account.late_balance_j = 0.0
+    hand.safety[0].passivity.balance_j = hand.safety[0].passivity.late_balance_j = 0.0
     slewed = hand.safety[0].slewed_n.copy()
-    back = hand.turn((0.18 - 0.0003 * 12, 0.0, 0.0))
+    back = hand.tick((0.18 - 0.0003 * 12, 0.0, 0.0))
     assert size(back.device_force_n - slewed) <= 0.5 + 1e-12
     assert back.limiters & LIMITER_ENERGY
 
@@ -178,6 +179,7 @@ def test_a_drag_within_its_slope_is_sent_as_it_is():
     assert table.limiters[-1] == 0
 
 
+@pytest.mark.compiled
 def test_the_slope_is_that_of_the_relative_speed_so_a_push_is_left_alone():
     still = moving(np.concatenate([np.tile([3.0, 0, 0], (1500, 1)), np.zeros((30, 3))]))
     table = simulate(WATER, still)
@@ -214,7 +216,7 @@ def test_a_limit_that_is_lowered_holds_at_once():
     hand = Hand(HONEY)
     assert size(hand.sweep(0.2, 300)[-1].device_force_n) > 4
     hand.safety[0].device_limit_n = 1.0
-    assert size(hand.turn((0.0602, 0, 0)).device_force_n) == pytest.approx(1.0)
+    assert size(hand.tick((0.0602, 0, 0)).device_force_n) == pytest.approx(1.0)
 
 
 def test_the_force_changes_by_at_most_the_slew_limit_per_tick():
@@ -263,9 +265,9 @@ def test_after_an_energy_debt_the_force_changes_more_slowly():
     def steepest(gain):
         hand = Hand(WATER)
         hand.sweep(0.001, 50)
-        account = hand.safety[0].account
-        account.gain = gain
-        felt = [hand.turn((0.00005 + 0.002 * k, 0.0, 0.0)).device_force_n[0] for k in range(1, 60)]
+        passivity = hand.safety[0].passivity
+        passivity.gain = gain
+        felt = [hand.tick((0.00005 + 0.002 * k, 0.0, 0.0)).device_force_n[0] for k in range(1, 60)]
         return np.abs(np.diff(felt)).max()
 
     assert steepest(1.0) == pytest.approx(SLEW_N, rel=1e-3)
@@ -294,6 +296,22 @@ def test_a_change_of_scene_fades_in_over_50_ms_and_never_steps():
     assert (after[-1].device_force_n == after[-1].force_n).all()
 
 
+@pytest.mark.parametrize("fade_s", [0.05, 0.3, 2.0])
+def test_a_scene_fades_in_over_the_time_it_asks_for(fade_s):
+    hand = Hand(HONEY)
+    hand.sweep(0.1, 10)
+    hand.model = pack(HONEY.model_copy(update={"fade_s": fade_s}))
+    begin_scene(hand.safety[0])
+    faded = [bool(sample.limiters & LIMITER_FADE) for sample in hand.sweep(0.1, 2100)]
+    assert sum(faded) == pytest.approx(fade_s / 1e-3, abs=1)
+    assert all(faded[: sum(faded)])
+
+
+def test_after_a_start_no_scene_fades_in_faster_than_the_start():
+    hand = Hand(HONEY.model_copy(update={"fade_s": 0.05}), faded_in=False)
+    assert sum(bool(sample.limiters & LIMITER_FADE) for sample in hand.sweep(0.1, 700)) == pytest.approx(500, abs=1)
+
+
 def test_a_scene_during_the_start_fade_begins_it_again():
     hand = Hand(HONEY, faded_in=False)
     hand.sweep(0.2, 400)
@@ -320,14 +338,15 @@ def test_a_force_that_is_no_number_becomes_zero_and_a_status():
     hand = Hand(HONEY)
     hand.sweep(0.05, 100)
     hand.model.liquids[0].drag.factor_kg_m = np.nan
-    broken = hand.turn((0.00505, 0, 0))
+    broken = hand.tick((0.00505, 0, 0))
     assert broken.status == STATUS_NON_FINITE
     assert broken.limiters & LIMITER_NON_FINITE
     assert np.isfinite(broken.device_force_n).all()
     assert size(broken.device_force_n) < size(hand.sample[0].device_force_n) + 0.5
-    assert not hand.turn((0.0051, 0, 0)).device_force_n.any()
+    assert not hand.tick((0.0051, 0, 0)).device_force_n.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*THESIS, *EVERYTHING])
 @settings(max_examples=examples(60), deadline=None)
 @given(data=st.data())
@@ -339,7 +358,7 @@ def test_whatever_the_device_says_the_force_is_finite_within_its_limit_and_never
     with np.errstate(all="ignore"):
         for place in data.draw(st.lists(places, max_size=60)):
             after_ns = data.draw(st.sampled_from([1_000_000, 1_000_000, 0, 1, 3_000_000, 40_000_000]))
-            sample = hand.turn(place, after_ns=after_ns)
+            sample = hand.tick(place, after_ns=after_ns)
             sent = sample.device_force_n
             assert np.isfinite(sent).all()
             assert size(sent) <= 8 * (1 + 1e-12)

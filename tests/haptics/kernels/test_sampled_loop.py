@@ -31,6 +31,7 @@ def coast(handle, k_spm, speed_mps, ticks):
     return np.array(speeds)
 
 
+@pytest.mark.slow
 def test_quadratic_drag_that_is_held_for_a_tick_diverges_from_k_v_2_on():
     k_spm = 1e-3 * 0.85 / 0.1  # water on 0.1 kg: 235 m/s
     calm, wild = (coast(new_handle(mass_kg=0.1), k_spm, kv / k_spm, 9) for kv in (1.99, 2.01))
@@ -75,6 +76,7 @@ def passivity_multiplier(alpha, delay):
     return needed[worst], theta[worst] / (2 * np.pi) * 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("alpha", "delay", "multiplier"),
     [

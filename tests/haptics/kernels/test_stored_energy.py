@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.effects.added_mass import AddedMass
+from study_app.haptics.model.effects.history import History
 from study_app.haptics.model.layout import LIMITER_ENERGY
-from study_app.haptics.model.scene import AddedMass, Ewma, Given, History, Kalman, Scene
+from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene
 from study_app.haptics.runtime.pack import pack
 from study_app.validation.stability.withheld_force import MOST, QUICK, measure
 from tests.haptics.scenes import COMPILED, Hand, liquid
@@ -56,9 +58,9 @@ def test_inertia_holds_the_energy_of_the_velocity_as_smoothed(effect, inertia_kg
     speeds = np.concatenate([np.full(300, 0.3), np.linspace(0.3, 0.0, 30)])
     smoothed_mps, reserves_j, expected_j = 0.0, [], []
     for place_m in np.cumsum(speeds) * 1e-3:
-        v = hand.turn((place_m, 0.0, 0.0)).velocity_mps[0]
+        v = hand.tick((place_m, 0.0, 0.0)).velocity_mps[0]
         smoothed_mps += (1 - np.exp(-1 / 15)) * (v - smoothed_mps)
-        reserves_j.append(hand.safety[0].account.reserve_j)
+        reserves_j.append(hand.safety[0].passivity.reserve_j)
         expected_j.append(0.5 * share * inertia_kg * smoothed_mps**2 / 3)
     assert v < 0.2 * smoothed_mps
     assert reserves_j[-1] == pytest.approx(expected_j[-1], rel=0.1)  # by half a tick in 15 ms
@@ -69,7 +71,7 @@ def test_inertia_holds_the_energy_of_the_velocity_as_smoothed(effect, inertia_kg
 def test_a_quick_stroke_is_no_debt_of_the_added_mass():
     mass = Scene(scale=3, liquids=(liquid(1000, effects=("drag", "added_mass")),), velocity=Kalman())
     hand = Hand(mass, dynamics=MEASURED)
-    samples = [hand.turn((0.03 * np.cos(2 * np.pi * 5 * k / 1000), 0.0, 0.0)) for k in range(1000)]
+    samples = [hand.tick((0.03 * np.cos(2 * np.pi * 5 * k / 1000), 0.0, 0.0)) for k in range(1000)]
     assert not any(sample.limiters & LIMITER_ENERGY for sample in samples)
 
 

@@ -34,11 +34,12 @@ MANY = scene(
 SCENES = {**THESIS, "many": MANY, **EVERYTHING}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("felt", SCENES.values(), ids=SCENES)
 def test_the_servos_tick_and_simulate_are_the_same(felt):
     positions_m = stroke(1500)
     hand = Hand(felt)
-    live = [hand.turn(place) for place in positions_m]
+    live = [hand.tick(place) for place in positions_m]
     t_s = 1e-9 * (np.array([sample.time_ns for sample in live]) - live[0].time_ns)
     table = simulate(felt, Motion(t_s, felt.scale * positions_m))
     for kind, field in [("velocity", "velocity_mps"), ("wake", "wake_mps"), ("force", "force_n")]:
@@ -57,24 +58,24 @@ def test_rest_is_zero_force_and_the_velocity_is_known():
 
 def test_an_effect_left_out_owns_no_memory():
     model = pack(HONEY)
-    assert (len(model.elements), len(model.segments), elements_needed(HONEY)) == (0, 0, 0)
-    assert len(pack(LIGHT_OIL).elements) == elements_needed(LIGHT_OIL) == 125
+    assert (len(model.rows.elements), len(model.rows.segments), elements_needed(HONEY)) == (0, 0, 0)
+    assert len(pack(LIGHT_OIL).rows.elements) == elements_needed(LIGHT_OIL) == 125
     assert len(pack(Scene()).liquids) == 0
 
 
 def test_a_model_is_refilled_in_place_with_a_fresh_state():
     model = pack(WATER, capacity=2000)
-    memory = [field.ctypes.data for field in model]
+    memory = [field.ctypes.data for field in model.arrays]
     used = Hand(WATER)
     used.model = model
     for place in stroke(500):
-        used.turn(place)
+        used.tick(place)
     pack_into(model, LIGHT_OIL)
-    assert [field.ctypes.data for field in model] == memory
+    assert [field.ctypes.data for field in model.arrays] == memory
     again, fresh = Hand(LIGHT_OIL), Hand(LIGHT_OIL)
     again.model = model
     for place in stroke(500):
-        assert again.turn(place).tobytes() == fresh.turn(place).tobytes()
+        assert again.tick(place).tobytes() == fresh.tick(place).tobytes()
 
 
 def test_models_made_with_a_capacity_have_room_for_any_scene_within_it():
@@ -91,6 +92,7 @@ def test_two_models_do_not_share_memory():
     assert not second.model.state[0].position_m.any()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="the interpreter allocates all the time")
 @pytest.mark.parametrize("felt", [Scene(), *SCENES.values()], ids=["rest", *SCENES])
 def test_hazard_18_no_tick_allocates_so_no_collection_can_pause_it(felt):

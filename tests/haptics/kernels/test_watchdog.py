@@ -1,4 +1,4 @@
-"""The watchdog: turns that come late, or not at all, and a program that stands still beside the servo."""
+"""The watchdog: ticks that come late, or not at all, and a program that stands still beside the servo."""
 
 import ctypes
 import sys
@@ -20,13 +20,14 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.probe import Probe
-from tests.haptics.runtime.test_servo import HONEY, WATER, felt, force_n, is_zero, wait_until
+from tests.haptics.running import felt, force_n, is_zero, wait_until
+from tests.haptics.scenes import HONEY, WATER
 
 MS = 1_000_000
 
 
 class Bench:
-    """A servo on a virtual clock whose turns can be kept from coming, with a probe that moves."""
+    """A servo on a virtual clock whose ticks can be kept from coming, with a probe that moves."""
 
     def __init__(self):
         self.probe, self.clock = Probe(), VirtualClock()
@@ -34,13 +35,13 @@ class Bench:
         self.reader = self.servo.telemetry.reader()
 
     def be_late(self, late_ms):
-        """Let a turn come so late, and take it."""
-        self.clock._memory[0].now_ns += round((1 + late_ms) * MS)
+        """Let a tick come so late, and take it."""
+        self.clock.memory[0].now_ns += round((1 + late_ms) * MS)
         return self.servo.advance(1)
 
     @property
     def fade(self):
-        return float(self.servo._loop._safety[0].fade)
+        return float(self.servo.loop.safety[0].fade)
 
 
 @pytest.fixture
@@ -49,7 +50,7 @@ def bench():
 
 
 @pytest.mark.parametrize("late_ms", [0.5, 4.9])
-def test_a_turn_that_is_a_little_late_costs_nothing(bench, late_ms):
+def test_a_tick_that_is_a_little_late_costs_nothing(bench, late_ms):
     felt(bench.servo)
     bench.be_late(late_ms)
     assert bench.fade == 1.0
@@ -57,7 +58,7 @@ def test_a_turn_that_is_a_little_late_costs_nothing(bench, late_ms):
 
 
 @pytest.mark.parametrize("late_ms", [6.0, 14.0, 27.5, 49.0])
-def test_a_late_turn_finds_the_force_fading_as_without_samples(bench, late_ms):
+def test_a_late_tick_finds_the_force_fading_as_without_samples(bench, late_ms):
     felt(bench.servo)
     bench.reader.read()
     bench.be_late(late_ms)
@@ -84,7 +85,7 @@ def test_the_fade_is_the_one_that_silence_of_the_device_gets():
 
 
 @pytest.mark.parametrize("late_ms", [50.0, 300.0])
-def test_after_fifty_milliseconds_without_a_turn_the_force_is_zero_and_returns_as_at_a_start(bench, late_ms):
+def test_after_fifty_milliseconds_without_a_tick_the_force_is_zero_and_returns_as_at_a_start(bench, late_ms):
     felt(bench.servo)
     bench.reader.read()
     bench.be_late(late_ms)
@@ -92,7 +93,7 @@ def test_after_fifty_milliseconds_without_a_turn_the_force_is_zero_and_returns_a
     bench.servo.advance(250)
     assert bench.fade == pytest.approx(0.5, abs=0.01)
     forces = np.linalg.norm(bench.reader.read().device_force_n, axis=1)
-    assert forces[:17].min() <= 8 * 16 / 500, "0.5 N a turn, from 8 N at most"
+    assert forces[:17].min() <= 8 * 16 / 500, "0.5 N a tick, from 8 N at most"
     assert bench.servo.fault is None
 
 
@@ -106,14 +107,14 @@ def test_a_servo_that_hangs_in_its_device_says_so_and_has_let_go_when_it_returns
         assert servo.fault is None
         probe.state.hangs = 1
         wait_until(lambda: servo.fault is not None)
-        assert "no turn for 75 ms" in servo.fault
+        assert "no tick for 75 ms" in servo.fault
         assert not servo.force_is_on
-        with pytest.raises(ServoFault, match="no turn for 75 ms"):
+        with pytest.raises(ServoFault, match="no tick for 75 ms"):
             servo.check()
-        turns = probe.state.reads
+        ticks = probe.state.reads
         probe.state.hangs = 0
-        wait_until(lambda: probe.state.reads > turns + 2)
-        assert servo._loop._safety[0].fade < 0.1
+        wait_until(lambda: probe.state.reads > ticks + 2)
+        assert servo.loop.safety[0].fade < 0.1
     finally:
         probe.state.hangs = 0
         servo.stop()
@@ -131,6 +132,7 @@ def replayed(samples, scene):
     return again.device_force_n
 
 
+@pytest.mark.slow
 @pytest.mark.realtime
 @pytest.mark.skipif(sys.platform == "win32", reason="a sleep of POSIX")
 def test_five_seconds_in_which_python_stands_still_change_no_force():

@@ -3,23 +3,14 @@
 import numpy as np
 import pytest
 
-from study_app.haptics.model.bounds import REFERENCE, bounds
+from study_app.haptics.model.bounds import bounds
+from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
+from study_app.haptics.model.effects.drag import REFERENCE, Drag
+from study_app.haptics.model.effects.history import History
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.gate import calls_for, resolve
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import (
-    Body,
-    Box,
-    Channel,
-    Drag,
-    Given,
-    History,
-    Liquid,
-    MotionBox,
-    Scene,
-    Uniform,
-    Vortex,
-    Wake,
-)
+from study_app.haptics.model.scene import Body, Box, Given, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, vectors
 
@@ -97,6 +88,7 @@ def test_the_wandering_keeps_to_its_box_and_uses_it(motion):
     assert ACCELERATION_MPS2 * 0.99 < turns.max() <= ACCELERATION_MPS2 * (1 + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LIQUIDS)
 @pytest.mark.parametrize("current", CURRENTS)
 @pytest.mark.parametrize("effect", ALL)

@@ -8,23 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.haptics.model.bounds import bounds, lowered_mps, resistance_n, submerged
-from study_app.haptics.model.gate import calls_for, cheapest_law, describe_gate, resolve
-from study_app.haptics.model.scene import (
-    Accuracy,
-    Body,
-    Box,
-    Channel,
-    Cylinder,
-    Drag,
-    Knee,
-    Liquid,
-    MotionBox,
-    Scene,
-    Uniform,
-    Vortex,
-    Wake,
-)
+from study_app.haptics.model.bounds import Extremes, bounds, lowered_mps, submerged
+from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
+from study_app.haptics.model.effects.drag import Drag, cheapest_law, resistance_n
+from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.gate import calls_for, describe_gate, resolve
+from study_app.haptics.model.scene import Accuracy, Body, Box, Cylinder, Knee, Liquid, MotionBox, Scene
 
 LIQUIDS = {
     "water": (998.2, 1.0016e-3),
@@ -92,7 +81,7 @@ def test_bounds_are_those_of_the_published_table(name, speed_mps, drag_n, added_
     assert bound(scene, "buoyancy") == pytest.approx(buoyancy_n, rel=0.01)
 
 
-def test_a_current_is_bounded_by_the_drag_it_adds_and_its_shear_by_what_it_turns():
+def test_a_current_is_bounded_by_the_drag_it_adds_and_its_shear_by_what_it_ticks():
     still = stirred("water", 0.5)
     uniform = stirred("water", 0.5, current=Uniform(velocity_mps=(0.3, 0.0, 0.4)))
     liquid = uniform.liquids[0]
@@ -203,7 +192,7 @@ def test_what_is_resolved_is_named_valid_and_final(scene):
 @given(scene=scenes)
 def test_the_law_is_the_cheapest_within_the_target_at_every_speed(scene):
     liquid = scene.liquids[0]
-    law = cheapest_law(scene, liquid)
+    law = cheapest_law(Extremes(scene, liquid))
     if liquid.viscosity_pa_s is None:
         assert law == "constant"
         return
@@ -230,7 +219,7 @@ def test_the_law_is_the_cheapest_within_the_target_at_every_speed(scene):
 )
 def test_laws_of_the_real_liquids(name, speed_mps, law):
     scene = stirred(name, speed_mps)
-    assert cheapest_law(scene, scene.liquids[0]) == law
+    assert cheapest_law(Extremes(scene, scene.liquids[0])) == law
 
 
 def test_effects_that_are_named_stay_as_they_are():
@@ -257,7 +246,7 @@ def test_the_table_in_words():
     drag, buoyancy, added_mass, history = (line.split(maxsplit=4) for line in lines[2:6])
     assert drag[:4] == ["drag", "0.143", "5.9%", "in"]
     assert "schiller-naumann, within 5 % or 0.05 N of haider-levenspiel" in drag[4]
-    assert added_mass[3:] == ["out", "0.026 N left out in all, within 0.122 N"]
+    assert added_mass[3:] == ["out", "0.026 N omitted in total, within 0.122 N"]
     assert buoyancy[4].startswith("without it 2.06 N would be missing, more than 0.122 N")
     assert history[0] == "history"
     assert lines[6] == ""
@@ -268,7 +257,7 @@ def test_the_table_in_words():
 def test_the_cost_has_a_column_where_it_was_measured():
     scene = stirred("water", 0.1)
     lines = describe_gate(scene, {("water", "buoyancy"): 3.6})
-    assert lines[1].split() == ["effect", "bound", "[N]", "share", "ns", "a", "tick", "why"]
+    assert lines[1].split() == ["effect", "bound", "[N]", "share", "ns", "per", "tick", "why"]
     assert [line.split()[3] for line in lines[2:5]] == ["–", "4", "–"]
 
 
@@ -276,3 +265,51 @@ def test_neither_the_gate_nor_the_laws_load_the_compiler():
     code = "import sys, study_app.haptics.model.gate; print('numba' in sys.modules, 'numpy' in sys.modules)"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed.split() == ["False", "False"]
+
+
+def later(scene):
+    """Return the scene as of a file of format 2."""
+    return scene.model_copy(update={"format": 2})
+
+
+@pytest.mark.parametrize(
+    ("name", "speed_mps", "effects"),
+    [
+        ("honey", 0.1, ["buoyancy", "unsteady_drag"]),
+        ("olive_oil", 1.0, ["buoyancy", "unsteady_drag"]),  # Re 739
+        ("olive_oil", 1.4, ["drag", "buoyancy", "added_mass"]),  # Re 1035
+        ("water", 1.0, ["drag", "buoyancy", "added_mass"]),
+        ("water", 0.1, ["buoyancy"]),
+    ],
+)
+def test_in_format_2_unsteady_drag_is_taken_up_to_re_1000(name, speed_mps, effects):
+    assert taken(later(stirred(name, speed_mps))) == effects
+
+
+def test_the_reynolds_number_is_told_as_the_reason():
+    told = "\n".join(describe_gate(later(stirred("honey", 0.1))))
+    assert "unsteady drag instead: Re is up to 0.966, not over 1000" in told
+    told = "\n".join(describe_gate(later(stirred("water", 1.0))))
+    assert told.count("Re is up to 6.78e+04, over 1000: no solution of the flow confirms it") == 2
+
+
+def test_a_current_is_carried_by_unsteady_drag():
+    river = stirred("honey", 0.1, current=Uniform(velocity_mps=(0.2, 0.0, 0.0)))
+    assert taken(later(river)) == ["current", "buoyancy", "unsteady_drag"]
+    assert taken(river) == ["drag", "current", "buoyancy", "history"]
+
+
+def test_a_damper_and_a_liquid_without_viscosity_keep_drag():
+    damper = stirred("honey", 0.1, drag=Drag(law="linear", damping_nspm=3.0))
+    assert "unsteady_drag" not in bounds(later(damper), damper.liquids[0])
+    assert "drag" in taken(later(damper))
+    assert "drag" in taken(later(stirred("water", 1.0, viscosity_pa_s=None)))
+
+
+def test_what_is_named_is_counted_once():
+    """Of two models of the same thing one has a share of the force."""
+    for effects in (("drag", "added_mass"), ("unsteady_drag",)):
+        scene = later(stirred("honey", 0.5, effects=effects))
+        counted = {"unsteady_drag"} if "unsteady_drag" in effects else {"drag", "added_mass", "history"}
+        shares = {verdict.effect: verdict.share for verdict in calls_for(scene)}
+        assert sum(shares[name] for name in counted) + shares["buoyancy"] == pytest.approx(1)

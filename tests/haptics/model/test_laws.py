@@ -64,6 +64,7 @@ def test_the_speed_at_which_8_newtons_are_reached(law, liquid, speed):
     assert drag_n(law, 0.93 * speed, **liquid) < 8 < drag_n(law, 1.07 * speed, **liquid)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 @given(low=st.floats(0, 1e6), high=st.floats(0, 1e6))
 def test_faster_is_never_less(law, low, high):

@@ -5,8 +5,9 @@ import pytest
 from pydantic import BaseModel
 
 from study_app.errors import StudyError
+from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
 from study_app.haptics.model.overrides import override, override_all
-from study_app.haptics.model.scene import Box, Channel, Everywhere, Foaw, Line, Uniform, Vortex
+from study_app.haptics.model.scene import Box, Everywhere, Foaw, Line
 from tests.haptics.scenes import HONEY, LIGHT_OIL, POOL, WATER, scene
 
 FULL = scene(POOL)
@@ -75,6 +76,7 @@ def test_every_parameter_is_reached_by_its_table_and_most_by_their_name_alone(fe
     assert shared <= {
         *("density_kg_m3", "law", "centre_m", "viscosity_pa_s", "speed_mps", "acceleration_mps2", "depth_m", "reach_m"),
         *("length", "scaling", "exponent", "decay", "axes", "samples", "tolerance_m", "filter_s", "smoothing_s"),
+        "damping_nspm",
     }
 
 

@@ -5,6 +5,7 @@ from study_app.errors import StudyError
 from study_app.haptics.model.paths import NAMES, circle, line, path, reach, reverse, stop, zigzag
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("rate_hz", [500.0, 1000.0])
 def test_the_ideal_velocity_is_the_slope_of_the_place(name, rate_hz):

@@ -1,8 +1,9 @@
 import pytest
 from pydantic import ValidationError
 
-from study_app.haptics.model.layout import EFFECT_DRAG
-from study_app.haptics.model.scene import Body, Box, Everywhere, Given, Liquid, MotionBox, Scene, Wake
+from study_app.haptics.model.effects import drag
+from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.scene import Body, Box, Everywhere, Given, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import PLACES, POOL, WATER, liquid, scene
 
@@ -65,7 +66,7 @@ def test_any_effect_may_be_called_for_where_its_table_stands():
 def test_a_liquid_may_leave_the_choice_to_the_gate():
     left = Liquid(id="x", density_kg_m3=1000, viscosity_pa_s=1e-3, effects="auto")
     assert left.effects == "auto"
-    assert pack(Scene(liquids=(left,))).liquids[0].effects & EFFECT_DRAG
+    assert pack(Scene(liquids=(left,))).liquids[0].effects & drag.BIT
 
 
 @pytest.mark.parametrize(

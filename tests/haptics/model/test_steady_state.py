@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.layout import LIMITER_NORM, LIMITER_SLOPE
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Drag, Knee, Liquid, Scene
+from study_app.haptics.model.scene import Knee, Liquid, Scene
 from study_app.haptics.model.steady_state import steady
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, vectors
@@ -25,9 +26,9 @@ def scene_of(name, scale, law="brown-lawler"):
     return Scene(scale=scale, liquids=(liquid,))
 
 
-def sent(scene, hand_mps):
-    """Return the force [N] and the limiters after a second of even motion of the hand."""
-    t_s = np.arange(1000) / 1000
+def sent(scene, hand_mps, lasting_s=1):
+    """Return the force [N] and the limiters after an even motion of the hand, a second by default."""
+    t_s = np.arange(1000 * lasting_s) / 1000
     x_m = scene.scale * hand_mps * t_s
     table = simulate(scene, Motion(t_s, np.column_stack([x_m, 0 * x_m, 0 * x_m])))
     return float(np.linalg.norm(vectors(table, "device")[-1])), int(table.limiters[-1])
@@ -46,6 +47,18 @@ def test_what_is_foretold_is_what_the_servo_sends(name, scale, hand_mps):
         if limiters & LIMITER_NORM and limiters & LIMITER_SLOPE:
             acted = "norm"
         assert foretold.limit == acted
+
+
+@pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+@pytest.mark.parametrize("name", ["gear_oil", "honey", "tar"])
+def test_of_unsteady_drag_what_is_foretold_comes_once_its_history_is_over(name):
+    liquid = Liquid(id=name, density_kg_m3=890, viscosity_pa_s={"gear_oil": 0.35, "honey": 10, "tar": 100}[name])
+    scene = Scene(scale=3, liquids=(liquid.model_copy(update={"effects": ("unsteady_drag",)}),), format=2)
+    foretold = steady(scene)
+    force_n, limiters = sent(scene, 0.1, lasting_s=30)
+    assert foretold.force_n == pytest.approx(force_n, rel=0.01)
+    assert (foretold.limit == "slope") == bool(limiters & LIMITER_SLOPE)
+    assert (foretold.limit == "slope") == (name == "tar")
 
 
 def test_the_limits_that_the_cases_above_meet():

@@ -110,6 +110,7 @@ def test_histories_and_local_wakes_begin_anew(name: str) -> None:
     assert built_alike(EVERYTHING[name], EVERYTHING[name]) is not bool(effects & {"history", "local_wake"})
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(st.lists(st.tuples(st.sampled_from([1.0, 100.0, 4000.0, 25000.0]), st.integers(1, 60)), min_size=1, max_size=30))
 def test_however_the_numbers_are_thrown_about_the_hand_gets_back_no_more_than_it_put_in(
@@ -131,7 +132,7 @@ def test_however_the_numbers_are_thrown_about_the_hand_gets_back_no_more_than_it
     device.close()
 
 
-def test_a_scene_and_numbers_handed_over_in_one_turn_are_both_taken() -> None:
+def test_a_scene_and_numbers_handed_over_in_one_tick_are_both_taken() -> None:
     servo, device = going_round(WATER)
     oil = load_scene("rek2024", "light_oil")
     servo.adjust(override_all(WATER, {"density_kg_m3": 2000.0}))

@@ -57,6 +57,7 @@ def test_figure_4_the_liquid_follows_and_the_drag_falls_as_the_square_of_a_line(
     assert (opposing < 0).all()
 
 
+@pytest.mark.compiled
 def test_figure_4_after_the_stop_the_liquid_pushes_on_and_comes_to_rest(circles):
     motion, moving_rows = circles
     force = vectors(simulate(FIGURE_TANK, motion), "force")
@@ -69,18 +70,20 @@ def test_figure_4_after_the_stop_the_liquid_pushes_on_and_comes_to_rest(circles)
     assert size(push[:4900]).min() > 0
 
 
+@pytest.mark.compiled
 def test_figure_5_turning_against_the_flow_meets_more_than_plain_drag():
     motion = reverse(1000.0)
     table = simulate(FIGURE_TANK, motion)
     force, v = vectors(table, "force"), motion.velocity_mps
-    turn = int(np.argmax(share_along(v[1:], v[:-1]) < 0)) + 1
-    assert size(force[turn : turn + 1])[0] > 3 * INITIAL_N
-    assert force[turn] @ v[turn] < 0
+    tick = int(np.argmax(share_along(v[1:], v[:-1]) < 0)) + 1
+    assert size(force[tick : tick + 1])[0] > 3 * INITIAL_N
+    assert force[tick] @ v[tick] < 0
     stop = int(np.argmin(size(v) > 0))
     assert size(force[stop : stop + 1])[0] > size(force[-1:])[0] == 0
 
 
-def test_figure_6_a_breaking_angle_above_the_turns_lets_the_force_fall_further():
+@pytest.mark.compiled
+def test_figure_6_a_breaking_angle_above_the_ticks_lets_the_force_fall_further():
     motion = zigzag(1000.0)
     broken = size(vectors(simulate(FIGURE_TANK, motion), "force"))
     whole = size(vectors(simulate(override_all(FIGURE_TANK, {"breaking_angle_deg": 100}), motion), "force"))
@@ -96,6 +99,7 @@ def test_figure_7_a_coarser_resolution_fills_more_slowly():
     assert final[2] < final[1] < final[0] < 0
 
 
+@pytest.mark.compiled
 def test_figure_8_a_higher_exponent_builds_slowly_and_gives_way_near_the_end():
     motion = line(1000.0, moving_s=5.0)
     drags = {y: -simulate(override_all(FIGURE_TANK, {"exponent": y, "decay": 1}), motion).fx_n for y in (0.25, 1, 4)}

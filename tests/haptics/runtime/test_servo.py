@@ -1,84 +1,28 @@
-import gc
+"""The servo's loop on a virtual clock: deterministic, without allocation, one scene at a time."""
+
 import math
-import signal
-import subprocess
-import sys
-import threading
-import time
-import weakref
 from random import Random
 
-import numba
 import numpy as np
 import pytest
-
-if numba.config.DISABLE_JIT:
-    pytest.skip("the servo exists compiled only", allow_module_level=True)
-
 from numba.core.runtime import _nrt_python, rtsys
 
 from study_app.devices.scripted import ScriptedDevice
-from study_app.errors import DeviceLost, ServoFault, StudyError
+from study_app.errors import StudyError
 from study_app.haptics.kernels.loop import run
 from study_app.haptics.model.layout import (
-    BUTTON_STOP,
     LIMITER_FADE,
-    LIMITER_STOP,
-    STATUS_DEVICE_LOST,
-    STATUS_NON_FINITE,
-    STATUS_OK,
-    STATUS_STALE_FAULT,
 )
-from study_app.haptics.model.scene import Liquid, Scene, Wake
+from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import HISTORY, timing
-from tests.haptics.probe import PROBE, Probe
+from tests.compiled import needs_servo
+from tests.haptics.probe import Probe
+from tests.haptics.running import is_zero
+from tests.haptics.scenes import HONEY, WATER
 
-WATER = Scene(
-    liquids=(
-        Liquid(
-            id="water",
-            density_kg_m3=1000,
-            effects=("drag", "wake"),
-            wake=Wake(length=1700, scaling=1700, exponent=0.75),
-        ),
-    )
-)
-HONEY = Scene(liquids=(Liquid(id="honey", density_kg_m3=1400),))
-
-
-@pytest.fixture
-def probe():
-    return Probe()
-
-
-@pytest.fixture
-def servo(probe):
-    return Servo(probe, clock=VirtualClock())
-
-
-def wait_until(condition, limit_s=30.0):
-    """Wait for another thread; a test that needs it fails rather than hangs."""
-    waiting, end = threading.Event(), time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        waiting.wait(0.001)
-
-
-def force_n(telemetry):
-    """Return the size of the force sent last [N]."""
-    latest = telemetry.latest()
-    return 0.0 if latest is None else np.linalg.norm(latest.device_force_n)
-
-
-def scene_of(telemetry):
-    latest = telemetry.latest()
-    return None if latest is None else latest.scene
-
-
-def is_zero(force):
-    return not np.any(force)
+pytestmark = needs_servo
 
 
 # the loop is one deterministic function
@@ -90,8 +34,8 @@ def scripted_session(*pieces):
     reader = servo.telemetry.reader()
     servo.load(WATER)
     device.reach_to(0.03, 0.01, -0.02)
-    for turns in pieces:
-        assert servo.advance(turns) == turns
+    for ticks in pieces:
+        assert servo.advance(ticks) == ticks
     samples = reader.read()
     servo.stop()
     return samples
@@ -107,7 +51,7 @@ def test_advancing_in_pieces_is_advancing_at_once():
     assert scripted_session(1, 16, 17, 966).tobytes() == scripted_session(1000).tobytes()
 
 
-def test_a_turn_comes_every_period_of_its_clock(servo):
+def test_a_tick_comes_every_period_of_its_clock(servo):
     reader = servo.telemetry.reader()
     servo.advance(50)
     samples = reader.read()
@@ -131,13 +75,13 @@ def counted_allocations():
 
 
 @pytest.mark.usefixtures("counted_allocations")
-def test_a_thousand_turns_allocate_nothing(servo):
+def test_a_thousand_ticks_allocate_nothing(servo):
     servo.load(WATER)
     servo.advance(1)
 
-    def allocations(turns):
+    def allocations(ticks):
         before = rtsys.get_allocation_stats()
-        servo.advance(turns)
+        servo.advance(ticks)
         return rtsys.get_allocation_stats().alloc - before.alloc
 
     assert allocations(1001) == allocations(1)
@@ -207,8 +151,8 @@ def test_rest_takes_the_force_to_zero_without_a_step(servo, probe):
 
 
 def test_a_reloaded_scene_begins_afresh():
-    def first_second(servo, turns_before):
-        servo.advance(turns_before)
+    def first_second(servo, ticks_before):
+        servo.advance(ticks_before)
         servo.load(WATER)
         reader = servo.telemetry.reader()
         servo.advance(1000)
@@ -245,167 +189,6 @@ def test_the_force_stays_within_what_the_device_bears(probe):
     assert sizes.max() == pytest.approx(1.5)
 
 
-# the force ends
-
-
-def felt(servo, scene=HONEY):
-    """Bring the servo to where a force is felt."""
-    servo.load(scene)
-    servo.advance(1000)
-    assert force_n(servo.telemetry) > 1
-
-
-def test_a_force_stop_is_zero_on_the_next_tick(servo, probe):
-    felt(servo)
-    servo.stop_force()
-    assert not servo.force_is_on
-    servo.advance(1)
-    assert is_zero(probe.forces_n[-1])
-    assert servo.telemetry.latest().limiters & LIMITER_STOP
-    servo.advance(1000)
-    assert is_zero(probe.forces_n[-1000:])
-
-
-def test_the_stop_button_of_the_device_is_heard_by_the_servo_itself(servo, probe):
-    felt(servo)
-    probe.state.buttons = BUTTON_STOP
-    servo.advance(1)
-    assert is_zero(probe.forces_n[-1])
-    assert not servo.force_is_on
-    probe.state.buttons = 0
-    servo.advance(1000)
-    assert is_zero(probe.forces_n[-1000:])
-
-
-def test_after_a_force_stop_the_force_fades_in_as_at_the_start(servo, probe):
-    felt(servo)
-    full = np.linalg.norm(probe.forces_n[-1])
-    servo.stop_force()
-    servo.advance(100)
-    servo.fade_in()
-    assert servo.force_is_on
-    servo.advance(600)
-    sizes = np.linalg.norm(probe.forces_n[-600:], axis=1)
-    assert sizes[249] == pytest.approx(full / 2, rel=0.02)
-    assert sizes[-1] == pytest.approx(full, rel=0.01)
-
-
-def test_a_force_stop_outlasts_a_change_of_scene(servo, probe):
-    felt(servo)
-    servo.stop_force()
-    servo.load(WATER)
-    servo.advance(200)
-    assert is_zero(probe.forces_n[-200:])
-
-
-def test_stopping_writes_zero(servo, probe):
-    felt(servo)
-    servo.stop()
-    assert is_zero(probe.forces_n[-1])
-
-
-def test_an_exception_in_the_host_ends_in_zero_force(probe):
-    def host():
-        with Servo(probe, clock=VirtualClock()) as servo:
-            felt(servo)
-            raise RuntimeError("host")
-
-    with pytest.raises(RuntimeError, match="host"):
-        host()
-    assert is_zero(probe.forces_n[-1])
-
-
-def test_a_servo_nobody_holds_ends_in_zero_force(probe):
-    servo = Servo(probe, clock=VirtualClock())
-    felt(servo)
-    gone = weakref.ref(servo)
-    del servo
-    gc.collect()
-    assert gone() is None
-    assert is_zero(probe.forces_n[-1])
-
-
-def test_a_stopped_servo_starts_again_at_rest_and_fades_in(servo, probe):
-    felt(servo)
-    servo.stop()
-    written = len(probe.forces_n)
-    servo.advance(100)
-    assert servo.telemetry.latest().scene == 0
-    assert is_zero(probe.forces_n[written:])
-    servo.load(HONEY)
-    servo.advance(250)
-    assert 0.2 < np.linalg.norm(probe.forces_n[-1]) < 4
-
-
-def test_stopping_twice_writes_nothing_more(servo, probe):
-    felt(servo)
-    servo.stop()
-    written = len(probe.forces_n)
-    servo.stop()
-    assert len(probe.forces_n) == written
-
-
-# faults
-
-
-@pytest.mark.parametrize("way", ["lost_at_read", "lost_at_write"])
-def test_a_lost_device_ends_the_loop_in_zero_force(servo, probe, way):
-    felt(servo)
-    probe.state[way] = probe.state.reads + 11
-    assert servo.advance(100) == 11
-    assert is_zero(probe.forces_n[-1])
-    assert servo.telemetry.latest().status == STATUS_DEVICE_LOST
-    assert servo.advance(100) == 0
-    assert not servo.force_is_on
-    assert "'probe' stopped answering" in servo.fault
-    with pytest.raises(DeviceLost, match="plug it in again"):
-        servo.check()
-    with pytest.raises(DeviceLost):
-        servo.load(WATER)
-    servo.rest()
-
-
-def test_after_a_loss_the_servo_can_be_started_anew(servo, probe):
-    felt(servo)
-    probe.state.lost_at_read = probe.state.reads + 1
-    servo.advance(10)
-    probe.state.lost_at_read = 1 << 60
-    servo.stop()
-    assert servo.advance(10) == 10
-    assert servo.fault is None
-    felt(servo)
-
-
-def test_a_device_without_news_for_50_ms_is_a_fault(servo, probe):
-    felt(servo)
-    probe.state.silent_from_read = probe.state.reads + 1
-    assert servo.advance(1000) == 50
-    assert servo.telemetry.latest().status == STATUS_STALE_FAULT
-    assert is_zero(probe.forces_n[-1])
-    with pytest.raises(ServoFault, match="nothing usable for 50 ms"):
-        servo.check()
-
-
-def test_a_force_that_is_no_number_is_never_written(servo, probe):
-    felt(servo)
-    for model in servo._loop._slots:
-        model.liquids.drag.factor_kg_m = np.nan
-    assert servo.advance(100) == 1
-    assert servo.telemetry.latest().status == STATUS_NON_FINITE
-    assert is_zero(probe.forces_n[-1])
-    assert np.isfinite(probe.forces_n).all()
-    with pytest.raises(ServoFault, match="not a finite number"):
-        servo.check()
-
-
-def test_one_position_that_is_no_number_is_passed_over(servo, probe):
-    felt(servo)
-    probe.state.bad_at_read = probe.state.reads + 5
-    assert servo.advance(100) == 100
-    assert servo.telemetry.latest().status == STATUS_OK
-    assert np.isfinite(probe.forces_n).all()
-
-
 # time
 
 
@@ -424,7 +207,7 @@ def test_a_gap_is_passed_over_and_not_made_up_for(probe):
     assert (np.diff(samples.time_ns) >= 600_000).all()
 
 
-def test_a_turn_that_is_only_a_little_late_costs_no_deadline(probe):
+def test_a_tick_that_is_only_a_little_late_costs_no_deadline(probe):
     clock = VirtualClock()
     servo = Servo(probe, clock=clock)
     reader = servo.telemetry.reader()
@@ -436,145 +219,12 @@ def test_a_turn_that_is_only_a_little_late_costs_no_deadline(probe):
 
 def test_a_reader_that_comes_too_late_counts_what_it_missed(servo):
     reader = servo.telemetry.reader()
-    turns = HISTORY + 5000
-    servo.advance(turns)
+    ticks = HISTORY + 5000
+    servo.advance(ticks)
     samples = reader.read()
-    assert reader.dropped == turns - samples.size > 0
-    assert samples.tick[-1] == turns - 1
+    assert reader.dropped == ticks - samples.size > 0
+    assert samples.tick[-1] == ticks - 1
     assert (np.diff(samples.tick) == 1).all()
     servo.advance(7)
     assert reader.read().size == 7
-    assert reader.dropped == turns - samples.size
-
-
-# in a thread of its own
-
-
-def test_the_thread_turns_while_python_computes_and_ends_when_told(probe):
-    with Servo(probe) as servo:
-        reader = servo.telemetry.reader()
-        assert servo.load(HONEY) == 1
-        wait_until(lambda: scene_of(servo.telemetry) == 1)
-        wait_until(lambda: force_n(servo.telemetry) > 0.1)
-        assert servo.now_ns() >= servo.telemetry.latest().time_ns
-        assert servo.describe()["priority"].split()[0] in {"real-time", "raised", "normal"}
-        assert servo.describe()["delay_ticks"] == servo.delay_ticks == servo.dynamics.delay_ticks(servo.rate_hz)
-        samples = reader.read()
-    assert (samples.lateness_ns >= 0).all()
-    assert is_zero(probe.forces_n[-1])
-    assert not any(thread.name == "servo" for thread in threading.enumerate())
-
-
-def test_scenes_loaded_faster_than_ticks_all_arrive_whole(probe):
-    with Servo(probe) as servo:
-        reader = servo.telemetry.reader()
-        serials = [servo.load(scene) for scene in (WATER, HONEY) * 10]
-        wait_until(lambda: scene_of(servo.telemetry) == serials[-1])
-        assert set(serials) <= set(reader.read().scene.tolist())
-
-
-def test_a_thread_can_be_stopped_and_started_again(probe):
-    servo = Servo(probe)
-    for _ in range(2):
-        turns = int(servo.telemetry.written[0])
-        servo.start()
-        servo.load(HONEY)
-        wait_until(lambda turns=turns: servo.telemetry.written[0] > turns + 20)
-        servo.stop()
-        assert is_zero(probe.forces_n[-1])
-    assert servo.fault is None
-
-
-def test_a_lost_device_is_told_to_the_host(probe):
-    probe.state.lost_at_read = 20
-    with Servo(probe) as servo:
-        wait_until(lambda: servo.fault is not None)
-        with pytest.raises(DeviceLost):
-            servo.check()
-    assert is_zero(probe.forces_n[-1])
-
-
-def test_a_thread_nobody_holds_ends_in_zero_force(probe):
-    servo = Servo(probe)
-    servo.start()
-    servo.load(HONEY)
-    telemetry = servo.telemetry
-    wait_until(lambda: force_n(telemetry) > 0.1)
-    del servo
-    gc.collect()
-    assert is_zero(probe.forces_n[-1])
-    assert not any(thread.name == "servo" for thread in threading.enumerate())
-
-
-def test_a_servo_does_one_thing_at_a_time(probe):
-    virtual = Servo(probe, clock=VirtualClock())
-    with pytest.raises(StudyError, match="advance"):
-        virtual.start()
-    with Servo(probe) as running:
-        with pytest.raises(StudyError, match="stop it first"):
-            running.start()
-        with pytest.raises(StudyError, match="stop it before"):
-            running.advance(1)
-
-
-def test_a_program_keeps_the_signal_handlers_it_has_set(probe):
-    def own(_number, _frame):
-        pass
-
-    before = signal.signal(signal.SIGTERM, own)
-    try:
-        with Servo(probe):
-            assert signal.getsignal(signal.SIGTERM) is own
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-# however the process ends
-
-SCRIPT = """
-import os, signal, sys, threading
-import numpy as np
-from study_app.haptics.runtime.servo import Servo
-from tests.haptics.probe import PROBE, Probe
-from tests.haptics.runtime.test_servo import HONEY, force_n, wait_until
-
-signal.signal(signal.SIGINT, signal.default_int_handler)  # who runs the tests may have switched signals off
-signal.signal(signal.SIGHUP, signal.SIG_DFL)
-memory = np.memmap(sys.argv[1], dtype=PROBE, mode="r+", shape=(1,)).view(np.recarray)
-servo = Servo(Probe(memory=memory))
-servo.start()
-servo.load(HONEY)
-wait_until(lambda: force_n(servo.telemetry) > 0.1)
-memory[0].clock = 1  # from here on the test may look
-ways = {
-    "SIGTERM": lambda: os.kill(os.getpid(), signal.SIGTERM),
-    "SIGINT": lambda: os.kill(os.getpid(), signal.SIGINT),
-    "SIGHUP": lambda: os.kill(os.getpid(), signal.SIGHUP),
-    "exception": lambda: 1 / 0,
-    "exit": lambda: sys.exit(3),
-    "end": lambda: None,
-}
-ways[sys.argv[2]]()
-if sys.argv[2].startswith("SIG"):
-    threading.Event().wait(30)
-"""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize(
-    ("way", "code"),
-    [("SIGTERM", 143), ("SIGINT", -signal.SIGINT), ("SIGHUP", 129), ("exception", 1), ("exit", 3), ("end", 0)],
-)
-def test_however_the_process_ends_the_last_force_is_zero(tmp_path, way, code):
-    Servo(Probe()).prepare()  # compile here, where the time limit is the test's
-    shared = tmp_path / "probe"
-    shared.write_bytes(bytes(PROBE.itemsize))
-    ended = subprocess.run(
-        [sys.executable, "-c", SCRIPT, str(shared), way], capture_output=True, text=True, timeout=120, check=False
-    )
-    probe = np.memmap(shared, dtype=PROBE, mode="r", shape=(1,)).view(np.recarray)[0]
-    assert probe.clock == 1, ended.stderr
-    assert ended.returncode == code, ended.stderr
-    forces = probe.forces_n[: probe.writes]
-    assert np.linalg.norm(forces, axis=1).max() > 0.1
-    assert is_zero(forces[-1])
+    assert reader.dropped == ticks - samples.size

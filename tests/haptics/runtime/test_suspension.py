@@ -23,7 +23,8 @@ import os, signal, sys
 import numpy as np
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.probe import PROBE, Probe
-from tests.haptics.runtime.test_servo import HONEY, force_n, wait_until
+from tests.haptics.running import force_n, wait_until
+from tests.haptics.scenes import HONEY
 
 for name in ("SIGTSTP", "SIGTTIN", "SIGTTOU"):
     signal.signal(getattr(signal, name), signal.SIG_DFL)
@@ -34,8 +35,8 @@ servo.load(HONEY)
 wait_until(lambda: force_n(servo.telemetry) > 0.1)
 print("pushing", flush=True)
 sys.stdin.readline()
-turns = memory[0].writes
-wait_until(lambda: memory[0].writes > turns + 10)
+ticks = memory[0].writes
+wait_until(lambda: memory[0].writes > ticks + 10)
 servo.stop()
 print("allowed" if signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL else "refused", flush=True)
 """
@@ -83,6 +84,7 @@ def test_another_thread_changes_nothing():
     allow_suspension(holder)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="devices are C functions")
 @pytest.mark.parametrize("name", SUSPENDING)
 def test_a_servo_that_pushes_goes_on(tmp_path, name):

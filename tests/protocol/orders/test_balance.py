@@ -6,7 +6,7 @@ from study_app.errors import StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import balance, describe_balance, evenness, numbered
-from tests.protocol.cases import ORDER, SOUND
+from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")
 SMALL = parse(SOUND.encode(), "small")
@@ -152,7 +152,7 @@ def test_a_balanced_design_in_words():
         ),
         ("shuffled", 3, 1, 20, 'order = "williams" would be even exactly, for every 6 participants.'),
         ('constrained"\nmax_repeats = "', 3, 2, 20, "At most 1 of a kind come in a row; the least distance"),
-        ("fixed", 3, 1, 20, "Everyone gets the same order: what a condition does cannot be told from what its"),
+        ("fixed", 3, 1, 20, "Everyone gets the same order: effects of condition and of position cannot be"),
         ("fixed", 3, 1, 20, "Positions are uneven: a code comes in a position 0 to 20 times, 6.67 on average."),
         ('constrained"\nmax_repeats = "', 3, 2, 20, "Drawn anew in every session"),
     ],

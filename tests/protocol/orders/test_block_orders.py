@@ -10,7 +10,7 @@ from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, orders_of, orders_of_receipt
 from study_app.store.receipt import without_conditions
-from tests.protocol.cases import EVERY_ORDER, SOUND
+from tests.protocol.sound import EVERY_ORDER, SOUND
 
 PROTOCOLS = [load("rek2024"), load("demo"), parse(SOUND.encode(), "small"), parse(EVERY_ORDER.encode(), "everything")]
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.protocol.order_constraint import Constraint, longest_run, shortest_distance
-from study_app.protocol.orders.constrained import PROPOSALS, _Left, arrange, propose
+from study_app.protocol.orders.constrained import PROPOSALS, Remaining, arrange, propose
 from study_app.protocol.streams import stream
 
 Order = tuple[int, ...]
@@ -78,6 +78,7 @@ def test_runs_and_distances_are_measured(order: Order):
     assert shortest_distance(order) == slow_distance(order)
 
 
+@pytest.mark.slow
 @given(SIZES, CONSTRAINTS, st.integers(0, 2**64))
 def test_an_order_keeps_its_constraint_or_is_impossible(size: tuple[int, int], constraint: Constraint, seed: int):
     codes, repetitions = size
@@ -150,7 +151,7 @@ def dead_ends(codes: int, repetitions: int, apart: int, run: int) -> int:
     dead = 0
     while waiting:
         order = waiting.pop()
-        left = _Left(codes, repetitions, apart, run)
+        left = Remaining(codes, repetitions, apart, run)
         for code in order:
             left.take(code)
         recent = order[len(order) - (apart - 1) :] if apart > 1 else order[-1:]
@@ -176,6 +177,7 @@ def test_no_state_that_can_be_reached_is_a_dead_end(codes: int, repetitions: int
         assert dead_ends(codes, repetitions, 1, run) == 0, run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("codes", "repetitions", "constraint"), SMALL)
 def test_the_chain_ends_close_to_all_orders_being_equally_likely(codes: int, repetitions: int, constraint: Constraint):
     """Follow the exact chances of the chain: it starts from one proposal and sees PROPOSALS − 1 more."""
@@ -194,6 +196,7 @@ def test_the_chain_ends_close_to_all_orders_being_equally_likely(codes: int, rep
     assert sum(abs(chance - 1 / len(now)) for chance in now) / 2 < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("codes", "repetitions", "constraint", "bound"),
     [

@@ -14,7 +14,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.reproduce import RecordedTrial, recorded_trials, reproduce
 from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store.receipt import without_conditions
-from tests.protocol.cases import ORDER, SOUND
+from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")
 SHUFFLED = parse(SOUND.replace('scale = "agreement"', 'scale = "agreement"\nitem_order = "shuffled"').encode(), "small")
@@ -40,6 +40,7 @@ def run(protocol: Protocol, participant: str, seed: int) -> list[RecordedTrial]:
     ]
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**64), st.sampled_from(["P001", "P007", "anna"]), st.sampled_from(ORDERS))
 def test_an_untouched_session_is_reproduced(seed: int, participant: str, order: str):
     for protocol in (REK, SHUFFLED, parse(SOUND.replace(ORDER, order).encode(), "small")):

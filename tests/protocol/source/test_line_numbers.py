@@ -176,6 +176,7 @@ values = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.data())
 def test_lines_of_any_document(data: st.DataObject):
     document = data.draw(st.dictionaries(names, values, max_size=4))

@@ -23,8 +23,8 @@ from study_app.session.transitions.events import (
     ResumeAsked,
     Submitted,
 )
-from study_app.session.transitions.moves import END_SHOWN_S
 from study_app.session.transitions.state import Phase
+from study_app.session.transitions.steps import END_SHOWN_S
 from study_app.session.trial import SETTLED_S
 from tests.session.fakes import AWAY, LEFT, RIGHT, World, at_block, step
 
@@ -242,11 +242,11 @@ def test_a_button_held_down_is_one_press(world: World) -> None:
 
 def test_a_fault_of_the_servo_is_kept_once_and_calls_the_operator(practising: World) -> None:
     practising.run(0.5)
-    practising.servo.fault = "the device 'scripted' stopped answering"
+    practising.servo.fault = "the device 'scripted' stopped responding"
     practising.run(0.1)
     practising.run(0.1)
     assert practising.journal.of("broke") == [
-        {"event": "broke", "t_s": pytest.approx(0.6), "what": "the device 'scripted' stopped answering"}
+        {"event": "broke", "t_s": pytest.approx(0.6), "what": "the device 'scripted' stopped responding"}
     ]
     assert isinstance(practising.pages[-1], TroublePage)
     assert practising.log[0] == "stop_force"

@@ -132,7 +132,8 @@ def test_buttons_answer_nothing_while_the_disk_is_full(world: World) -> None:
     world.runner.post(Note(1.0, "mark", ""))
     world.run(0.1)
     world.run(0.1, buttons=BUTTON_CONTINUE)
-    assert world.state.phase is Phase.READING
+    assert world.state.stall is not None
+    assert world.state.stall.before is Phase.READING
 
 
 def test_a_session_that_is_ended_with_a_full_disk_ends_and_stays_unfinished(practising: World) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -17,7 +16,7 @@ class Tape:
     def __init__(self) -> None:
         self.told: list[Any] = []
 
-    def start(self, trial: int, attempt: int, rate_hz: float) -> None:
+    def start(self, trial: int, attempt: int, rate_hz: float, _interval: int | None = None) -> None:
         self.told.append(("start", trial, attempt, rate_hz))
 
     def append(self, samples: Any) -> None:
@@ -41,9 +40,9 @@ def recorded(tape: Tape) -> list[list[int]]:
     return found
 
 
-def unpainted(recorder: Any = None) -> World:
+def unpainted(recorder: Any = None, **ports: Any) -> World:
     """Return a world whose practice was asked for two seconds ago, and no frame of its tank was painted."""
-    world = World(recorder=recorder)
+    world = World(recorder=recorder, **ports)
     world.paints = False
     world.runner.post(Begin(0.0))
     world.runner.post(Continue(0.0))
@@ -121,9 +120,8 @@ def test_frames_are_recorded_with_their_trial_and_attempts_have_recordings_of_th
 
 
 def test_the_end_is_put_off_until_the_recordings_are_on_the_disk() -> None:
-    world = unpainted()
     settled: list[bool] = []
-    world.runner._ports = replace(world.runner._ports, settled=lambda: bool(settled))
+    world = unpainted(settled=lambda: bool(settled))
     told: list[bool] = []
     world.runner.on_change(lambda _state: told.append(world.runner.finished))
     world.runner.post(EndAsked(3.0, "aborted", "cable"))

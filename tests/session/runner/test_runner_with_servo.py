@@ -30,7 +30,7 @@ from study_app.session.transitions.state import Phase
 from study_app.session.trial import SETTLED_S
 from study_app.store.blinded.sealing import opened
 from study_app.store.clock import SessionClock
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.tables.session_tables import trials
 from tests.compiled import needs_servo
 from tests.session import small
@@ -136,7 +136,7 @@ def test_a_pulled_cable_calls_the_operator(bench: Bench) -> None:
     bench.run(100)
     assert bench.runner.state.phase is Phase.TROUBLE
     assert isinstance(bench.pages[-1], TroublePage)
-    assert "stopped answering" in bench.journal.of("broke")[0]["what"]
+    assert "stopped responding" in bench.journal.of("broke")[0]["what"]
     assert not bench.servo.force_is_on
 
 
@@ -159,17 +159,17 @@ def test_a_task_is_followed_on_the_device_and_drawn_from_its_history(bench: Benc
 
 
 def late(bench: Bench, clock: VirtualClock) -> None:
-    clock._memory[0].now_ns += 5_000_000_000  # the process was stopped
+    clock.memory[0].now_ns += 5_000_000_000  # the process was stopped
 
 
 def late_before_the_first_tick(bench: Bench, clock: VirtualClock) -> None:
     bench.runner.post(RepeatAsked(bench.clock(), "once more"))
-    clock._memory[0].now_ns += 5_000_000_000  # between the first painted frame and the first tick of the scene
+    clock.memory[0].now_ns += 5_000_000_000  # between the first painted frame and the first tick of the scene
 
 
 def late_where_nobody_reads(bench: Bench, clock: VirtualClock) -> None:
     bench.servo.advance(10)
-    clock._memory[0].now_ns += 5_000_000_000
+    clock.memory[0].now_ns += 5_000_000_000
     bench.servo.advance(40_000)  # all that telemetry held of it is overwritten
 
 
@@ -179,7 +179,7 @@ def suspended(bench: Bench, clock: VirtualClock) -> None:
 
 @pytest.mark.parametrize("freeze", [late, late_before_the_first_tick, late_where_nobody_reads, suspended])
 def test_a_freeze_within_a_trial_interrupts_it_and_it_comes_again(bench: Bench, freeze: Any) -> None:
-    clock = bench.servo._loop.clock
+    clock = bench.servo.loop.clock
     assert isinstance(clock, VirtualClock)
     bench.run(800)
     freeze(bench, clock)
@@ -202,11 +202,11 @@ def test_a_freeze_within_a_trial_interrupts_it_and_it_comes_again(bench: Bench, 
 
 
 def test_a_freeze_while_a_page_is_read_interrupts_nothing(bench: Bench) -> None:
-    clock = bench.servo._loop.clock
+    clock = bench.servo.loop.clock
     assert isinstance(clock, VirtualClock)
     bench.runner.post(PauseAsked(bench.clock(), "participant"))
     bench.run(100)
-    clock._memory[0].now_ns += 5_000_000_000
+    clock.memory[0].now_ns += 5_000_000_000
     clock.suspension_ns += 5_000_000_000
     bench.run(100)
     bench.runner.post(ResumeAsked(bench.clock(), "participant"))
@@ -237,13 +237,9 @@ class Judged:
                 folder,
                 study,
                 b"small",
-                "P001",
-                seed=1,
-                operator="",
-                language="en",
-                device=device.describe(),
-                screens={},
-                simulated=True,
+                SessionStart(
+                    "P001", seed=1, operator="", language="en", device=device.describe(), screens={}, simulated=True
+                ),
                 clock=session_clock,
             )
             with store:
@@ -254,7 +250,7 @@ class Judged:
                 servo.advance(round(opening_s * 1000))  # the tank is not on the screen yet
                 for frame in range(200):
                     if frame == 60:
-                        clock._memory[0].now_ns += late_ns  # the system gave the servo no time
+                        clock.memory[0].now_ns += late_ns  # the system gave the servo no time
                     if frame == 90:
                         servo.advance(round(stall_s * 1000))  # the window draws nothing meanwhile
                     servo.advance(16)
@@ -288,7 +284,7 @@ def delay_error_ms(delay_ms: float) -> float:
         servo.advance(200)  # as much history as any delay asks for
         while not journal.of("trial_ended"):
             for _ in range(16):
-                clock._memory[0].now_ns += int(draw.integers(600_000))  # the system is late
+                clock.memory[0].now_ns += int(draw.integers(600_000))  # the system is late
                 servo.advance(1)
             view = runner.view(servo.now_ns() + int(draw.integers(400_000)))
             if view is not None:

@@ -17,10 +17,12 @@ from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Reach
 from study_app.protocol.orders.schedule import stream
+from study_app.protocol.questions.rating import RatingView
 from study_app.session.pages import TextPage
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.exploration import RATE_HZ, exploration
 from study_app.session.simulated.observers import Reacher, Senses, choices, reading_s
+from study_app.session.simulated.rehearsed_session import RehearsedSession
 from study_app.session.simulated.trial_features import feelings
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
@@ -156,7 +158,8 @@ def test_the_last_choice_for_an_item_is_its_answer_and_every_choice_is_on_the_sc
     seed: int, values: list[int]
 ) -> None:
     answers = {f"item_{number}": value for number, value in enumerate(values)}
-    given_ = choices(answers, stream(seed, "test").random, 7)
+    items = tuple(RatingView(item, 1, "Statement.", True, labels=("point",) * 7) for item in answers)
+    given_ = choices(items, answers, stream(seed, "test").random)
     assert {choice.item: choice.value for choice in given_} == answers
     assert all(1 <= choice.value <= 7 and choice.after_s > 0 for choice in given_)
 
@@ -165,14 +168,14 @@ def test_the_last_choice_for_an_item_is_its_answer_and_every_choice_is_on_the_sc
 def test_a_device_that_is_lost_ends_the_rehearsal_with_a_word_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    look = rehearsal.Rehearsal._see
+    look = RehearsedSession.look
 
     def pull_the_cable(self: Any, senses: Any) -> TankView | None:
-        self._machine.device.unplug()
+        self.machine.device.unplug()
         return look(self, senses)
 
-    monkeypatch.setattr(rehearsal.Rehearsal, "_see", pull_the_cable)
-    with pytest.raises(SessionError, match="stopped answering"):
+    monkeypatch.setattr(RehearsedSession, "look", pull_the_cable)
+    with pytest.raises(SessionError, match="stopped responding"):
         rehearsal.rehearse("demo", participants=1, seed=1, results=tmp_path / "demo")
 
 
@@ -203,11 +206,11 @@ def test_a_servo_that_is_ended_from_outside_ends_the_rehearsal(monkeypatch: Any)
 
     def ended(self: Servo, ticks: int) -> int:
         if next(turns) == 50:
-            self._loop.control[0].run = 0  # as a request to terminate does
+            self.loop.control[0].run = 0  # as a request to terminate does
         return advance(self, ticks)
 
     monkeypatch.setattr(Servo, "advance", ended)
-    with pytest.raises(SessionError, match="ended from outside"):
+    with pytest.raises(SessionError, match="stopped from outside"):
         feelings(small.protocol(), seed=1, people=1)
 
 
@@ -221,6 +224,7 @@ def confirmed(lines: Iterable[Any]) -> dict[tuple[int, str], int]:
     }
 
 
+@pytest.mark.slow
 @needs_servo
 @pytest.mark.parametrize(("seed", "page"), [(8, 1), (5, 2), (9, 4)])
 def test_a_rehearsal_that_was_interrupted_and_resumed_answers_like_one_that_was_not(

@@ -1,21 +1,26 @@
-"""The machine: walked row by row, refused where there is no row, and driven at random."""
+"""The transition table, row by row: refused where there is no row."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, get_args
+from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Trial, build_schedule
-from study_app.session.pages import EndPage, PausePage, Progress, QuestionnairePage, TaskPage, TextPage, TroublePage
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.session.pages import (
+    EndPage,
+    PausePage,
+    Progress,
+    QuestionnairePage,
+    TaskPage,
+    TextPage,
+    TroublePage,
+)
 from study_app.session.transitions.commands import (
-    FadeIn,
-    Finish,
+    LeaveTask,
     Rest,
     ShowPage,
     StartTrial,
@@ -26,78 +31,24 @@ from study_app.session.transitions.commands import (
 )
 from study_app.session.transitions.events import (
     Begin,
-    Broke,
     Chosen,
     Continue,
     EndAsked,
-    Event,
     ForceStopped,
     ItemShown,
-    LanguageChosen,
-    Note,
     PauseAsked,
-    Reconnected,
-    RepeatAsked,
     ResumeAsked,
     Submitted,
     TaskDone,
+    WriteCompleted,
+    WriteFailed,
+    WriteRetried,
 )
-from study_app.session.transitions.state import FINAL, Phase, SessionState
+from study_app.session.transitions.moves import STOPPABLE
+from study_app.session.transitions.state import FINAL, Phase
 from study_app.session.transitions.table import TRANSITIONS, advance, open_session
 from tests.session import small
-
-EVENTS = get_args(Event)
-
-
-def state_in(phase: Phase) -> SessionState:
-    """Return a session in that phase, in its first main trial where there is one."""
-    if phase is Phase.OPENING:
-        return small.opened()
-    if phase is Phase.COMPLETE:
-        return small.walk(small.opened(), Phase.COMPLETE)
-    answering = small.walk(small.opened(), Phase.ANSWERING)
-    match phase:
-        case Phase.READING:
-            return small.walk(small.opened(), Phase.READING)
-        case Phase.TASK:
-            return small.walk(small.opened(), Phase.TASK, times=2)
-        case Phase.ANSWERING:
-            for item in answering.trial.items:
-                answering, _ = advance(answering, Chosen(9.0, item, 5))
-            return answering
-        case Phase.PAUSED:
-            return advance(answering, PauseAsked(9.0, "operator"))[0]
-        case Phase.TROUBLE:
-            return advance(answering, Broke(9.0, "cable", "device"))[0]
-        case _:
-            return advance(answering, EndAsked(9.0, "withdrawn", ""))[0]
-
-
-def event_of(kind: type[Any]) -> Any:
-    """Return an event of that kind that says nothing impossible."""
-    more: dict[type[Any], tuple[Any, ...]] = {
-        TaskDone: ("complete", {"duration_s": 2.0}),
-        ItemShown: ("liquid",),
-        Chosen: ("liquid", 3),
-        LanguageChosen: ("en",),
-        PauseAsked: ("participant",),
-        ResumeAsked: ("operator",),
-        ForceStopped: ("device",),
-        Note: ("note", "spilled, coffee"),
-        RepeatAsked: ("a call",),
-        EndAsked: ("aborted", "fire drill"),
-        Broke: ("no sample for 50 ms",),
-        Reconnected: ({"name": "memory"},),
-    }
-    return kind(50.0, *more.get(kind, ()))
-
-
-def written(commands: tuple[Any, ...]) -> list[str]:
-    return [command.event for command in commands if isinstance(command, Write)]
-
-
-def shown(commands: tuple[Any, ...]) -> Any:
-    return next((command.page for command in commands if isinstance(command, ShowPage)), None)
+from tests.session.transitions.states import EVENTS, LEFT, event_of, shown, state_in, written
 
 
 @pytest.mark.parametrize("kind", EVENTS, ids=lambda kind: kind.__name__)
@@ -173,7 +124,7 @@ def test_a_trial_starts_its_scene_and_task_before_it_is_shown() -> None:
     state, commands = advance(state_in(Phase.READING), Continue(3.0))
     assert [type(command) for command in commands] == [Write, Write, WriteTables, StartTrial, ShowPage]
     start, page = commands[-2], shown(commands)
-    assert (start.trial, start.attempt, start.condition) == (1, 1, "is_thick")
+    assert (start.trial, start.attempt, start.presented.condition) == (1, 1, "is_thick")
     assert page.task == start.task == state.plan.protocol.tasks["explore"]
     assert page.workspace_m == (0.1, 0.06, 0.06)
     assert page.body_radius_m == pytest.approx(0.0034)
@@ -185,7 +136,7 @@ def test_the_scene_of_a_trial_is_the_one_behind_its_code() -> None:
     paused, _ = advance(state, PauseAsked(1.0, "operator"))
     _, commands = advance(paused, ResumeAsked(2.0, "operator"))
     (start,) = [command for command in commands if isinstance(command, StartTrial)]
-    assert start.condition == state.plan.key["feeling"][state.trial.code]
+    assert start.presented.condition == state.plan.key["feeling"][state.trial.code]
 
 
 def test_a_delayed_trial_starts_with_its_delay_and_its_page_says_nothing_of_it() -> None:
@@ -280,171 +231,41 @@ def test_an_item_of_another_page_is_refused(event: Any) -> None:
         advance(state_in(Phase.ANSWERING), event)
 
 
-def test_a_pause_during_a_task_ends_the_attempt_and_the_trial_starts_again() -> None:
-    paused, commands = advance(state_in(Phase.TASK), PauseAsked(5.0, "participant"))
-    assert commands[:2] == (StopTrial(), Rest())
-    assert commands[2] == Write("trial_ended", {"trial": 2, "attempt": 1, "outcome": "interrupted"}, measured=True)
-    assert shown(commands) == PausePage(force_off=False)
-    again, commands = advance(paused, ResumeAsked(9.0, "operator"))
-    assert written(commands) == ["resumed", "trial_started"]
-    assert (again.phase, again.trial.number, again.attempt) == (Phase.TASK, 2, 2)
-    assert not any(isinstance(command, FadeIn) for command in commands)
+def test_going_on_during_a_task_leaves_it_and_stays_until_it_is_done() -> None:
+    state = state_in(Phase.TASK)
+    assert advance(state, Continue(5.0)) == (state, (LeaveTask(),))
 
 
-def test_a_pause_while_answering_goes_back_to_the_same_page_with_every_choice() -> None:
-    answering = state_in(Phase.ANSWERING)
-    paused, _ = advance(answering, PauseAsked(5.0, "operator"))
-    back, commands = advance(paused, ResumeAsked(9.0, "operator"))
-    assert back == answering
-    assert dict(shown(commands).chosen) == {"liquid": 5, "strong": 5, "spare": 5}
-
-
-def test_a_second_pause_at_once_changes_nothing() -> None:
-    paused = state_in(Phase.PAUSED)
-    assert advance(paused, PauseAsked(6.0, "participant")) == (paused, ())
-
-
-@pytest.mark.parametrize("phase", [Phase.READING, Phase.TASK, Phase.ANSWERING, Phase.PAUSED])
-def test_a_force_stop_is_the_first_command_and_resuming_fades_the_force_in(phase: Phase) -> None:
-    stopped, commands = advance(state_in(phase), ForceStopped(5.0, "participant"))
-    assert commands[0] == StopForce()
-    assert stopped.phase is Phase.PAUSED
-    assert shown(commands) == PausePage(force_off=True, held="pause" if phase is Phase.PAUSED else None)
-    resumed, commands = advance(stopped, ResumeAsked(6.0, "operator"))
-    assert FadeIn() in commands
-    assert written(commands)[:2] == ["resumed", "force_restored"]
-    assert not resumed.force_off
-
-
-def test_a_force_that_the_operator_stopped_is_the_operators_to_bring_back() -> None:
-    stopped, commands = advance(state_in(Phase.TASK), ForceStopped(5.0, "operator"))
-    assert shown(commands) == PausePage(force_off=True, held="force")
-    with pytest.raises(SessionError, match="the operator switched the force off: the operator resumes it"):
-        advance(stopped, ResumeAsked(6.0, "participant"))
-    resumed, commands = advance(stopped, ResumeAsked(7.0, "operator"))
-    assert commands[:3] == (
-        Write("resumed", {"by": "operator"}),
-        Write("force_restored", {"by": "operator"}),
-        FadeIn(),
-    )
-    assert (resumed.phase, resumed.held, resumed.force_off) == (Phase.TASK, None, False)
-
-
-@pytest.mark.parametrize("by", ["participant", "device", "program"])
-def test_a_force_that_somebody_else_stopped_may_be_brought_back_by_the_participant(by: Any) -> None:
-    stopped, commands = advance(state_in(Phase.READING), ForceStopped(5.0, by))
-    assert shown(commands) == PausePage(force_off=True)
-    _, commands = advance(stopped, ResumeAsked(6.0, "participant"))
-    assert commands[1] == Write("force_restored", {"by": "participant"})
-
-
-@pytest.mark.parametrize("by", ["participant", "device", "program", "operator"])
-def test_no_later_stop_takes_the_operators_stop_away(by: Any) -> None:
-    stopped, _ = advance(state_in(Phase.READING), ForceStopped(5.0, "operator"))
-    again, commands = advance(stopped, ForceStopped(6.0, by))
-    assert shown(commands) == PausePage(force_off=True, held="force")
-    with pytest.raises(SessionError, match="the operator resumes it"):
-        advance(again, ResumeAsked(7.0, "participant"))
-
-
-def test_the_operators_stop_during_the_participants_pause_holds_it() -> None:
-    paused, _ = advance(state_in(Phase.READING), PauseAsked(4.0, "participant"))
-    stopped, _ = advance(paused, ForceStopped(5.0, "operator"))
-    with pytest.raises(SessionError, match="the operator resumes it"):
-        advance(stopped, ResumeAsked(6.0, "participant"))
-
-
-def test_the_operators_pause_is_the_operators_to_end_whoever_stops_the_force_then() -> None:
-    paused, commands = advance(state_in(Phase.ANSWERING), PauseAsked(5.0, "operator"))
-    assert shown(commands) == PausePage(force_off=False, held="pause")
-    stopped, commands = advance(paused, ForceStopped(6.0, "participant"))
-    assert shown(commands) == PausePage(force_off=True, held="pause")
-    for state in (paused, stopped):
-        with pytest.raises(SessionError, match="the operator paused the session: the operator resumes it"):
-            advance(state, ResumeAsked(7.0, "participant"))
-        assert advance(state, ResumeAsked(7.0, "operator"))[0].phase is Phase.ANSWERING
-
-
-def test_the_participants_pause_is_the_participants_to_end_until_the_operator_pauses_too() -> None:
-    paused, _ = advance(state_in(Phase.READING), PauseAsked(5.0, "participant"))
-    _, commands = advance(paused, ResumeAsked(6.0, "participant"))
-    assert commands[0] == Write("resumed", {"by": "participant"})
-    taken_over, commands = advance(paused, PauseAsked(5.5, "operator"))
-    assert commands[0] == Write("paused", {"by": "operator"})
-    assert shown(commands) == PausePage(force_off=False, held="pause")
-    assert advance(taken_over, PauseAsked(5.6, "operator")) == (taken_over, ())
-    with pytest.raises(SessionError, match="the operator resumes it"):
-        advance(taken_over, ResumeAsked(6.0, "participant"))
-
-
-def test_the_force_fades_in_before_a_trial_starts_again() -> None:
-    stopped, _ = advance(state_in(Phase.TASK), ForceStopped(5.0, "device"))
-    _, commands = advance(stopped, ResumeAsked(6.0, "operator"))
-    order = [type(command) for command in commands]
-    assert order.index(FadeIn) < order.index(StartTrial)
-
-
-@pytest.mark.parametrize("phase", [Phase.TROUBLE, *sorted(FINAL, key=str)])
-def test_the_force_can_be_stopped_where_nothing_goes_on(phase: Phase) -> None:
-    state = state_in(phase)
-    after, commands = advance(state, ForceStopped(5.0, "operator"))
-    assert after == state
-    assert commands[0] == StopForce()
-
-
-def test_a_repeat_keeps_the_attempt_that_was_and_its_reason() -> None:
-    again, commands = advance(state_in(Phase.TASK), RepeatAsked(5.0, "phone rang"))
-    assert written(commands) == ["trial_ended", "repeat", "trial_started"]
-    assert commands[3].fields == {"trial": 2, "reason": "phone rang"}
-    assert again.attempt == 2
-
-
-def test_a_repeat_while_answering_forgets_the_choices_but_not_the_measured_attempt() -> None:
-    again, commands = advance(state_in(Phase.ANSWERING), RepeatAsked(5.0, "phone rang"))
-    assert written(commands) == ["repeat", "trial_started"]
-    assert (again.phase, again.answers, again.attempt) == (Phase.TASK, {}, 2)
-
-
-def test_the_next_trial_begins_with_its_first_attempt() -> None:
-    again, _ = advance(state_in(Phase.TASK), RepeatAsked(5.0, "phone rang"))
-    assert small.walk(again, Phase.TASK).attempt == 1
-
-
-def test_a_repeat_without_a_reason_is_refused() -> None:
-    with pytest.raises(SessionError, match="write one"):
-        advance(state_in(Phase.TASK), RepeatAsked(5.0, "  "))
-
-
-@pytest.mark.parametrize("status", ["withdrawn", "aborted"])
-def test_an_early_end_closes_the_session_before_it_says_so(status: Any) -> None:
-    ended, commands = advance(state_in(Phase.TASK), EndAsked(5.0, status, "tired"))
-    assert commands[:2] == (StopTrial(), Rest())
-    assert commands[-2] == Finish(status, "tired")
-    assert isinstance(shown(commands), EndPage)
-    assert ended.phase is Phase.ENDED
-
-
-def test_an_early_end_and_a_complete_session_do_not_read_alike() -> None:
-    early = shown(advance(state_in(Phase.READING), EndAsked(5.0, "aborted", ""))[1])
-    last = small.walk(small.opened(), Phase.READING, times=2)
-    assert early != shown(advance(last, Continue(9.0))[1])
-
-
-def test_what_broke_is_for_the_journal_and_not_for_the_participant() -> None:
-    trouble, commands = advance(state_in(Phase.TASK), Broke(5.0, "no sample for 50 ms"))
+@pytest.mark.parametrize("phase", [phase for phase in Phase if phase is not Phase.STALLED])
+def test_a_disk_that_takes_nothing_stops_the_force_and_keeps_what_is_left_from_every_phase(phase: Phase) -> None:
+    before = state_in(phase)
+    stalled, commands = advance(before, WriteFailed(9.0, "disk full", (LEFT,)))
     assert commands[:3] == (StopForce(), StopTrial(), Rest())
-    assert written(commands) == ["trial_ended", "broke"]
-    page = shown(commands)
-    assert isinstance(page, TroublePage)
-    assert "50 ms" not in page.title + page.paragraph
-    assert trouble.phase is Phase.TROUBLE
+    assert isinstance(shown(commands), EndPage if phase in FINAL else TroublePage)
+    assert (stalled.phase, stalled.over) == (Phase.STALLED, phase in FINAL)
+    assert advance(stalled, WriteRetried(9.0)) == (stalled, (LEFT,))
+    after, commands = advance(stalled, WriteCompleted(10.0))
+    if phase in STOPPABLE:
+        assert (after, commands) == advance(before, ForceStopped(10.0, "program"))
+    else:
+        assert (after, commands) == (before, ())
 
 
-def test_a_session_that_broke_and_is_aborted_counts_as_broken() -> None:
-    _, commands = advance(state_in(Phase.TROUBLE), EndAsked(9.0, "aborted", "cable"))
-    assert Finish("broken", "cable") in commands
-    _, commands = advance(state_in(Phase.TROUBLE), EndAsked(9.0, "withdrawn", "enough"))
-    assert Finish("withdrawn", "enough") in commands
+def test_the_operators_stop_while_the_disk_takes_nothing_is_kept_through_retries() -> None:
+    stopped, commands = advance(state_in(Phase.STALLED), ForceStopped(10.0, "operator"))
+    assert commands == (StopForce(),)
+    again, _ = advance(stopped, WriteFailed(9.0, "still full", (LEFT,)))
+    assert shown(advance(again, WriteCompleted(11.0))[1]) == PausePage(force_off=True, held="force")
+
+
+def test_an_end_while_the_disk_takes_nothing_is_over_and_not_written() -> None:
+    ended, commands = advance(state_in(Phase.STALLED), EndAsked(10.0, "withdrawn", ""))
+    assert [type(command) for command in commands] == [ShowPage]
+    assert isinstance(shown(commands), EndPage)
+    assert ended.over
+    with pytest.raises(SessionError, match="over"):
+        advance(ended, EndAsked(11.0, "withdrawn", ""))
+    assert advance(ended, WriteCompleted(12.0))[0].phase is Phase.ENDED
 
 
 def test_a_language_that_the_study_is_not_written_in_is_refused(protocol: Protocol) -> None:
@@ -462,85 +283,3 @@ def test_nothing_that_is_printed_names_a_condition_a_liquid_or_a_delay() -> None
     text = " ".join(printed)
     words = ["is_thin", "is_thick", "on_time", "is_late", "0.137", "137", "1013", "1450"]
     assert [word for word in words if word in text] == []
-
-
-CHOICES = st.one_of(st.integers(1, 7), st.none())
-ANY_EVENT = st.one_of(
-    *(st.just(event_of(kind)) for kind in EVENTS if kind not in (Chosen, ItemShown, Broke, EndAsked)),
-    st.builds(Chosen, st.just(0.0), st.sampled_from(["liquid", "strong", "spare", "different"]), CHOICES),
-    st.builds(ItemShown, st.just(0.0), st.sampled_from(["liquid", "strong", "spare", "different"])),
-)
-INCIDENTS = st.one_of(ANY_EVENT, st.sampled_from([event_of(Broke), event_of(EndAsked)]))
-
-
-@settings(max_examples=150, deadline=None)
-@given(st.lists(st.one_of(st.none(), st.none(), ANY_EVENT), max_size=120), st.lists(INCIDENTS, max_size=5))
-def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events: list[Any], late: list[Any]) -> None:
-    """None stands for going on as if nothing had happened."""
-    state = small.opened()
-    latest: dict[tuple[int, int], dict[str, Any]] = {}
-    kept: dict[int, dict[str, Any]] = {}
-    disk: list[Any] = []
-    for drawn in [*events, *late]:
-        event = _going_on(state) if drawn is None else drawn
-        before = replace(state)
-        try:
-            after, commands = advance(state, event)
-        except SessionError:
-            assert state == before
-            continue
-        _check_order(commands)
-        disk += [command for command in commands if isinstance(command, Write)]
-        if isinstance(event, Chosen):
-            latest.setdefault((before.trial.number, before.attempt), {})[event.item] = event.value
-        if isinstance(event, Submitted):
-            kept[before.trial.number] = latest[before.trial.number, before.attempt]
-        state = after
-    confirmed = {write.fields["trial"]: write.fields["items"] for write in disk if write.event == "responses"}
-    assert {
-        trial: {row["item"]: row["value"] for row in rows if row["first_s"] is not None}
-        for trial, rows in confirmed.items()
-    } == kept
-    chosen = [write for write in disk if write.event == "choice"]
-    assert len(chosen) >= sum(len(answers) for answers in kept.values())
-    if state.phase not in FINAL:
-        state, commands = advance(state, EndAsked(999.0, "aborted", ""))
-        assert any(isinstance(command, Finish) for command in commands)
-    assert state.phase in FINAL
-
-
-def _going_on(state: SessionState) -> Any:
-    waiting = state.phase in {Phase.PAUSED, Phase.TROUBLE, *FINAL}
-    return ResumeAsked(1.0, "operator") if waiting else small.next_event(state, 1.0)
-
-
-def _check_order(commands: tuple[Any, ...]) -> None:
-    """Safety of the hand, then the disk, then what is felt and seen; nothing after the page."""
-    rank = {StopForce: 0, StopTrial: 0, Rest: 0, Write: 1, WriteTables: 1, FadeIn: 1, Finish: 1, StartTrial: 2}
-    ranks = [rank.get(type(command), 3) for command in commands]
-    assert ranks == sorted(ranks)
-    assert sum(isinstance(command, ShowPage) for command in commands) <= 1
-
-
-@given(st.integers(0, 2**32), st.data())
-@settings(max_examples=30, deadline=None)
-def test_every_trial_that_was_begun_is_ended_once_per_attempt(seed: int, data: st.DataObject) -> None:
-    state = small.opened(seed)
-    begun: list[tuple[int, int]] = []
-    ended: list[tuple[int, int]] = []
-    while state.phase not in FINAL:
-        if state.phase is Phase.PAUSED:
-            event: Any = ResumeAsked(1.0, "operator")
-        elif state.phase is Phase.TASK and data.draw(st.booleans()):
-            event = data.draw(st.sampled_from([event_of(PauseAsked), event_of(ForceStopped), event_of(RepeatAsked)]))
-        else:
-            event = small.next_event(state, 1.0)
-        state, commands = advance(state, event)
-        for command in commands:
-            if isinstance(command, Write) and command.event in {"trial_started", "trial_ended"}:
-                which = (command.fields["trial"], command.fields["attempt"])
-                (begun if command.event == "trial_started" else ended).append(which)
-    assert begun == ended
-    assert len(set(begun)) == len(begun)
-    steps = state.plan.schedule.steps
-    assert {trial for trial, _ in begun} == {step.number for step in steps if isinstance(step, Trial)}

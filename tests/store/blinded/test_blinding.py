@@ -18,6 +18,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import (
+    check_conditions,
     open_or_draw_key,
     reveal,
     revealed,
@@ -74,7 +75,7 @@ def test_several_liquids_of_a_condition_are_named_in_order(
 
 
 def test_a_code_that_is_not_in_the_key_is_refused(tmp_path: Path, protocol: Protocol) -> None:
-    with pytest.raises(StoreError, match="knows no code 'L9' of block 'liquids'"):
+    with pytest.raises(StoreError, match="has no code 'L9' of block 'liquids'"):
         open_or_draw_key(tmp_path, protocol).condition("liquids", "L9")
 
 
@@ -160,9 +161,9 @@ def test_rehearsals_and_real_sessions_do_not_mix(tmp_path: Path, protocol: Proto
     rehearsed.mkdir()
     open_or_draw_key(real, protocol)
     open_or_draw_key(rehearsed, protocol, stream(1, "blinding").random)
-    with pytest.raises(StoreError, match="rehearsed holds a rehearsal: real sessions would mix with it"):
+    with pytest.raises(StoreError, match="rehearsed holds a rehearsal: they must not be mixed with real sessions"):
         open_or_draw_key(rehearsed, protocol)
-    with pytest.raises(StoreError, match="real holds real sessions: a rehearsal would mix with it"):
+    with pytest.raises(StoreError, match="real holds real sessions: they must not be mixed with a rehearsal"):
         open_or_draw_key(real, protocol, stream(1, "blinding").random)
 
 
@@ -180,8 +181,11 @@ def test_a_protocol_with_other_conditions_is_refused_without_naming_them(
         tables["blocks"]["liquids"]["conditions"].reverse()
     else:
         tables["blocks"]["liquids"]["code_prefix"] = "Q"
-    with pytest.raises(StoreError, match="was sealed for other conditions than this protocol's") as refusal:
+    with pytest.raises(StoreError, match="was sealed for other conditions than those of this protocol") as refusal:
         open_or_draw_key(tmp_path, Protocol.model_validate(tables))
+    with pytest.raises(StoreError, match="undo that change") as early:
+        check_conditions(tmp_path, Protocol.model_validate(tables))
+    assert str(early.value) == str(refusal.value)
     assert not any(word in str(refusal.value) for word in ("mildew", "tardy", "139", "1200"))
 
 
@@ -198,14 +202,14 @@ def test_a_protocol_with_other_texts_keeps_its_key(
 def test_an_unreadable_key_is_an_error_that_names_it(tmp_path: Path, protocol: Protocol, content: bytes) -> None:
     open_or_draw_key(tmp_path, protocol)
     sealed(tmp_path).write_bytes(content)
-    with pytest.raises(StoreError, match=r"key\.sealed is no sealed key any more"):
+    with pytest.raises(StoreError, match=r"key\.sealed is no longer a sealed key"):
         open_or_draw_key(tmp_path, protocol)
 
 
 def test_a_key_of_a_later_format_is_refused(tmp_path: Path, protocol: Protocol) -> None:
     open_or_draw_key(tmp_path, protocol)
-    sealed(tmp_path).write_bytes(base64.encodebytes(json.dumps(content_of(tmp_path) | {"format": 2}).encode()))
-    with pytest.raises(StoreError, match="has format 2, this version reads 1"):
+    sealed(tmp_path).write_bytes(base64.encodebytes(json.dumps(content_of(tmp_path) | {"format": 3}).encode()))
+    with pytest.raises(StoreError, match="has format 3, this version reads 1 and 2"):
         open_or_draw_key(tmp_path, protocol)
 
 
@@ -311,11 +315,11 @@ def test_a_line_that_is_no_reveal_is_told_and_the_others_count(
     assert unreadable_reveals(folder) == ((1, False),)
     assert [one["by"] for one in reveals(folder)] == ["AB"]
     assert [str(one) for one in verify(folder).errors] == [
-        "blinding/reveals.jsonl: line 1 records no reveal: it was changed; restore it from a copy"
+        "blinding/reveals.jsonl: line 1 is not a reveal: it was changed; restore it from a copy"
     ]
 
 
 def test_a_folder_without_a_key_is_named(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match=r"is no study's folder \(it has no key\.sealed\): name one"):
+    with pytest.raises(StoreError, match=r"is not a study folder \(it has no key\.sealed\): name one"):
         reveal(tmp_path, "AB", "analysis")
     assert names_in(tmp_path) == []

@@ -25,12 +25,13 @@ from study_app.store.journals import journal
 from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import reopen
-from study_app.store.tables.columns import SEALED, TRIALS, header, unsealed
+from study_app.store.tables.column import header, unsealed
+from study_app.store.tables.columns import SEALED, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, read_table
 from study_app.store.tables.study_description import description_bytes
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import SOURCE
-from tests.store.verification.forging import Lines, cover_up, forge
+from tests.store.forging import Lines, cover_up, forge
 
 Start = Callable[..., SessionStore]
 Attend = Callable[[SessionStore], None]
@@ -144,7 +145,7 @@ def test_what_is_not_the_journals_is_left_and_named(tmp_path: Path, start: Start
     left = unblind(folder, "AB", "done").left
     assert len(left) == 3
     assert "P001" in left[0]
-    assert "is not what the journal gives, so it was left as it is: liquid-study rebuild " in left[0]
+    assert "differs from the journal, so it was not changed: rebuild it with liquid-study rebuild " in left[0]
     assert "is open in another program" in left[1]
     assert "damaged" in left[2]
     assert not SEALED & names(changed)
@@ -171,8 +172,8 @@ def test_the_command_names_the_codes_and_what_it_left(start: Start, attend: Atte
     codes = {line.split()[1] for line in done.stdout.splitlines()}
     assert codes == {"practice", "L1", "L2", "D1", "D2"}
     assert done.stderr.splitlines() == [
-        f"warning: {table} is not what the journal gives, so it was left as it is: "
-        f"liquid-study rebuild {store.folder.path} makes it again"
+        f"warning: {table} differs from the journal, so it was not changed: "
+        f"rebuild it with liquid-study rebuild {store.folder.path}"
     ]
 
 

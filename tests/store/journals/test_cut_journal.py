@@ -17,7 +17,7 @@ from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import SOURCE
-from tests.store.verification.forging import Lines, forge
+from tests.store.forging import Lines, forge
 
 Attend = Callable[[SessionStore], None]
 
@@ -65,7 +65,7 @@ def test_a_finished_session_whose_journal_lost_its_end_is_left_alone(folder: Pat
 @pytest.mark.parametrize(
     ("left", "sentence"),
     [
-        ("checksums.sha256", "was made when the session had ended"),
+        ("checksums.sha256", "was written after the session ended"),
         ("fingerprints.txt", "lists data/sub-P007/ses-01 as ended"),
         ("*responses_data.csv", "responses_data.csv has 12 rows, and the journal gives 0"),
         ("*trials_data.csv", "trials_data.csv has 5 rows, and the journal gives 2"),

@@ -179,7 +179,7 @@ def test_an_unwritable_results_folder_is_one_line(tmp_path: Path, start: Callabl
     (tmp_path / "file").write_text("no folder")
     with pytest.raises(StoreError) as refusal:
         start(results=tmp_path / "file" / "study")
-    assert "file/study cannot be written (Not a directory)" in str(refusal.value)
+    assert "file/study cannot be written (a file is where a folder is needed)" in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert names_in(tmp_path) == ["file"]
 
@@ -238,14 +238,14 @@ import json, sys
 from pathlib import Path
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
-from study_app.store.sessions.begin import begin
+from study_app.store.sessions.begin import SessionStart, begin
 protocol = Protocol.model_validate(json.loads(sys.argv[1]))
 given = dict(seed=1, operator="AB", language="en", device={"name": "mouse"}, screens={}, simulated=False)
 print("ready", flush=True)
 for line in sys.stdin:
     folder, participant = line.split()
     try:
-        store = begin(Path(folder), protocol, b"", participant, **given)
+        store = begin(Path(folder), protocol, b"", SessionStart(participant, **given))
     except StoreError as error:
         print("refused", error, flush=True)
     else:
@@ -265,6 +265,7 @@ def test_halves_of_a_killed_program_go_when_the_next_session_begins(start: Calla
     assert not any(half.exists() for half in halves)
 
 
+@pytest.mark.slow
 def test_of_two_programs_racing_for_one_id_one_gets_it_and_both_share_the_key(
     tmp_path: Path, tables_of_study: Callable[..., dict[str, Any]]
 ) -> None:
@@ -295,3 +296,13 @@ def test_of_two_programs_racing_for_one_id_one_gets_it_and_both_share_the_key(
     finally:
         for racer in racers:
             racer.communicate()
+
+
+@pytest.mark.parametrize("answer", [None, {"means": "noise", "noise_db": 60}])
+def test_the_receipt_has_how_motors_were_masked_where_that_was_asked(
+    start: Callable[..., SessionStore], answer: dict[str, Any] | None
+) -> None:
+    with start(motors_masked=answer) as store:
+        held = receipt.read(store.folder.receipt)
+    assert held.get("motors_masked") == answer
+    assert ("motors_masked" in held) == (answer is not None)

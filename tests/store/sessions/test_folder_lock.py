@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 
 from study_app.errors import StoreError
@@ -52,7 +53,7 @@ def test_letting_go_twice_is_no_harm(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "changes",
-    [{"pid": "ended"}, {"pid": os.getpid(), "began": "another time"}],
+    [{"pid": "ended"}, {"pid": os.getpid(), "began": 0.25}],
     ids=["the process has ended", "another process has its number now"],
 )
 def test_the_marker_of_a_program_that_is_gone_is_passed_over(tmp_path: Path, changes: dict[str, Any]) -> None:
@@ -77,8 +78,8 @@ def test_a_killed_program_that_nobody_has_waited_for_is_gone(tmp_path: Path) -> 
 
 @pytest.mark.parametrize(
     "changes",
-    [{"host": "another-machine"}, {"pid": None}],
-    ids=["of another machine", "without a process"],
+    [{"host": "another-machine"}, {"pid": None}, {"began": "1d2f 4711"}, {"began": None}],
+    ids=["of another machine", "without a process", "as earlier versions wrote it", "without a time"],
 )
 def test_a_program_that_may_live_is_not_disturbed(tmp_path: Path, changes: dict[str, Any]) -> None:
     marker = other(tmp_path, **changes)
@@ -111,10 +112,25 @@ def test_a_process_that_runs_began_once_and_one_that_ended_is_none() -> None:
     assert process_began(ended_process()) is None
 
 
-def test_where_a_system_does_not_say_when_a_process_began_its_number_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(folder_lock, "_BOOT", Path("/nowhere/boot_id"))
-    assert process_began(os.getpid()) == "unknown"
-    assert process_began(ended_process()) is None
+def test_a_process_of_which_nothing_may_be_known_is_taken_for_a_living_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def denied(_process: int) -> float:
+        raise psutil.AccessDenied
+
+    other(tmp_path)
+    monkeypatch.setattr(folder_lock, "process_began", denied)
+    assert is_open(tmp_path)
+
+
+def test_setting_the_clock_ends_no_opening(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On Linux the wall time at which a process began is computed from the clock of now."""
+    opening = open_alone(tmp_path)
+    create_time, boot_time = psutil.Process.create_time, psutil.boot_time
+    monkeypatch.setattr(psutil.Process, "create_time", lambda self: create_time(self) + 3600 * psutil.LINUX)
+    monkeypatch.setattr(psutil, "boot_time", lambda: boot_time() + 3600)
+    assert is_open(tmp_path)
+    opening.release()
 
 
 RACER = """
@@ -137,6 +153,7 @@ for line in sys.stdin:
 """
 
 
+@pytest.mark.slow
 def test_of_programs_that_come_at_once_never_two_get_in(tmp_path: Path) -> None:
     """A stale marker lies in every folder, which both want to take away."""
     gone = ended_process()

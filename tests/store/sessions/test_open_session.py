@@ -199,7 +199,7 @@ def test_a_disk_that_fills_during_a_session_costs_nothing_that_was_acknowledged(
     store.append("trial_started", **trial_of(6))
     acknowledged = store.folder.journal.read_bytes()
     with files_up_to(len(acknowledged) + 20):
-        with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(File too large\): free space"):
+        with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(File too large\): free disk space"):
             store.append("trial_ended", trial=6, attempt=1, outcome="complete", **summary)
         with pytest.raises(StoreError, match="File too large"):
             store.finish("aborted")
@@ -258,8 +258,8 @@ def test_a_disk_that_becomes_read_only_leaves_whole_lines_and_is_tried_again(
     store = start()
     store.append("note", kind="note", text="before")
     before = journal.read(store.folder.journal)
-    disk = Refusing(store._journal._file, step, kept)
-    store._journal._file = disk  # type: ignore[assignment]
+    disk = Refusing(store.journal.file, step, kept)
+    store.journal.file = disk  # type: ignore[assignment]
     for _ in range(2):
         with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written"):
             store.append("note", kind="note", text="never acknowledged")

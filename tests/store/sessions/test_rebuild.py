@@ -15,7 +15,7 @@ from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.verification.integrity import doubts
 from study_app.store.verification.verify_study import verify
-from tests.store.verification.forging import forge
+from tests.store.forging import forge
 
 
 def every_byte(folder: Path) -> dict[str, bytes]:
@@ -88,7 +88,7 @@ def test_a_session_without_a_fingerprint_gets_it_with_a_note(tmp_path: Path, end
     before = path.read_bytes()
     path.unlink()
     (error,) = verify(tmp_path / "study").errors
-    assert str(error) == "fingerprints.txt: lacks data/sub-P007/ses-01, which has ended; rebuild of it adds it"
+    assert str(error) == "fingerprints.txt: lacks data/sub-P007/ses-01, which has ended; rebuild adds it"
     assert set(rebuild(ended.folder.path).rewritten) == {ended.folder.checksums, ended.folder.rebuilt, path}
     assert path.read_bytes() == before
     assert "fingerprints.txt had no fingerprint of the session" in ended.folder.rebuilt.read_text()
@@ -141,6 +141,7 @@ def three_answers(store: SessionStore) -> None:
         store.append("responses", trial=number, attempt=1, items=[item])
 
 
+@pytest.mark.slow
 def test_of_a_journal_cut_at_any_byte_everything_whole_is_rebuilt_and_the_journal_left_alone(
     start: Callable[..., SessionStore],
 ) -> None:
@@ -200,7 +201,7 @@ def test_a_damaged_journal_is_refused_untouched(tmp_path: Path, ended: SessionSt
 
 def test_what_is_no_session_is_named(tmp_path: Path, ended: SessionStore) -> None:
     for path in (tmp_path, tmp_path / "study", ended.folder.path.parent, tmp_path / "none"):
-        with pytest.raises(StoreError, match="is no session's folder: name one such as"):
+        with pytest.raises(StoreError, match="is not a session folder: name one such as"):
             rebuild(path)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import time
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -26,6 +27,7 @@ from study_app.store.sessions.folder_lock import is_open
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import FullDisk, choose
 from tests.store.sessions.conftest import Again
+from tests.store.test_recorder import Disk
 
 
 def present(store: SessionStore, trial: Trial, summary: dict[str, Any]) -> None:
@@ -46,6 +48,30 @@ def answer(store: SessionStore, trial: Trial) -> None:
         choose(store, trial.number, items)
         store.append("responses", trial=trial.number, attempt=1, items=items)
     store.write_tables()
+
+
+def test_a_session_is_left_promptly_though_the_disk_takes_no_recording_and_goes_on(
+    start: Callable[..., SessionStore],
+    again: Again,
+    samples_of: Callable[..., Any],
+    protocol: Protocol,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("study_app.store.sessions.open_session.LEAVING_S", 0.05, raising=False)
+    trial = next(step for step in build_schedule(protocol, "P007", 11).steps if isinstance(step, Trial))
+    store, disk = start(recordings=True), Disk(monkeypatch)
+    assert store.recorder is not None
+    store.recorder.start(trial.number, 1, 1000.0)
+    store.recorder.append(samples_of(10))
+    present(store, trial, {})
+    before = time.perf_counter()
+    store.close()
+    assert time.perf_counter() - before < 10.0, "and not the half minute that the end of a session waits"
+    assert not is_open(store.folder.path)
+    with again() as resumed:
+        assert resumed.lines[-1]["event"] == "session_resumed"
+        assert resumed.lines[-2]["event"] == "recording_lost"
+    disk.works.set()
 
 
 def test_it_goes_on_after_the_last_line_and_says_so(start: Callable[..., SessionStore], again: Again) -> None:
@@ -235,8 +261,8 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
         store.recorder.stop()
     store.recorder.close()
     store.append("recorded", **event_fields(store))
-    store._journal.close()
-    store._opening.release()
+    store.journal.close()
+    store.opening.release()
     torn = store.folder.recordings / ".trial-003.parquet.0123abcd.tmp"
     torn.write_bytes(b"PAR1")
     frames = recording_files(store.folder.recordings, 3, 1)[1]
@@ -256,7 +282,7 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
         ]
         assert told_of[1]["samples_recorded"] == 200
         assert len(read_samples(resumed.folder.path / told_of[1]["recording"])) == 200
-        assert told_of[2]["reason"] == "the program ended before it was whole"
+        assert told_of[2]["reason"] == "the program ended before it was complete"
         recorder = resumed.recorder
         assert recorder is not None
         recorder.start(3, 2, 1000.0)

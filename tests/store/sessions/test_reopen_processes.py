@@ -20,6 +20,8 @@ from study_app.store.sessions.reopen import reopen
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import SOURCE
 
+pytestmark = pytest.mark.slow
+
 RACER = """
 import json, sys
 from pathlib import Path
@@ -73,11 +75,11 @@ from pathlib import Path
 import numpy as np
 from study_app.haptics.model.layout import SAMPLE
 from study_app.protocol.load import load, source_bytes
-from study_app.store.sessions.begin import begin
-store = begin(
-    Path(sys.argv[1]), load("demo"), source_bytes("demo"), "P001", seed=1, operator="", language="en",
-    device={"name": "mouse"}, screens={}, simulated=True, recordings=True,
+from study_app.store.sessions.begin import SessionStart, begin
+start = SessionStart(
+    "P001", seed=1, operator="", language="en", device={"name": "mouse"}, screens={}, simulated=True, recordings=True
 )
+store = begin(Path(sys.argv[1]), load("demo"), source_bytes("demo"), start)
 samples = np.zeros(35_000, SAMPLE)
 samples["position_m"] = np.random.default_rng(1).random((35_000, 3))
 for trial in range(1, 1000):
@@ -117,6 +119,6 @@ def test_a_killed_program_leaves_all_acknowledged_answers_and_a_session_that_goe
     assert not list(study.rglob("*.tmp"))
     findings = verify(study)
     assert [str(error) for error in findings.errors] == []
-    assert [str(warning) for warning in findings.warnings if "ended before it was whole" not in str(warning)] == []
+    assert [str(warning) for warning in findings.warnings if "ended before it was complete" not in str(warning)] == []
     for path in (folder / "recordings").glob("trial-???.parquet"):
         assert len(read_samples(path)) == 105_000

@@ -37,7 +37,7 @@ def test_a_finished_session_is_refused_untouched(
 ) -> None:
     start().finish("withdrawn")
     before = every_byte(tmp_path)
-    with pytest.raises(StoreError, match=r"is finished \(withdrawn\): it cannot go on; use a new session number"):
+    with pytest.raises(StoreError, match=r"is finished \(withdrawn\) and cannot be resumed; use a new session number"):
         again()
     assert every_byte(tmp_path) == before
 
@@ -110,14 +110,14 @@ def test_of_other_conditions_nothing_but_that_is_told(
     start().close()
     with pytest.raises(StoreError) as refusal:
         again(protocol=changed(tables_of_study(), path, value), source=SOURCE + b"# changed")
-    assert str(refusal.value).endswith("What differs: conditions differ")
+    assert str(refusal.value).endswith("Differences: conditions differ")
 
 
 def test_a_file_that_differs_in_its_comments_alone_is_refused_and_said_to(
     start: Callable[..., SessionStore], again: Again
 ) -> None:
     start().close()
-    with pytest.raises(StoreError, match="What differs: comments, order or notation, nothing that is run"):
+    with pytest.raises(StoreError, match="Differences: only comments, order or notation"):
         again(source=SOURCE + b"# changed")
 
 
@@ -187,7 +187,7 @@ def test_a_session_that_had_not_begun_cannot_go_on(
         pass
     store.folder.journal.write_bytes(store.folder.journal.read_bytes()[:40])
     before = every_byte(tmp_path)
-    with pytest.raises(StoreError, match=r"journal\.jsonl holds no line: .* use a new session number"):
+    with pytest.raises(StoreError, match=r"journal\.jsonl has no line: .* use a new session number"):
         again()
     assert every_byte(tmp_path) == before
 

@@ -17,11 +17,13 @@ from study_app.store.journals import journal_writer
 from study_app.store.sessions import begin, open_session
 from study_app.store.sessions.folder_lock import markers, open_alone
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.participant_ids import check_unused, suggest_id
+from study_app.store.sessions.participant_ids import check_unused, used_ids
 from study_app.store.sessions.reopen import reopen
 from study_app.store.sessions.unstarted_sessions import abandoned, never_begun
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import SOURCE
+
+pytestmark = pytest.mark.slow
 
 Start = Callable[..., SessionStore]
 
@@ -77,11 +79,11 @@ def left(request: pytest.FixtureRequest, study: StudyFolder, start: Start) -> St
 
 
 def test_its_id_is_suggested_again_and_can_be_begun(left: StudyFolder, start: Start, attend: Any) -> None:
-    assert suggest_id(left) == "P004"
+    assert used_ids(left).suggested() == "P004"
     check_unused(left, "P004", 1)
     with start("P004") as store:
         store.append("page_shown", page="consent")
-        assert suggest_id(left) == "P005"
+        assert used_ids(left).suggested() == "P005"
         store.finish("completed")
     with pytest.raises(StoreError, match="P004 already has session 1"):
         start("P004")
@@ -96,7 +98,7 @@ def test_going_on_with_it_says_that_it_is_to_be_begun(left: StudyFolder, protoco
         lambda: reopen(place.path, protocol, SOURCE, operator="", device={}, screens={}),
         lambda: app.resume(place.path),
     ):
-        with pytest.raises(StoreError, match=r"nothing can go on: begin it as a new session of participant P004"):
+        with pytest.raises(StoreError, match=r"it cannot be resumed: begin a new session of participant P004"):
             go_on()
 
 
@@ -135,7 +137,7 @@ def test_what_a_program_killed_while_claiming_left_is_swept_with_the_next_claim(
     assert markers(half)
     start("P003", session=2).close()
     assert half.is_dir(), "another participant's"
-    assert suggest_id(study) == "P004"
+    assert used_ids(study).suggested() == "P004"
     start("P004").finish("completed")
     assert [path.name for path in place.iterdir()] == ["ses-01"]
     assert verify(study.path).errors == ()

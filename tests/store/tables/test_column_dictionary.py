@@ -6,15 +6,21 @@ import pytest
 
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
-from study_app.store.tables.columns import EXCLUSIONS, TABLES
+from study_app.store.tables.columns import EXCLUSIONS, GROUP, INTERVALS, RESPONSES_2, TABLES, TRIALS_2
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
+
+OF_FORMAT_2 = tuple(column for column in TRIALS_2 if column not in TABLES["trials"])
 
 
 def test_every_column_of_every_file_has_its_line() -> None:
     text = dictionary_markdown()
     sections = {title: columns for title, _, _, columns in SECTIONS}
-    assert list(sections.values()) == [*TABLES.values(), EXCLUSIONS, SAMPLES, FRAMES]
-    parts = re.split(r"^<summary><b>(\w+)</b>: ", text, flags=re.MULTILINE)
+    responses, trials, participants = TABLES.values()
+    tables = [responses, RESPONSES_2, trials, INTERVALS, participants]
+    outcome, group = OF_FORMAT_2
+    assert (outcome.levels[-1][0], group) == ("invalid", GROUP)
+    assert list(sections.values()) == [*tables, OF_FORMAT_2, EXCLUSIONS, SAMPLES, FRAMES]
+    parts = re.split(r"^<summary><b>([\w, ]+)</b>: ", text, flags=re.MULTILINE)
     assert parts[1::2] == [*sections, "Journal"]
     for title, part in zip(parts[1::2], parts[2::2], strict=True):
         names = re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE)
@@ -42,11 +48,11 @@ def test_every_table_is_one_that_renders() -> None:
     [
         "| `response` | whole number, 1 to 7, or n/a | The answer on the scale, from 1 (completely disagree) to 7 "
         "(completely agree). |",
-        "| `simulated` | true, false | true where participant and device were simulated (a rehearsal). |",
+        "| `simulated` | true, false | true if participant and device were simulated (a rehearsal). |",
         "| `force_peak_n` | number [N], or n/a | Largest magnitude of the force sent to the device. **Sealed until "
         "unblinding.** |",
-        "| `page_left` | `page` | The participant went on from it. |",
-        "| `due_ns` | whole number [ns] | When the turn was due; it was late by time_ns - due_ns. |",
+        "| `page_left` | `page` | The participant left it. |",
+        "| `due_ns` | whole number [ns] | Time when the tick was due; its lateness is time_ns - due_ns. |",
     ],
 )
 def test_a_line_says_kind_unit_range_and_meaning(line: str) -> None:

@@ -5,7 +5,9 @@ import re
 import pytest
 
 from study_app.haptics.model.layout import LIMITER_NAMES
-from study_app.store.tables.columns import TABLES, Column, every_column, header, variable
+from study_app.store.tables.cells import variable
+from study_app.store.tables.column import Column, header
+from study_app.store.tables.columns import TABLES, every_column
 
 
 @pytest.mark.parametrize("table", TABLES)
@@ -56,6 +58,6 @@ def test_a_variable_is_a_property_value_with_unit_range_and_levels() -> None:
         "unitText": "s",
         "minValue": 0,
     }
-    phase = Column("phase", "text", "What for.", levels=(("main", "counts"), ("practice", "learning")))
-    assert variable(phase)["description"] == "What for. Levels: main: counts; practice: learning."
+    phase = Column("phase", "text", "What for.", levels=(("main", "analysed"), ("practice", "learning")))
+    assert variable(phase)["description"] == "What for. Levels: main: analysed; practice: learning."
     assert variable(phase)["valuePattern"] == "(main|practice)"

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -114,10 +115,10 @@ def test_of_two_programs_the_last_to_write_has_seen_both(
     write, other = participants.write_file, start("P002")
     store = start("P001")
 
-    def late(path: Path, content: bytes) -> None:
+    def late(path: Path, content: bytes, **given: Any) -> None:
         monkeypatch.setattr(participants, "write_file", write)
         other.finish("withdrawn")
-        write(path, content)
+        write(path, content, **given)
 
     monkeypatch.setattr(participants, "write_file", late)
     store.finish("completed")
@@ -195,6 +196,88 @@ def test_a_list_reads_no_journal_that_is_older_than_the_table(
     known = participants.participants(study)
     assert participants.participants_at_once(study) == known
     assert [row["status"] for row in known] == ["damaged", "damaged", "completed", "completed", "unfinished"]
+
+
+class Killed(BaseException):
+    """The program ends here."""
+
+
+def test_a_program_killed_after_it_overwrote_a_newer_row_leaves_a_table_that_heals(
+    tmp_path: Path, start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, other = participants.write_file, start("P002")
+    store = start("P001")
+    study = StudyFolder(tmp_path / "study")
+    began_ns = time.time_ns() - 20 * 10**9
+    monkeypatch.setattr(participants, "disk_time_ns", lambda _folder: began_ns)
+
+    def late(path: Path, content: bytes, **given: Any) -> None:
+        monkeypatch.setattr(participants, "write_file", write)
+        other.finish("withdrawn")
+        os.utime(other.folder.journal, ns=(began_ns + 10 * 10**9,) * 2)
+        write(path, content, **given)
+        raise Killed
+
+    monkeypatch.setattr(participants, "write_file", late)
+    with pytest.raises(Killed):
+        store.finish("completed")
+    assert [row["status"] for row in table(study.path)] == ["completed", "unfinished"]
+    participants.write_participants(study, "brackish")
+    assert [row["status"] for row in table(study.path)] == ["completed", "withdrawn"]
+
+
+def test_only_journals_that_changed_since_the_table_was_made_are_read(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    attend: Callable[[SessionStore], None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ("P001", "P002", "P003", "P004", "P005"):
+        store = start(name)
+        attend(store)
+        store.finish("completed")
+    study = StudyFolder(tmp_path / "study")
+    path = study.participants("brackish")
+    age(study.path, 3600.0)
+    whole, scan, read = path.read_bytes(), journal.scan, []
+    monkeypatch.setattr(journal, "scan", lambda file: (read.append(file.parts[-3]), scan(file))[1])
+    start("P006").finish("withdrawn")
+    assert set(read) == {"sub-P006"}
+    rows = path.read_bytes().splitlines(keepends=True)
+    assert rows[:6] == whole.splitlines(keepends=True)
+    no_second = b"".join([*rows[:2], *rows[3:]])
+    as_damaged = b"".join([*rows[:4], rows[4].replace(b"completed", b"damaged"), *rows[5:]])
+    for content, expected in (
+        (no_second, {"P002"}),
+        (as_damaged, {"P004"}),
+        (whole[:-40], {f"P00{n}" for n in range(1, 7)}),
+    ):
+        path.write_bytes(content)
+        age(study.path, 3600.0)
+        read.clear()
+        participants.write_participants(study, "brackish")
+        assert set(read) == {f"sub-{name}" for name in expected}
+        assert path.read_bytes() == b"".join(rows)
+
+
+def test_opening_the_key_makes_no_row_of_the_table_count(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    attend: Callable[[SessionStore], None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    store = start("P001")
+    attend(store)
+    store.finish("completed")
+    study = StudyFolder(tmp_path / "study")
+    age(study.path, 3600.0)
+    scan, read = journal.scan, []
+    monkeypatch.setattr(journal, "scan", lambda file: (read.append(file), scan(file))[1])
+    participants.participants_at_once(study)
+    assert read == []
+    study.reveals.write_text("")
+    participants.participants_at_once(study)
+    assert read == [store.folder.journal]
 
 
 @pytest.mark.parametrize("content", [b"", b"study\nx\n", b"\xff\xfe", b'"', None])

@@ -17,7 +17,9 @@ from study_app.errors import StoreError
 from study_app.store.journals.journal import read
 from study_app.store.progress import progress_of
 from study_app.store.sessions.begin import SessionStore
-from study_app.store.tables.columns import MISSING, RESPONSES, TABLES, TRIALS, Column, header, unsealed, variable
+from study_app.store.tables.cells import variable
+from study_app.store.tables.column import MISSING, Column, header, unsealed
+from study_app.store.tables.columns import RESPONSES, TABLES, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, in_columns_of, read_table
 from study_app.store.tables.formulas import guarded
 from study_app.store.tables.session_tables import latest, participant, responses, trials
@@ -81,6 +83,7 @@ def test_text_comes_back_through_the_csv_module_and_pandas(text: str) -> None:
     assert frame["second"].to_list() == ["end", cell]
 
 
+@pytest.mark.slow
 @given(texts=st.lists(st.tuples(st.text(st.characters(codec="utf-8")), st.text(st.characters(codec="utf-8")))))
 def test_any_text_comes_back_through_the_csv_module(texts: list[tuple[str, str]]) -> None:
     content = csv_bytes(TEXT, [{"first": first, "second": second} for first, second in texts])

@@ -79,7 +79,7 @@ def test_the_folder_of_another_study_is_refused(tmp_path: Path, protocol: Protoc
 def test_a_description_that_is_none_is_named(tmp_path: Path, content: bytes) -> None:
     folder = StudyFolder(tmp_path)
     folder.description.write_bytes(content)
-    with pytest.raises(StoreError, match=r"dataset_description\.json describes no study"):
+    with pytest.raises(StoreError, match=r"dataset_description\.json does not describe a study"):
         check_study(folder, "brackish")
 
 
@@ -87,7 +87,7 @@ def test_a_description_that_cannot_be_read_is_named(tmp_path: Path, protocol: Pr
     folder = StudyFolder(tmp_path)
     folder.description.mkdir()
     for attempt in (lambda: check_study(folder, "brackish"), lambda: write_description(folder, protocol.study)):
-        with pytest.raises(StoreError, match=r"dataset_description\.json cannot be read \(it is no file\)"):
+        with pytest.raises(StoreError, match=r"dataset_description\.json cannot be read \(it is not a file\)"):
             attempt()
 
 

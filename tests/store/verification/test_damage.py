@@ -27,6 +27,8 @@ from study_app.store.verification.verify_study import verify
 from study_app.viewmodels.sessions import sessions
 from tests.store.conftest import SOURCE
 
+pytestmark = pytest.mark.slow
+
 FINISHED = "data/sub-P007/ses-01"
 UNFINISHED = "data/sub-P008/ses-01"
 SEED = int(os.environ.get("LIQUID_STUDY_DAMAGE_SEED", "5"))

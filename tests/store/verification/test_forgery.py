@@ -26,7 +26,7 @@ from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.fingerprints import listed
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import SOURCE
-from tests.store.verification.forging import Lines, cover_up, forge
+from tests.store.forging import Lines, cover_up, forge
 
 P007 = "data/sub-P007/ses-01"
 
@@ -136,17 +136,18 @@ def change_and_rebuild(study: Path) -> None:
     rebuild(study / P007)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("act", "sentence"),
     [
         (edit_a_response, "was written after another line than the one before it, which was changed"),
         (edit_the_responses, "another answer than was chosen before: it was changed"),
         (take_a_choice_away, "another answer than was chosen before: it was changed"),
-        (cut_the_journal, "was made when the session had ended, though the journal has no end"),
+        (cut_the_journal, "was written after the session ended, but the journal has no end"),
         (cut_the_journal_and_delete_the_checksums, f"{P007}: is not the session that fingerprints.txt lists as"),
-        (delete_a_participant, f"{P007}: is missing, though fingerprints.txt lists it"),
-        (call_the_simulated_real, "simulated: not as in the journal"),
-        (leave_out_the_chain, "has another format than receipt.json says"),
+        (delete_a_participant, f"{P007}: is missing, but fingerprints.txt lists it"),
+        (call_the_simulated_real, "simulated: differ from the journal"),
+        (leave_out_the_chain, "has another format than receipt.json states"),
         (begin_the_chain_late, "has previous, and the lines before it lack it"),
         (change_and_rebuild, f"{P007}: is not the session that fingerprints.txt lists as"),
     ],
@@ -204,12 +205,13 @@ def add_a_session(study: Path) -> None:
         table.unlink()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("act", "sentence"),
     [
         (change_every_answer, f"{P007}: is not the session that"),
-        (cut_the_journal, "it has no end any more"),
-        (forget_a_participant, f"{P007}: is missing, though"),
+        (cut_the_journal, "it no longer has an end"),
+        (forget_a_participant, f"{P007}: is missing, but"),
         (call_everything_real, f"{P007}: is not the session that"),
         (write_it_in_format_1, f"{P007}: is not the session that"),
         (end_it_with_another_status, f"{P007}: is not the session that"),
@@ -232,7 +234,7 @@ def test_changed_tables_do_not_survive_a_rebuild(study: Path, tmp_path: Path) ->
     before = [table.read_bytes() for table in tables]
     for table in tables:
         table.write_bytes(table.read_bytes().replace(b",7,", b",1,").replace(b"complete", b"timeout"))
-    assert "is not what the journal gives" in told(study)
+    assert "differs from the journal" in told(study)
     (study / P007 / "checksums.sha256").unlink()
     rebuild(study / P007)
     assert [table.read_bytes() for table in tables] == before
@@ -240,6 +242,7 @@ def test_changed_tables_do_not_survive_a_rebuild(study: Path, tmp_path: Path) ->
     assert verify(study, tmp_path / "kept.txt").sound
 
 
+@pytest.mark.slow
 def test_a_marker_of_another_machine_hides_no_forgery_from_the_fingerprints_kept_elsewhere(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -256,7 +259,7 @@ def test_a_marker_of_another_machine_hides_no_forgery_from_the_fingerprints_kept
 def test_a_line_that_records_no_reveal_opens_no_key(study: Path, record: dict[str, str]) -> None:
     StudyFolder(study).reveals.write_text(json.dumps(record) + "\n")
     assert blinding.revealed_key(study) is None
-    assert "reveals.jsonl: line 1 records no reveal: it was changed" in told(study)
+    assert "reveals.jsonl: line 1 is not a reveal: it was changed" in told(study)
 
 
 def test_a_torn_reveal_is_a_warning_and_opens_no_key(study: Path) -> None:
@@ -265,7 +268,7 @@ def test_a_torn_reveal_is_a_warning_and_opens_no_key(study: Path) -> None:
     path.write_bytes(path.read_bytes()[:-9])
     assert blinding.revealed_key(study) is None
     assert told(study) == ""
-    assert "line 1 records no reveal: it was torn" in "\n".join(map(str, verify(study).warnings))
+    assert "line 1 is not a reveal: it is incomplete" in "\n".join(map(str, verify(study).warnings))
 
 
 def test_an_unfinished_session_with_a_changed_line_does_not_go_on(
@@ -280,13 +283,15 @@ def test_an_unfinished_session_with_a_changed_line_does_not_go_on(
         check_can_go_on(store.folder.path, protocol, SOURCE)
     store.folder.journal.write_bytes(before)
     forge(store.folder.journal, lambda lines: lines[0].pop("format"), chained=False)
-    with pytest.raises(StoreError, match="has another format than its receipt says"):
+    with pytest.raises(StoreError, match="has another format than its receipt states"):
         check_can_go_on(store.folder.path, protocol, SOURCE)
 
 
 def test_a_fingerprint_is_what_the_documentation_says(study: Path) -> None:
     """It can be computed without this program: SHA-256 of some lines of the list, in base32."""
-    for proof, place in listed(StudyFolder(study).fingerprints):
+    proofs = listed(StudyFolder(study).fingerprints)
+    assert proofs
+    for proof, place in proofs:
         lines = (study / place / "checksums.sha256").read_text().splitlines(keepends=True)
         proved = "".join(line for line in lines if "_data.csv" not in line and "rebuilt.txt" not in line)
         letters = base64.b32encode(hashlib.sha256(proved.encode()).digest()).decode().lower()
@@ -301,16 +306,16 @@ def test_the_command_compares_with_the_copy(study: Path, tmp_path: Path) -> None
     cover_up(study)
     done = CliRunner().invoke(commands, words)
     assert (done.exit_code, done.output.splitlines()[-1]) == (3, "1 session: not sound")
-    assert f"error: {P007}: is missing, though" in done.output
+    assert f"error: {P007}: is missing, but" in done.output
 
 
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        (None, "is no file: name a copy"),
-        (b"", "holds no fingerprint"),
-        (b"\xff\n", "line 1 is no fingerprint: a line must be such as"),
-        (b"k3vq-7m2p-xw4d data/sub-P007/ses-01\nx\n", "line 2 is no fingerprint"),
+        (None, "is not a file: name a copy"),
+        (b"", "has no fingerprint"),
+        (b"\xff\n", "line 1 is not a fingerprint: a line must be such as"),
+        (b"k3vq-7m2p-xw4d data/sub-P007/ses-01\nx\n", "line 2 is not a fingerprint"),
     ],
 )
 def test_a_copy_that_is_none_is_named(study: Path, tmp_path: Path, content: bytes | None, sentence: str) -> None:

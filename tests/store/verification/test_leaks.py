@@ -14,7 +14,8 @@ from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.sessions.begin import SessionStore
-from study_app.store.verification.leaks import Telltales, certain_telltales, leaks, telltales
+from study_app.store.verification.leaks import Telltales, certain_telltales, leaks, presented_numbers, telltales
+from tests.protocol.trials.studies import study as levels_study
 
 
 def found(folder: Path, protocol: Protocol) -> list[tuple[str, str]]:
@@ -145,6 +146,18 @@ def test_the_sealed_key_gives_the_words_too(
     words = certain_telltales(key.tables, receipt.without_conditions(protocol)).words
     assert {"quagmire", "feel_mildew", "1013.7", "0.99917"} < words
     assert "137" not in words
+
+
+def test_levels_standards_and_comparisons_are_looked_for_in_every_unit(tmp_path: Path) -> None:
+    edits = (("standards = [1, 2]", "standards = [1.0713]"), ("[0.2, 0.4, 0.8]", "[0.2371]"))
+    protocol = levels_study(*edits)
+    comparison = 1.0713 + 1.0713 * 0.2371
+    assert presented_numbers(protocol) == {1.0713, 0.2371, comparison}
+    (tmp_path / "notes.txt").write_text(f"level 0.2371\nnothing\nfelt {comparison!r} Pa s, or {comparison * 1000!r}")
+    assert {place for place, _ in found(tmp_path, protocol)} == {"notes.txt, line 1", "notes.txt, line 3"}
+    published = receipt.without_conditions(protocol)
+    certain = certain_telltales({"liquids": {}, "conditions": {}}, published, presented_numbers(protocol))
+    assert certain.in_text(f"{comparison!r} and 0.2371") == [repr(comparison)], "short numbers stand anywhere"
 
 
 def test_without_words_nothing_is_found() -> None:

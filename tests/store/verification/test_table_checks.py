@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.store.tables.columns import Column, header
+from study_app.store.tables.column import Column, header
 from study_app.store.verification.table_checks import problems
 
 COLUMNS = (
@@ -66,12 +66,12 @@ def test_columns_are_those_of_the_dictionary_in_its_order() -> None:
     names = header(COLUMNS)
     assert found(names=names[1:]) == ["columns are missing: name"]
     assert found(names=(*names, "mood")) == ["columns are unknown: mood"]
-    assert found(names=(names[1], names[0], *names[2:])) == ["columns are in another order, or there more than once"]
-    assert found(names=(*names, "name")) == ["columns are in another order, or there more than once"]
+    assert found(names=(names[1], names[0], *names[2:])) == ["columns are in another order or duplicated"]
+    assert found(names=(*names, "name")) == ["columns are in another order or duplicated"]
     assert found(RIGHT, RIGHT[:-1]) == ["row 3 has 5 cells, not 6"]
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff", b'name,"count\n'])
 def test_what_is_no_table_is_named(content: bytes) -> None:
     (problem,) = problems(content, COLUMNS)
-    assert problem.startswith(("columns are missing", "is no CSV in UTF-8"))
+    assert problem.startswith(("columns are missing", "is not CSV in UTF-8"))

@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from study_app.protocol.forms.simulated_observer import Felt
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.questions.simulated_answers import Felt
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.sessions.begin import SessionStore, begin
+from study_app.store.sessions.begin import SessionStart, SessionStore, begin
 from study_app.store.verification.verify_study import verify
 from tests.faults.support import short
+from tests.platforms import needs_fork
 from tests.store.conftest import SOURCE, choose, study_tables, summary_of_trial
+
+pytestmark = pytest.mark.slow
 
 ENOUGH = 1  # looks
 MOST = 12  # sessions of a program
-
-forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
 
 
 def hold_sessions(study: Path, first: int, enough: Any) -> None:
@@ -35,7 +35,7 @@ def hold_sessions(study: Path, first: int, enough: Any) -> None:
             break
         person = f"P{number:03d}"
         who: dict[str, Any] = {"seed": 11, "operator": "AB", "language": "en", "simulated": True}
-        store = begin(study, protocol, SOURCE, person, device={"name": "scripted"}, screens={}, **who)
+        store = begin(study, protocol, SOURCE, SessionStart(person, device={"name": "scripted"}, screens={}, **who))
         for trial in build_schedule(protocol, person, 11).trials:
             which = {"trial": trial.number, "attempt": 1}
             told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
@@ -86,7 +86,7 @@ def look_beside(study: Path, *programs: tuple[Callable[..., None], tuple[Any, ..
     return looks, running, errors
 
 
-@forks
+@needs_fork
 def test_sessions_that_are_begun_and_ended_beside_it_are_never_called_unsound(tmp_path: Path) -> None:
     """Two programs write to one study, with all that begins and ends a session."""
     study = tmp_path / "study"
@@ -97,7 +97,7 @@ def test_sessions_that_are_begun_and_ended_beside_it_are_never_called_unsound(tm
     assert (findings.sound, findings.running) == (True, 0)
 
 
-@forks
+@needs_fork
 def test_a_rehearsal_with_recordings_beside_it_is_never_called_unsound(tmp_path: Path) -> None:
     _, running, errors = look_beside(tmp_path / "study", (rehearse_short, (short.write(tmp_path),)))
     assert errors == []
@@ -105,7 +105,7 @@ def test_a_rehearsal_with_recordings_beside_it_is_never_called_unsound(tmp_path:
     assert verify(tmp_path / "study").sound
 
 
-@forks
+@needs_fork
 def test_answers_that_are_written_beside_it_are_never_called_unsound(tmp_path: Path) -> None:
     looks, _, errors = look_beside(tmp_path / "study", (answer_only, ()))
     assert errors == []

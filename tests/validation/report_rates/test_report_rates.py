@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
 
 import numpy as np
@@ -11,16 +12,22 @@ from click.testing import CliRunner
 
 from study_app.analysis.designs.block_tests import of_tables
 from study_app.analysis.evaluate import found_in
+from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
+from study_app.analysis.findings.delay_trend import FINDING as TREND
+from study_app.analysis.findings.detection_threshold import FINDING as THRESHOLD
+from study_app.analysis.findings.liquid_recognition import FINDING as RECOGNITION
+from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
+from study_app.analysis.findings.other_assumptions import FINDING as AGAIN
+from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
+from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
 from study_app.analysis.power.plan import plan
 from study_app.analysis.statistics.psychometrics.threshold import noticed
 from study_app.cli import commands
+from study_app.protocol.forms.simulated_observer import Felt
 from study_app.protocol.load import load
-from study_app.protocol.questions.simulated_answers import Felt
-from study_app.validation.report_rates import simulated_studies as studies
+from study_app.validation.report_rates import known_effects as studies
 from study_app.validation.report_rates import simulation, single_test_rates
-from study_app.validation.report_rates.rate_tables import markdown, table
-from study_app.validation.report_rates.rates import Limit, Rate
-from study_app.validation.report_rates.simulated_studies import (
+from study_app.validation.report_rates.known_effects import (
     EXTENTS,
     GENERATORS,
     Extent,
@@ -30,8 +37,11 @@ from study_app.validation.report_rates.simulated_studies import (
     answers,
     simulated,
 )
+from study_app.validation.report_rates.rate_tables import markdown, table
+from study_app.validation.report_rates.rates import Limit, Rate
 from study_app.validation.report_rates.simulation import validate
 from study_app.validation.report_rates.study_rates import CLAIMED, LOST, Cell, count, truth
+from study_app.workers.executors import open_executor
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +97,7 @@ def test_settings_that_are_alike_are_answered_alike_on_average(
             assert np.ptp(means, axis=0).max() > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("participants", [5, 15])
 def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, participants: int) -> None:
     people = tuple(f"P{number}" for number in range(participants))
@@ -100,22 +111,33 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, partic
                 )
                 for verdicts_only in (False, True)
             )
-            assert [one.verdict for one in quick.against] == [one.verdict for one in whole.against]
-            assert [one.found.effect for one in quick.against] == [one.found.effect for one in whole.against]
-            for one, other in zip(quick.against, whole.against, strict=True):
+            assert [one.verdict for one in CONTRASTS.of(quick)] == [one.verdict for one in CONTRASTS.of(whole)]
+            assert [one.found.effect for one in CONTRASTS.of(quick)] == [
+                one.found.effect for one in CONTRASTS.of(whole)
+            ]
+            for one, other in zip(CONTRASTS.of(quick), CONTRASTS.of(whole), strict=True):
                 told = {field.name: getattr(one.found, field.name) for field in fields(one.found)}
                 told = {name: value for name, value in told.items() if value not in (None, "") and name != "note"}
                 told.pop("checks_agree", None)
                 assert told == {name: getattr(other.found, name) for name in told}
-            assert quick.equivalent_up_to == whole.equivalent_up_to
-            assert (quick.omnibus, quick.pairs) == (whole.omnibus, whole.pairs)
-            assert [one.p_adjusted for one in quick.trends] == [one.p_adjusted for one in whole.trends]
-            assert (quick.lowest, quick.threshold, quick.mixed) == (whole.lowest, whole.threshold, ())
-            if whole.named is not None and quick.named is not None:
-                assert (quick.named.verdict, quick.named.found.p) == (whole.named.verdict, whole.named.found.p)
-            assert (quick.named is None) == (whole.named is None)
+            assert CONTRASTS.entries(quick).keys() == CONTRASTS.entries(whole).keys()
+            assert CONTRASTS.entries(quick)["equivalent_up_to"] == CONTRASTS.entries(whole)["equivalent_up_to"]
+            assert (OMNIBUS.of(quick), PAIRS.of(quick)) == (OMNIBUS.of(whole), PAIRS.of(whole))
+            assert [one.p_adjusted for one in TREND.of(quick)] == [one.p_adjusted for one in TREND.of(whole)]
+            assert (LOWEST.of(quick), THRESHOLD.of(quick), AGAIN.of(quick).mixed) == (
+                LOWEST.of(whole),
+                THRESHOLD.of(whole),
+                (),
+            )
+            if RECOGNITION.of(whole) is not None and RECOGNITION.of(quick) is not None:
+                assert (RECOGNITION.of(quick).verdict, RECOGNITION.of(quick).found.p) == (
+                    RECOGNITION.of(whole).verdict,
+                    RECOGNITION.of(whole).found.p,
+                )
+            assert (RECOGNITION.of(quick) is None) == (RECOGNITION.of(whole) is None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("generator", GENERATORS)
 def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(studies, "TRUTH", 200)
@@ -130,6 +152,19 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
     }
     assert rates == [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
     assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
+
+
+def test_rates_do_not_depend_on_the_executor(rek: Simulated, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(studies, "TRUTH", 200)
+    monkeypatch.setattr(simulation, "EXTENTS", EXTENTS[:1])
+    monkeypatch.setattr(simulation, "ROUNDS", 1)
+    found = []
+    for engine, workers in (("threads", 1), ("threads", 2), ("processes", 2)):
+        with open_executor(engine, workers) as executor:  # type: ignore[arg-type]
+            *_, last = validate(rek, 2, executor, sizes=(5,))
+        found.append(last)
+    assert found[0][0] > 0
+    assert found[0] == found[1] == found[2]
 
 
 def test_two_studies_in_one_process_have_truths_of_their_own(rek: Simulated, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,10 +182,10 @@ def test_two_studies_in_one_process_have_truths_of_their_own(rek: Simulated, mon
 @pytest.mark.parametrize(
     ("hits", "code", "last"),
     [
-        ((20, 0), 0, "every rate keeps to its limit"),
+        ((20, 0), 0, "every rate is within its limit"),
         ((62, 0), 4, "1 of 2 rates undecided: simulate more studies"),
-        ((62, 300), 3, "1 of 2 rates beyond their limits, 1 undecided"),
-        ((), 4, "nothing was counted"),
+        ((62, 300), 3, "1 of 2 rates exceed their limits, 1 undecided"),
+        ((), 4, "no rate was counted"),
     ],
 )
 def test_the_command_tells_rates_that_are_undecided_from_rates_that_hold(
@@ -160,7 +195,7 @@ def test_the_command_tells_rates_that_are_undecided_from_rates_that_hold(
     rates += (Rate("cell", 5, "size", "counted", 7, 1000),) if rates else ()
     monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda *_args, **_named: None)
     monkeypatch.setattr("study_app.analysis.power.plan.plan", lambda *_args: None)
-    monkeypatch.setattr("study_app.validation.report_rates.simulated_studies.simulated", lambda *_args: None)
+    monkeypatch.setattr("study_app.validation.report_rates.known_effects.simulated", lambda *_args: None)
     monkeypatch.setattr(
         "study_app.validation.report_rates.simulation.validate", lambda *_args, **_named: [(1000, rates)]
     )
@@ -169,6 +204,7 @@ def test_the_command_tells_rates_that_are_undecided_from_rates_that_hold(
     assert done.output.splitlines()[-1] == last
 
 
+@pytest.mark.slow
 def test_single_tests_are_counted() -> None:
     (leaning,) = single_test_rates.count(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
     assert (leaning.studies, leaning.limit) == (4, "at most 5 %")
@@ -207,7 +243,7 @@ def continued(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[tuple[int, int]
         return count_
 
     monkeypatch.setattr(
-        simulation, "_counts", lambda *_: {("clear", 5): counted("clear", 0), ("unclear", 5): counted("unclear", 2)}
+        simulation, "cell_counts", lambda *_: {("clear", 5): counted("clear", 0), ("unclear", 5): counted("unclear", 2)}
     )
     return batches
 
@@ -216,7 +252,8 @@ def test_cells_with_an_undecided_rate_are_continued_with_other_studies(
     rek: Simulated, continued: dict[str, list[tuple[int, int]]]
 ) -> None:
     told: list[str] = []
-    *_, (done, rates) = validate(rek, 290, jobs=1, progress=told.append)
+    with ThreadPoolExecutor(1) as executor:
+        *_, (done, rates) = validate(rek, 290, executor, progress=told.append)
     assert continued["clear"] == [(batch, 25) for batch in range(11)] + [(11, 15)]
     assert [batch for batch, _ in continued["unclear"]] == list(range(24))  # 24 of 290 are undecided, of 580 4.1 % hold
     assert [(rate.hits, rate.studies, rate.holds) for rate in rates] == [(0, 290, "yes"), (24, 580, "yes")]
@@ -228,7 +265,8 @@ def test_a_cell_is_continued_until_it_is_beyond_or_has_four_times_the_studies(
     rek: Simulated, continued: dict[str, list[tuple[int, int]]]
 ) -> None:
     told: list[str] = []
-    *_, (done, rates) = validate(rek, 10, jobs=1, progress=told.append)
+    with ThreadPoolExecutor(1) as executor:
+        *_, (done, rates) = validate(rek, 10, executor, progress=told.append)
     assert [(rate.hits, rate.studies, rate.holds) for rate in rates] == [(0, 40, "too few studies"), (6, 30, "no")]
     assert continued == {"clear": [(batch, 10) for batch in range(4)], "unclear": [(batch, 10) for batch in range(3)]}
     assert done == 70

@@ -10,8 +10,10 @@ if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
 from study_app.evaluation.reference_model import wakes
+from study_app.haptics.model.effects.current import Uniform
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
-from study_app.haptics.model.scene import Box, Liquid, Scene, Uniform, Wake
+from study_app.haptics.model.scene import Box, Liquid, Scene
 from study_app.validation.soak.exact_wake import Ledger, wake_of
 from study_app.validation.soak.wake_drift import Drift
 

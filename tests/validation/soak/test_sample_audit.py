@@ -16,7 +16,7 @@ PERIOD_NS = 1_000_000
 
 
 def samples(count=10):
-    """Return good samples: a steady force, turn after turn."""
+    """Return good samples: a steady force, tick after tick."""
     made = records(SAMPLE, count)
     made.tick = np.arange(count)
     made.time_ns = np.arange(count) * PERIOD_NS + 100
@@ -88,12 +88,12 @@ def test_a_lost_device_begins_another_run():
     assert (counts.lost, counts.silent) == (1, 0)
 
 
-def test_missing_turns_are_counted():
+def test_missing_ticks_are_counted():
     made = samples()
     assert broken(audited(made[[0, 1, 2, 6, 7, 8]])) == {"missing": 3}
 
 
-def test_a_turn_that_takes_long_passes_deadlines_over():
+def test_a_tick_that_takes_long_passes_deadlines_over():
     made = samples()
     made.busy_ns[7] = 3_500_000
     made.time_ns[8:] += 2_000_000
@@ -101,4 +101,4 @@ def test_a_turn_that_takes_long_passes_deadlines_over():
     made.lateness_ns[8] += 500_000
     counts = audited(made)
     assert broken(counts) == {"overruns": 2}
-    assert counts.long_turns == 1
+    assert counts.long_ticks == 1

@@ -23,6 +23,8 @@ from study_app.protocol.load import load_scenes
 from study_app.validation.soak.soak import Soak, soak
 from study_app.validation.soak.wake_drift import Drift
 
+pytestmark = pytest.mark.slow
+
 SHORT_H = 2 / 60
 
 
@@ -74,7 +76,7 @@ def test_liquids_without_a_wake_are_soaked_too():
     assert found.drift.comparisons == 0
 
 
-def test_two_real_seconds_turn_in_a_thread_of_their_own(scenes):
+def test_two_real_seconds_tick_in_a_thread_of_their_own(scenes):
     found = soak(scenes, 2 / 3600, virtual=False)
     assert found.findings == ()
     assert found.ticks >= found.planned
@@ -100,8 +102,8 @@ def test_one_that_is_asked_to_end_says_what_it_has(scenes):
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_no_force_turns_to_and_fro_where_a_hand_keeps_still(scenes, seed):
-    """An account in debt once let the force flip between two counts of the encoder, for seconds."""
+def test_no_force_ticks_to_and_fro_where_a_hand_keeps_still(scenes, seed):
+    """An passivity in debt once let the force flip between two counts of the encoder, for seconds."""
     rested = []
     with Soak({"light_oil": scenes["light_oil"]}, 0.012, virtual=True, seed=seed) as run:
         run.device.allow = lambda _faults, _gap: None
@@ -109,7 +111,7 @@ def test_no_force_turns_to_and_fro_where_a_hand_keeps_still(scenes, seed):
         while run.done < run.ticks:
             run.step()
             seen = reader.read()
-            if run._stretch.part == "rest":
+            if run.stretch.part == "rest":
                 rested.append(seen.device_force_n.copy())
     force_n = np.concatenate(rested)
     assert len(force_n) > 5000
@@ -149,7 +151,7 @@ def stepped(scenes, spoil, *, at=0.5, hours=SHORT_H):
 
 def test_a_spoilt_sum_of_the_wake_is_found(scenes):
     def spoil(run):
-        for model in run.servo._loop._slots:
+        for model in run.servo.loop.slots:
             model.liquid_states.wake.scale *= 1 + 1e-6
 
     found = stepped(scenes, spoil, at=0.15)  # in the steady part of a round in water, whose wake is 1.7 s long
@@ -159,7 +161,7 @@ def test_a_spoilt_sum_of_the_wake_is_found(scenes):
 
 def test_a_spoilt_decay_of_the_wake_is_found(scenes):
     def spoil(run):
-        for model in run.servo._loop._slots:
+        for model in run.servo.loop.slots:
             model.liquids.wake.log_decay_per_s *= 1 + 1e-4
 
     assert any("off its definition" in finding for finding in stepped(scenes, spoil, at=0.6).findings)
@@ -167,22 +169,22 @@ def test_a_spoilt_decay_of_the_wake_is_found(scenes):
 
 def test_a_force_of_the_liquids_that_is_no_number_is_found(scenes):
     def spoil(run):
-        for model in run.servo._loop._slots:
+        for model in run.servo.loop.slots:
             model.liquids.drag.factor_kg_m = math.nan
 
     found = stepped(scenes, spoil, at=0.6)
-    assert found.findings == ("1 forces of the liquids that are no numbers",)
+    assert found.findings == ("1 non-finite forces of the liquids",)
     assert found.device.not_finite == 0, "none of them was sent"
 
 
-def test_a_servo_that_takes_no_turn_is_not_waited_for(scenes, monkeypatch):
+def test_a_servo_that_takes_no_tick_is_not_waited_for(scenes, monkeypatch):
     now_s = iter(range(0, 1000, 6))
     monkeypatch.setattr("study_app.validation.soak.soak.time.monotonic", lambda: next(now_s))
     with Soak(scenes, SHORT_H, virtual=True) as run:
         run.step()
-        run.servo.advance = lambda _turns: 0
+        run.servo.advance = lambda _ticks: 0
         run.step()
-        with pytest.raises(ServoFault, match="no turn for 10 s"):
+        with pytest.raises(ServoFault, match="no tick for 10 s"):
             run.step()
 
 
@@ -195,8 +197,8 @@ def test_memory_that_is_kept_is_found(scenes):
 
 def test_a_force_above_the_limit_is_found(scenes):
     def spoil(run):
-        run.servo._loop._safety[0].device_limit_n = 20.0
-        for model in run.servo._loop._slots:
+        run.servo.loop.safety[0].device_limit_n = 20.0
+        for model in run.servo.loop.slots:
             model.parameters.force_limit_n = 20.0
             model.parameters.slope_limit_nspm *= 10
 
@@ -216,8 +218,8 @@ def test_samples_read_too_late_are_counted_and_cost_nothing_else(scenes):
 def test_dropped_samples_that_are_not_counted_are_found(scenes):
     def spoil(run):
         run.servo.advance(50_000)
-        run._reader.read()
-        run._reader.dropped = 0
+        run.reader.read()
+        run.reader.dropped = 0
 
     assert any("dropped" in finding for finding in stepped(scenes, spoil, at=0.6).findings)
 
@@ -226,15 +228,15 @@ def test_dropped_samples_that_are_not_counted_are_found(scenes):
     ("record", "name", "value", "said"),
     [
         ("counts", "excess", 1, "above the limit"),
-        ("counts", "no_number", 1, "no numbers"),
+        ("counts", "no_number", 1, "non-finite forces"),
         ("counts", "steps", 1, "not 1.5 N"),
         ("counts", "unstopped", 1, "while stopped"),
-        ("counts", "believed", 1, "no place"),
+        ("counts", "believed", 1, "implausible readings"),
         ("counts", "drift_ns", 1, "off its ticks"),
-        ("counts", "overruns", -1, "follow from the turns"),
+        ("counts", "overruns", -1, "follow from the ticks"),
         ("counts", "samples", 0, "ticks are not"),
         ("counts", "displaced", 0, "readings of glitch"),
-        ("device", "not_finite", 1, "written that are no numbers"),
+        ("device", "not_finite", 1, "non-finite forces were written"),
         ("device", "most_n", 8.1, "of 8.1 N was written"),
         ("device", "last_n", 0.1, "not zero"),
     ],

@@ -28,6 +28,7 @@ def total_j(arm):
     return 0.5 * (kinetic_j + springs_j)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", [MIDDLE, FIRM])
 def test_arm_follows_the_solution_of_its_equations(hold):
     def path(t):

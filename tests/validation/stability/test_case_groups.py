@@ -22,6 +22,8 @@ from study_app.validation.stability.stability_cases import PLANTS, Case, liquids
 from study_app.validation.stability.verdict import MISJUDGED_ALLOWANCE_J, judge, windows
 from tests.haptics.scenes import COMPILED
 
+pytestmark = pytest.mark.slow
+
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from study_app.haptics.model.limits import bearable, table
+from study_app.haptics.model.limits import damping_limits, table
 from study_app.haptics.model.scene import Ewma, Kalman, Line
 from study_app.validation.stability.damping_boundary import boundary_nspm, measure_limits, passive_nspm
 from tests.haptics.scenes import COMPILED
@@ -99,6 +99,7 @@ def test_without_delay_friction_proves_19_times_its_damping():
     assert 1 / passive_nspm(1.0, alpha=1.0) == pytest.approx(1.0, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [0, 1, 4])
 @pytest.mark.parametrize("friction_nspm", [0.1, 1.0, 10.0])
 def test_what_is_proved_passive_is_stable(delay, friction_nspm):
@@ -106,16 +107,18 @@ def test_what_is_proved_passive_is_stable(delay, friction_nspm):
     assert proved < boundary_nspm(Ewma(), 1e-3, delay, friction_nspm=friction_nspm)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [Ewma(), Ewma(alpha=0.2), Kalman()], ids=str)
 def test_the_shipped_table_is_the_one_that_is_measured(velocity):
     """The first lines of some estimators; the whole is remade by a command."""
     shipped = [it for it in table() if (it.estimator, it.alpha) == (velocity.kind, getattr(velocity, "alpha", None))]
     for one, measured in zip(shipped[:6], measure_limits([velocity]), strict=False):
         assert one[:4] == (measured.estimator, measured.alpha, pytest.approx(measured.period_s), measured.delay_ticks)
-        assert one.bearable == pytest.approx(measured.bearable, rel=0.02, abs=0.11)
+        assert one.limits == pytest.approx(measured.limits, rel=0.02, abs=0.11)
 
 
+@pytest.mark.slow
 def test_every_limit_lies_below_the_boundary():
     for delay in (1, 2, 4):
         for period_s in (0.5e-3, 1e-3, 4e-3):
-            assert bearable(period_s, delay).drag_nspm < 0.78 * boundary_nspm(Ewma(), period_s, delay)
+            assert damping_limits(period_s, delay).drag_nspm < 0.78 * boundary_nspm(Ewma(), period_s, delay)

@@ -12,7 +12,7 @@ from study_app.devices.falcon.exchange import FALCON
 from study_app.validation.stability import driver_loop
 from study_app.validation.stability.driver_loop import BEYOND_SCRIPTED_J, STOP_M, judge_driven
 from study_app.validation.stability.stability_cases import Case, parse
-from study_app.validation.stability.sweep import in_words
+from study_app.validation.stability.stability_report import in_words
 from study_app.validation.stability.trace_measures import given_out_j
 from tests.haptics.scenes import COMPILED
 
@@ -24,15 +24,12 @@ RELEASE = Case(plant="falcon", liquid="light_oil", hand="lets-go", motion="sine"
 
 def traces(case):
     """Return the traces of the Falcon and of a scripted device."""
-    falcon = driver_loop._opened_falcon()
+    falcon = driver_loop.opened_falcon()
     falcon.renew()
-    scripted = driver_loop._Scripted(48e-6)
-    return (
-        driver_loop._falcon_trace(case, falcon),
-        driver_loop._trace(case, scripted, scripted, falcon.dynamics),
-    )
+    return driver_loop.falcon_trace(case, falcon), driver_loop.scripted_traces(case, falcon.dynamics)[1]
 
 
+@pytest.mark.slow
 def test_falcon_and_scripted_device_are_in_the_same_hand():
     case = dataclasses.replace(RELEASE, liquid="water", mass_kg=0.25, release_s=0.9)
     falcon, scripted = traces(case)
@@ -89,51 +86,51 @@ def test_driver_gives_out_no_more_than_the_scripted_device(phase):
 
 def test_driver_that_lets_go_slowly_gives_out_too_much(monkeypatch):
     """The motors go on with what they push for 5 ms."""
-    follow = driver_loop._falcon_trace
+    follow = driver_loop.falcon_trace
 
     def slow(case, falcon):
         trace = follow(case, falcon)
         trace.acting_n[5:] = trace.acting_n[:-5].copy()
         return trace
 
-    monkeypatch.setattr(driver_loop, "_falcon_trace", slow)
+    monkeypatch.setattr(driver_loop, "falcon_trace", slow)
     case = dataclasses.replace(RELEASE, speed_mps=0.75398, liquid="honey", release_s=0.6625)
     assert judge_driven(case).reasons == ("energy",)
 
 
 def test_force_that_trembles_is_unstable(monkeypatch):
-    follow = driver_loop._falcon_trace
+    follow = driver_loop.falcon_trace
 
     def trembling(case, falcon):
         trace = follow(case, falcon)
         trace.sent_n[:, 1] += 0.2 * np.sin(2 * np.pi * 100 * trace.t_s)
         return trace
 
-    monkeypatch.setattr(driver_loop, "_falcon_trace", trembling)
+    monkeypatch.setattr(driver_loop, "falcon_trace", trembling)
     assert judge_driven(RELEASE).reasons == ("force",)
 
 
 def test_position_that_is_no_number_is_unstable(monkeypatch):
-    follow = driver_loop._falcon_trace
+    follow = driver_loop.falcon_trace
 
     def lost(case, falcon):
         trace = follow(case, falcon)
         trace.position_m[100] = math.nan
         return trace
 
-    monkeypatch.setattr(driver_loop, "_falcon_trace", lost)
+    monkeypatch.setattr(driver_loop, "falcon_trace", lost)
     assert judge_driven(RELEASE).reasons == ("not finite",)
 
 
 def test_renewed_falcon_is_as_after_it_was_opened():
-    falcon = driver_loop._opened_falcon()
+    falcon = driver_loop.opened_falcon()
     falcon.renew()
-    before = falcon._memory.tobytes(), falcon.hand.memory.tobytes()
-    driver_loop._falcon_trace(RELEASE, falcon)
-    assert falcon._memory.tobytes() != before[0]
+    before = falcon.memory.tobytes(), falcon.hand.memory.tobytes()
+    driver_loop.falcon_trace(RELEASE, falcon)
+    assert falcon.memory.tobytes() != before[0]
     falcon.renew()
-    assert (falcon._memory.tobytes(), falcon.hand.memory.tobytes()) == before
-    assert falcon._memory.dtype == FALCON
+    assert (falcon.memory.tobytes(), falcon.hand.memory.tobytes()) == before
+    assert falcon.memory.dtype == FALCON
 
 
 def test_command_judges_a_case_through_the_driver():

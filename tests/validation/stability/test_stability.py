@@ -13,14 +13,17 @@ from study_app.cli.options import EXIT_FOUND
 from study_app.errors import StoreError, StudyError
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.protocol.load import load, shipped
-from study_app.validation.stability import sweep as stability
+from study_app.validation.stability import stability_report as stability
 from study_app.validation.stability.case_groups import Group, groups, some, sweep
 from study_app.validation.stability.device_bench import trace_of
 from study_app.validation.stability.fidelity import LIMITED, STUDY_LOOPS, fidelities
 from study_app.validation.stability.stability_cases import GRIPS, Case, liquids, parse, scene_of
 from study_app.validation.stability.trace_measures import fast_part, smooth
 from study_app.validation.stability.verdict import judge
+from study_app.workers.executors import open_executor
 from tests.haptics.scenes import COMPILED
+
+pytestmark = pytest.mark.slow
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 
@@ -30,7 +33,8 @@ PRESETS = [name for name in liquids() if name not in LIMITED]
 
 @pytest.fixture(scope="module")
 def swept():
-    return stability.run_sweep(some(sweep(), 120), [Group("gentle", (Case(), Case(plant="arm")))])
+    with open_executor("threads") as executor:
+        return stability.run_sweep(some(sweep(), 120), [Group("gentle", (Case(), Case(plant="arm")))], executor)
 
 
 def test_the_sweep_has_5000_cases_and_everything_that_it_should():
@@ -57,6 +61,14 @@ def test_many_are_unstable_without_safety_and_none_with_it(swept):
     assert len(unstable) > 25
     assert {reason for verdict in unstable for reason in verdict.reasons} == {"energy", "oscillation", "force"}
     assert [str(verdict.case) for verdict in swept.unstable] == []
+
+
+@compiled
+def test_the_strongest_linear_damper_is_unstable_without_safety_and_stable_with_it():
+    damped = [dataclasses.replace(case, liquid="damper") for case in some(sweep(), 60)]
+    assert sum(not judge(case, safe=False).stable for case in damped) > 25
+    assert [str(case) for case in damped if not judge(case, safe=True).stable] == []
+    assert parse(str(damped[0])) == damped[0]
 
 
 @compiled

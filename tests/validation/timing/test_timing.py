@@ -1,4 +1,4 @@
-"""How loops are timed: by the same rule, in turns, and said in words, tables and a figure. No time is judged here."""
+"""How loops are timed: by the same rule, in ticks, and said in words, tables and a figure. No time is judged here."""
 
 import csv
 import io
@@ -33,7 +33,7 @@ from study_app.validation.timing.timed_scene import FULL, PlayedHand
 from study_app.validation.timing.timing_report import BEGIN, COLUMNS, END, csv_text, markdown, text, write
 
 _virtual_at = record_at(VIRTUAL)
-NORMAL, REAL_TIME = Grant("normal", "no more was asked for"), Grant("real-time", "SCHED_FIFO 60")
+NORMAL, REAL_TIME = Grant("normal", "no more was requested"), Grant("real-time", "SCHED_FIFO 60")
 
 
 def lane(kind, grant, lateness_us, overruns=0, busy_us=()):
@@ -68,17 +68,17 @@ WELL = found(
 
 
 def after(*milliseconds):
-    """Return turns of 10 µs that begin so long after the start [(n, 2) ns], after those of the lead-in."""
+    """Return ticks of 10 µs that begin so long after the start [(n, 2) ns], after those of the lead-in."""
     lead = [(k + 1) * PERIOD_NS for k in range(LEAD_IN)]
     begun = [*lead, *(LEAD_IN * PERIOD_NS + round(ms * 1e6) for ms in milliseconds)]
     return [(begun_ns, begun_ns + 10_000) for begun_ns in begun]
 
 
-def test_turns_on_time_are_not_late():
+def test_ticks_on_time_are_not_late():
     assert taken(0, after(1, 2, 3.25, 4)).lateness_ns.tolist() == [0, 0, 250_000, 0]
 
 
-def test_a_turn_that_comes_late_is_late_by_all_of_it_and_passes_deadlines_over():
+def test_a_tick_that_comes_late_is_late_by_all_of_it_and_passes_deadlines_over():
     late = taken(0, after(1, 5.4, 6))
     assert late.lateness_ns.tolist() == [0, 3_400_000, 1_000_000]
     assert late.overruns == 2
@@ -98,19 +98,18 @@ def _sleep_late(context, deadline_ns):
 
 @pytest.fixture(scope="module")
 def late_clock():
-    """Return a clock in virtual time whose sleeps are late, now and then by several turns."""
+    """Return a clock in virtual time whose sleeps are late, now and then by several ticks."""
     clock = VirtualClock()
     clock.sleep = c_function(SLEEP, _sleep_late)
     return clock
 
 
 def test_servo_and_bare_loop_count_alike(late_clock):
-    """On one clock that is late by a rule, both must say the same of the same number of turns."""
-    bare = BareLoop.__new__(BareLoop)
-    bare.grant, bare._real_time, bare._clock = NORMAL, False, late_clock
-    late_clock._memory[0].now_ns = 0
-    ours = bare.turn(500)
-    late_clock._memory[0].now_ns = 0
+    """On one clock that is late by a rule, both must say the same of the same number of ticks."""
+    bare = BareLoop(NORMAL, real_time=False, clock=late_clock)
+    late_clock.memory[0].now_ns = 0
+    ours = bare.run(500)
+    late_clock.memory[0].now_ns = 0
     servo = Servo(PlayedHand(), clock=late_clock)
     reader = servo.telemetry.reader()
     servo.advance(500 + LEAD_IN)
@@ -118,38 +117,39 @@ def test_servo_and_bare_loop_count_alike(late_clock):
     assert np.array_equal(samples.lateness_ns[LEAD_IN:], ours.lateness_ns)
     assert (ours.lateness_ns > 3_000_000).any()
     passed = np.diff(samples.time_ns - samples.lateness_ns)[LEAD_IN:] // PERIOD_NS - 1
-    assert abs(ours.overruns - int(passed.sum())) <= 2, "the last turn's, and the first one's"
+    assert abs(ours.overruns - int(passed.sum())) <= 2, "the last tick's, and the first one's"
 
 
-# the scene, and what a turn may do
+# the scene, and what a tick may do
 
 
 def test_every_effect_that_can_act_at_once_is_on_and_acts():
-    assert set(FULL.liquids[0].effects) == set(Effect.__args__) - {"local_wake"}
+    assert set(FULL.liquids[0].effects) == set(Effect.__args__) - {"local_wake", "unsteady_drag"}
     servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
     reader = servo.telemetry.reader()
     servo.load(FULL)
     servo.advance(6000)
     samples = reader.read()
-    local = servo._loop._slots[servo._loop.control[0].taken % 2].liquid_states[0]
-    for name in ("drag", "added_mass", "history"):
-        assert np.abs(local[name].force_n).max() > 0, name
+    local = servo.loop.slots[servo.loop.control[0].taken % 2].liquid_states[0]
+    assert np.abs(local.damping_n).max() > 0, "drag"
+    for row, name in enumerate(("added_mass", "history")):
+        assert np.abs(local.inertia_n[row]).max() > 0, name
     assert np.abs(samples.wake_mps).max() > 0.05
     assert np.abs(local.current.velocity_mps).max() > 0
     assert 0.2 < np.linalg.norm(samples.device_force_n, axis=1).max() <= 8
     assert not (samples.limiters & LIMITER_NON_FINITE).any()
 
 
-def test_a_turn_with_every_effect_allocates_nothing():
+def test_a_tick_with_every_effect_allocates_nothing():
     servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
     servo.load(FULL)
     servo.advance(10)
     _nrt_python.memsys_enable_stats()
     try:
 
-        def allocations(turns):
+        def allocations(ticks):
             before = rtsys.get_allocation_stats()
-            servo.advance(turns)
+            servo.advance(ticks)
             return rtsys.get_allocation_stats().alloc - before.alloc
 
         assert allocations(1001) == allocations(1)
@@ -157,17 +157,17 @@ def test_a_turn_with_every_effect_allocates_nothing():
         _nrt_python.memsys_disable_stats()
 
 
-def test_no_python_is_called_in_a_turn():
-    """Ten times the turns make not one call more of a Python function, nor of one of its C functions."""
+def test_no_python_is_called_in_a_tick():
+    """Ten times the ticks make not one call more of a Python function, nor of one of its C functions."""
     servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
     servo.load(FULL)
     servo.advance(1)
 
-    def calls(turns):
+    def calls(ticks):
         heard = []
         sys.setprofile(lambda _frame, event, _argument: heard.append(event))
         try:
-            servo.advance(turns)
+            servo.advance(ticks)
         finally:
             sys.setprofile(None)
         return len(heard)
@@ -192,6 +192,7 @@ class FakeWindows:
         return work()
 
 
+@pytest.mark.slow
 def test_a_race_times_every_loop_in_every_class_it_is_granted():
     lines = []
     raced = timing(0.5, "none", FakeWindows(), tell=lines.append)
@@ -206,10 +207,11 @@ def test_a_race_times_every_loop_in_every_class_it_is_granted():
     assert not any(thread.name in {"servo", "timed"} for thread in threading.enumerate())
 
 
+@pytest.mark.slow
 def test_without_qt_its_timer_is_left_out_and_said_so():
     raced = timing(0.5, "none", None, spin_us=100)
     assert all(one.kind != "qt" for one in raced.lanes)
-    assert "no Qt here" in raced.notes[-1]
+    assert "Qt is not available" in raced.notes[-1]
     assert raced.spin_us == 100
     assert raced.spun_share > 0
     assert "a spin of 100 µs before each deadline took" in text(raced)
@@ -230,17 +232,17 @@ def test_times_that_make_no_sense_are_refused(seconds):
 
 def test_the_loops_of_python_call_the_same_tick():
     loop = ThreadLoop(NORMAL, real_time=False)
-    before = int(loop._tick._servo.telemetry.written[0])
-    loop.turn(20)
-    assert int(loop._tick._servo.telemetry.written[0]) - before == 20 + LEAD_IN
+    before = int(loop.tick.servo.telemetry.written[0])
+    loop.run(20)
+    assert int(loop.tick.servo.telemetry.written[0]) - before == 20 + LEAD_IN
 
 
-def test_the_servo_that_is_timed_lets_go_after_each_turn():
+def test_the_servo_that_is_timed_lets_go_after_each_tick():
     loop = ServoLoop(NORMAL, real_time=False, spin_us=None)
     for _ in range(2):
-        assert len(loop.turn(20).lateness_ns) == 20
+        assert len(loop.run(20).lateness_ns) == 20
     assert loop.servo.grant.level == "normal"
-    assert not loop.servo._loop.live
+    assert not loop.servo.loop.live
 
 
 def test_cores_are_kept_busy_by_processes_that_end():
@@ -279,7 +281,7 @@ def test_a_deadline_that_was_passed_over_is_one_over_1_ms_late():
 
 def test_promises_are_held():
     assert [promise.held for promise in WELL.promises()] == [True] * 4
-    assert "normal: 0 turns over 1 ms late, 100 fewer than of a Python thread" in str(WELL.promises()[2])
+    assert "normal: 0 ticks over 1 ms late, 100 fewer than with a Python thread" in str(WELL.promises()[2])
 
 
 @pytest.mark.parametrize(
@@ -299,7 +301,7 @@ def test_each_promise_can_be_missed(servo, missed):
 
 def test_the_text_has_every_loop_and_every_promise():
     said = text(WELL)
-    for words in ("this servo", "bare compiled loop", "Python thread", "Qt timer", "a machine, 2 cores", "held"):
+    for words in ("this servo", "bare compiled loop", "Python thread", "Qt timer", "a machine, 2 cores", "met"):
         assert words in said
     assert max(len(line) for line in said.splitlines()) < 200
 
@@ -309,7 +311,7 @@ def test_the_csv_holds_each_lane_once():
     assert tuple(rows[0]) == COLUMNS
     assert [row["loop"] for row in rows] == [one.name for one in WELL.lanes]
     assert float(rows[0]["p50_us"]) == 30
-    assert rows[1]["turn_p99_us"] == "n/a"
+    assert rows[1]["tick_p99_us"] == "n/a"
     assert rows[3]["overruns"] == "5"
 
 
@@ -333,6 +335,7 @@ def test_the_readme_has_such_a_table_to_be_replaced_whole():
         assert words in held, "put DIR/timing.md, as timing --load gui --to DIR writes it, in place of the table"
 
 
+@pytest.mark.slow
 def test_files_are_written_and_the_figure_is_the_same_each_time(tmp_path):
     files = write(WELL, tmp_path)
     assert [file.name for file in files] == ["timing.txt", "timing.md", "timing.csv", "timing.png", "timing.svg"]

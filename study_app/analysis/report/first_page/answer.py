@@ -6,32 +6,25 @@ The p that decide stand in the sections that follow.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal, TypeAlias
+from typing import Final
 
-Question: TypeAlias = Literal["distinguished", "noticed from", "unchanged up to"]
-
-ASKED: Final[dict[Question, str]] = {
-    "distinguished": "Which liquids were distinguished?",
-    "noticed from": "From which delay do participants notice a difference?",
-    "unchanged up to": "Up to which delay do answers not change by a relevant amount?",
-}
 NO_EVIDENCE: Final = "That is not evidence that there is nothing."
 FOUND: Final = ("shown", "suggested")
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """An answer to one question about one block (its id).
+    """An answer to one question (the key of a finding) about one block (its id).
 
     ``claims`` says whether it claims that settings differ or that a delay is noticed, which would be false in a study
     where nothing differs; ``exploratory`` whether that was not decided on before the study. ``at_ms`` is the shortest
     delay that it says is noticed.
     """
 
-    question: Question
+    question: str
     block: str
     title: str
-    told: str
+    text: str
     sizes: tuple[str, ...]
     claims: bool = False
     exploratory: bool = False

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
-from study_app.analysis.findings.block_results import BlockFound, Results
-from study_app.analysis.report.first_page.answer import NO_EVIDENCE, Answer, Question
-from study_app.analysis.report.first_page.answers_of_delays import noticed_from, unchanged
-from study_app.analysis.report.first_page.answers_of_liquids import distinguished
+from study_app.analysis.findings import all_findings
+from study_app.analysis.findings.over_all_statements import FINDING as OVERALL
+from study_app.analysis.report.first_page.answer import NO_EVIDENCE, Answer
+from study_app.analysis.results.block_results import BlockFound, Results
+from study_app.analysis.results.finding import Finding, Question
 from study_app.analysis.statistics.multiple_comparisons import holm
+from study_app.analysis.tables.compared_blocks import Kind
 from study_app.analysis.tables.planned_analysis import Decided
 
 
@@ -18,7 +21,7 @@ def answers(results: Results) -> tuple[Answer, ...]:
     They claim something about a block only where the one test over all its statements finds a difference, corrected
     by Holm over the blocks: in a study where nothing differs they then claim anything at most so often as alpha says.
     """
-    overall = holm([None if found.overall is None else found.overall.p for found in results.blocks])
+    overall = holm([None if (one := OVERALL.of(found)) is None else one.p for found in results.blocks])
     return tuple(
         _unless_claimed_alone(one, p, results.decided.alpha)
         for found, p in zip(results.blocks, overall, strict=True)
@@ -30,23 +33,23 @@ def _unless_claimed_alone(answer: Answer, p_over_all: float | None, alpha: float
     """Return an answer without its claim where the test over all statements does not find a difference."""
     if not answer.claims or (p_over_all is not None and p_over_all <= alpha):
         return answer
-    told = (
+    text = (
         "Nothing is claimed here: single tests in the sections below find something, but the test over all statements "
         f"does not find a difference. {NO_EVIDENCE}"
     )
-    return replace(answer, told=told, sizes=(), claims=False, exploratory=False, at_ms=None)
+    return replace(answer, text=text, sizes=(), claims=False, exploratory=False, at_ms=None)
 
 
 def _of_block(found: BlockFound, decided: Decided) -> tuple[Answer, ...]:
     """Return the answers that a block gives: none before anybody's answers count."""
     if not found.n:
         return ()
-    questions: tuple[Question, ...] = (
-        ("noticed from", "unchanged up to") if found.kind == "delays" else ("distinguished",)
-    )
     if not found.revealed:
         waits = "This waits for the key to be opened: until then settings are codes."
-        return tuple(Answer(question, found.id, found.title, waits, ()) for question in questions)
-    if found.kind == "delays":
-        return noticed_from(found, decided), unchanged(found)
-    return (distinguished(found, decided),)
+        return tuple(Answer(one.key, found.id, found.title, waits, ()) for one, _ in questions(found.kind))
+    return tuple(question.answer(found, decided) for _, question in questions(found.kind))
+
+
+def questions(kind: Kind) -> tuple[tuple[Finding[Any], Question], ...]:
+    """Return the findings that answer a question of the first page about blocks of this kind, and the questions."""
+    return tuple((one, one.question) for one in all_findings() if one.question is not None and kind in one.kinds)

@@ -29,6 +29,13 @@ def p_within(differences: Array, bound: float, seed: int, resamples: int = RESAM
     Parameters
     ----------
     differences : (studies, participants) array
+        Paired differences, in points of the scale.
+    bound : float
+        In points of the scale.
+    seed : int
+        Of the resamples.
+    resamples : int
+        How many are drawn.
     """
     n = differences.shape[1]
     shares = _shares(n, seed, resamples)

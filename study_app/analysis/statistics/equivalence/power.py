@@ -42,6 +42,15 @@ def equivalent(
     Parameters
     ----------
     differences : (studies, participants) array
+        Paired differences, in points of the scale.
+    bound : float
+        In points of the scale.
+    alpha : float
+        Level of each one-sided test.
+    rng : Generator
+        Draws the resamples.
+    draws : int
+        How many are drawn.
     """
     n = differences.shape[1]
     spread = differences.std(axis=1, ddof=1) if n > 1 else np.zeros(len(differences))

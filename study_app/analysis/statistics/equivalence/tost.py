@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtr, stdtrit
 
 from study_app.analysis.statistics.equivalence.bootstrap_t import p_within, resamples_for
-from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked, clopper_pearson, told
+from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked, clopper_pearson, counted
 from study_app.analysis.statistics.paired import Alternative, signed, signed_p
 from study_app.errors import AnalysisError
 
@@ -52,7 +52,7 @@ class Equivalence(Outcome):
     (signed ranks, which bound the pseudo-median), both for differences that lie symmetrically, and ``p_bootstrap``
     (bootstrap-t), for those that lean to one side. Where all differences are equal there is no t, and the signs and
     ranks alone decide: ``p`` is the larger of theirs. No test sees people who are not in the sample: ``p_unseen`` is
-    the probability that it holds nobody of a group of the share ``UNSEEN`` of all people.
+    the probability that it holds no member of a group of the share ``UNSEEN`` of all people.
 
     ``verdict`` is "equivalent" where every p is at most alpha; else "different" where the larger p of a t test against
     0 (``p_different``) and of signed ranks (``p_different_ranks``) is; else "out of reach" where no answers of so many
@@ -119,6 +119,10 @@ def tost(
         NaN where an answer is missing: dropped.
     bound : float
         In points of the scale, set before the study.
+    alpha : float
+        Level of each one-sided test.
+    seed : int
+        Of the resamples.
     checks : bool
         Whether to ask without normality too, which takes long for many hundreds of participants.
     verdict_only : bool
@@ -178,16 +182,12 @@ def _compared(
 def _described(kept: Array, bound: float, alpha: float) -> Equivalence:
     """Return what can be said before any test."""
     n = len(kept)
-    reason = f"all {n} differences are equal: no spread for an interval" if n > 1 else f"{told(n)}: no spread"
+    reason = f"all {n} differences are equal: no spread for an interval" if n > 1 else f"{counted(n)}: no spread"
     return Equivalence(
         test="equivalence, two one-sided t tests",
         n=n,
         dropped=0,
         statistic_name="t",
-        statistic=None,
-        p=None,
-        smallest_p=None,
-        method="none",
         effect_name="mean difference",
         effect=float(kept.mean()) if n else None,
         no_interval=reason,

@@ -196,15 +196,15 @@ def _maxima(heights: Array) -> Whole:
 def at_bounds(counts: Counts, curve: Curve, guess: Bounds, lapse: Bounds) -> tuple[str, ...]:
     """Return what of a fitted curve lies where the fit ends, so that the answers alone do not tell it."""
     narrow, wide = (counts.span * float(np.exp(end)) for end in _log_widths(counts))
-    told = []
+    limits = []
     for what, found, (least, most) in (("guesses", curve.guess, guess), ("lapses", curve.lapse, lapse)):
         if least < most and found > most - NEAR:
-            told.append(f"{what} are at the most that the fit allows ({most:g}) and may be more")
+            limits.append(f"{what} are at the most that the fit allows ({most:g}) and may be more")
     if curve.width < narrow * (1 + NEAR):
-        told.append("the curve is as steep as the fit allows: the levels lie too far apart to determine it")
+        limits.append("the curve is as steep as the fit allows: the levels lie too far apart to determine it")
     if curve.width > wide * (1 - NEAR):
-        told.append("the curve is as flat as the fit allows")
-    return tuple(told)
+        limits.append("the curve is as flat as the fit allows")
+    return tuple(limits)
 
 
 def _log_widths(counts: Counts) -> Bounds:

@@ -39,6 +39,10 @@ def p_of_rise(yes: Array, asked: Array, levels: Array, shape: Shape, seed: int, 
         Counts; one row where answers are independent.
     levels : (levels,) array
         Ascending.
+    shape : Shape
+        The psychometric function's.
+    seed : int
+        Of the rearrangements.
     alpha : float
         So many rearrangements are drawn that their number does not decide whether p reaches it.
     """

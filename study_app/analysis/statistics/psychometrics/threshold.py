@@ -93,10 +93,14 @@ def noticed(
     ----------
     values : (participants, levels) or (participants, levels, presentations) array
         Answers in points of the scale; for yes and no coded 1 and 0 give ``noticed_from`` = 1.
-    levels : sequence
+    levels : sequence of float
         What was presented; equal levels are replicates of one.
+    noticed_from : float
+        The least answer that means noticed.
     alpha : float
         No threshold is stated where p of a rise is above it.
+    seed : int
+        Of the rearrangements.
     """
     array = np.asarray(values, dtype=np.float64)
     array = checked(array[..., None] if array.ndim == 2 else array, "participants, levels, presentations")
@@ -134,10 +138,14 @@ def threshold(
     ----------
     levels, yes, asked : (levels,) arrays
         What was presented, how often it was noticed, and how often it was asked.
+    shape : Shape
+        The psychometric function's.
     guess, lapse : float, optional
         Fixed rates; otherwise free up to 0.5.
     alpha : float
         No threshold is stated where p of a rise is above it.
+    seed : int
+        Of the rearrangements.
 
     Raises
     ------
@@ -192,7 +200,9 @@ def _impossible(counts: Counts) -> str:
     if len(counts.levels) < 3:
         return "fewer than three levels were answered"
     if not counts.yes.any():
-        return f"nobody noticed anything up to {counts.levels.max():g}: the threshold lies above, or there is none"
+        return (
+            f"no participant noticed anything up to {counts.levels.max():g}: the threshold lies above, or there is none"
+        )
     if (counts.yes == counts.asked).all():
         return "everybody noticed something at every level"
     return ""
@@ -313,7 +323,6 @@ def _outcome(
         statistic_name="deviance",
         statistic=None if curve is None else max(0.0, 2 * (counts.saturated - curve.log_likelihood)),
         p=p,
-        smallest_p=None,
         method=f"maximum likelihood, {shape} function of level",
         effect_name="detection threshold",
         effect=None if curve is None else curve.threshold,

@@ -1,7 +1,7 @@
-"""A Falcon looked over: found, opened, its program run, homed, and turned for some seconds without force.
+"""A Falcon looked over: found, opened, its program run, homed, and run for some seconds without force.
 
 Everything is done by the driver that a session uses, so what fails there fails here; `examine` returns what was seen,
-and ``diagnosis`` what that shows.
+and ``failure_modes`` what that shows.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ import numpy as np
 from study_app.devices.falcon.device import FalconDevice
 from study_app.devices.falcon.emulated import EmulatedFalcon, new_emulator
 from study_app.devices.falcon.emulator.emulator import Emulator
-from study_app.devices.falcon.failure_modes import ALL_HOMED, OPEN, Facts
+from study_app.devices.falcon.facts import ALL_HOMED, OPEN, Facts
 from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.mechanics.geometry import WORKSPACE_M
 from study_app.devices.falcon.transport.ftdi import FtdiTransport, load_d2xx
 from study_app.devices.falcon.transport.usb import find_falcons
-from study_app.devices.registry import kind_of
 from study_app.errors import DeviceError, DeviceLost, ServoFault
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
@@ -63,16 +62,16 @@ def examine(
     firmware : file of its program
     faults : of an emulated one, as ``Emulator.take`` takes them
     tell : is given what to do, a line at a time
-    seconds : how long it is turned
+    seconds : how long it is run
     emulator : the emulated one; None: a new one
 
     Raises
     ------
     DeviceError
-        ``name`` is no Falcon, or it cannot have faults.
+        It cannot have faults.
     """
     device = _device(name, firmware, faults, tell, emulator)
-    facts = _looked_for() if kind_of(name) == "falcon" else Facts()
+    facts = _looked_for() if name.partition(":")[0] == "falcon" else Facts()
     try:
         device.open()
     except FalconFailure as failure:
@@ -83,8 +82,8 @@ def examine(
         facts = _merged(facts, _opened(device))
         facts = _merged(facts, Facts(replies=True, homed=ALL_HOMED, pulled_out=True))
         tell(MOVE)
-        turned, failure_text = _turned(device, seconds)
-        facts = _merged(facts, turned)
+        ran, failure_text = _ran(device, seconds)
+        facts = _merged(facts, ran)
         return Examined(facts, failure_text, _words(device, facts))
 
 
@@ -95,10 +94,7 @@ def _device(
     tell: Callable[[str], object],
     emulator: Emulator | None,
 ) -> FalconDevice:
-    kind = kind_of(name)
-    if not kind.startswith("falcon"):
-        raise DeviceError(f"the doctor looks at Falcons, and '{name}' is none: see 'liquid-study devices list'")
-    if kind != "falcon-emulated":
+    if name != "falcon-emulated":
         if faults:
             raise DeviceError(
                 f"'{name}' cannot be given faults: only falcon-emulated can, or emulate-falcon at its end"
@@ -144,8 +140,8 @@ def _opened(device: FalconDevice) -> Facts:
     )
 
 
-def _turned(device: FalconDevice, seconds: float) -> tuple[Facts, str | None]:
-    """Turn it at rest, and return what was seen, and the servo's fault, if it stopped itself."""
+def _ran(device: FalconDevice, seconds: float) -> tuple[Facts, str | None]:
+    """Run it at rest, and return what was seen, and the servo's fault, if it stopped itself."""
     emulated = isinstance(device, EmulatedFalcon)
     clock = VirtualClock() if emulated else None
     kept: list[Any] = []
@@ -199,7 +195,7 @@ def _words(device: FalconDevice, facts: Facts) -> tuple[str, ...]:
         used = found["calibration"]
         words.append(f"calibration: {used['measured'] if isinstance(used, dict) else 'none'}")
     if facts.broken_share is not None:
-        words.append(f"packets without a whole reply: {facts.broken_share:.2%}")
+        words.append(f"incomplete replies: {facts.broken_share:.2%}")
     if facts.rate_hz is not None:
-        words.append(f"turns a second: {facts.rate_hz:.0f}")
+        words.append(f"ticks per second: {facts.rate_hz:.0f}")
     return tuple(words)

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from study_app.devices.falcon.diagnosis import MODES
-from study_app.devices.falcon.failure_modes import Mode
+from study_app.devices.falcon.facts import Mode
+from study_app.devices.falcon.failure_modes import MODES
 
 if TYPE_CHECKING:
     from study_app.devices.falcon.doctor.examine import Examined
-    from study_app.devices.falcon.failure_modes import Facts
+    from study_app.devices.falcon.facts import Facts
 from study_app.devices.doctor_report import Finding, Report
 
 
@@ -33,7 +33,7 @@ def _finding(number: int, mode: Mode, facts: Facts) -> Finding:
         mode.id,
         mode.tested,
         mode.symptom,
-        "not looked at" if shown is None else "found" if shown else "ok",
+        "not checked" if shown is None else "found" if shown else "ok",
         mode.cause,
         mode.cure(facts.platform),
         mode.detected,

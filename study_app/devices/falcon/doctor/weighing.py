@@ -1,7 +1,8 @@
 """Weights held by the Falcon: it keeps its grip at a place against what pulls, and what its motors needed is noted.
 
 At each place the grip comes to rest once from above and once from below, with nothing on it and with a load, so that
-friction and the grip's own weight are told from the load. `calibration.fit` makes motor units a newton of the notes.
+friction and the grip's own weight are separated from the load. `calibration.fit` computes motor units per newton from
+the notes.
 """
 
 from __future__ import annotations
@@ -29,19 +30,19 @@ PLACES_M: Final = (
 )
 GRAVITY_MPS2: Final = 9.80665
 LEAST_N, MOST_N = 1.0, 6.0
-"""Loads that tell enough, and that the motors hold beside the grip's own weight."""
+"""Loads that are heavy enough to measure, and that the motors hold in addition to the grip's own weight."""
 
 _STIFFNESS_NPM = 600.0
 _DAMPING_NSPM = 8.0
 _SMOOTHING_S = 0.005
 _PACE_MPS = 0.05
 _BESIDE_M = 0.005
-_TURN_S = 0.001
+_TICK_S = 0.001
 _STILL_MPS = 0.002
-_STILL_TURNS = 300
+_STILL_TICKS = 300
 _PATIENCE_S = 6.0
-_BLIND_TURNS = 20
-_WEIGHED_TURNS = 300
+_BLIND_TICKS = 20
+_WEIGHED_TICKS = 300
 
 Ask = Callable[[str, str], Callable[[], str | None]]
 """(what is asked for: "let-go", "hang", "pull", "reading" or "take-off"; the words) -> a function that returns None
@@ -58,12 +59,12 @@ class Notes:
 
 
 class Grip:
-    """The grip of an open Falcon, kept at a place by a spring; one turn of it takes a millisecond.
+    """The grip of an open Falcon, kept at a place by a spring; one tick of it takes a millisecond.
 
     Parameters
     ----------
     device : open and homed
-    virtual : whether time is counted in turns, not on the clock
+    virtual : whether time is counted in ticks, not on the clock
     """
 
     def __init__(self, device: FalconDevice, *, virtual: bool = False) -> None:
@@ -75,8 +76,8 @@ class Grip:
         self._velocity_mps = np.zeros(3)
         self._target_m: Any = None
         self._blind = 0
-        for _ in range(_BLIND_TURNS):
-            self.turn()
+        for _ in range(_BLIND_TICKS):
+            self.tick()
         self._target_m = self._place_m.copy()
 
     @property
@@ -84,13 +85,13 @@ class Grip:
         """Where it is (3,) [m, hand frame]."""
         return self._place_m.copy()
 
-    def turn(self) -> None:
-        """Read where it is and push it toward its target; without news for 20 turns, with no force."""
+    def tick(self) -> None:
+        """Read where it is and push it toward its target; without news for 20 ticks, with no force."""
         if self._virtual:
-            self._now_ns += round(1e9 * _TURN_S)
-            elapsed_s = _TURN_S
+            self._now_ns += round(1e9 * _TICK_S)
+            elapsed_s = _TICK_S
         else:
-            time.sleep(_TURN_S)
+            time.sleep(_TICK_S)
             before_ns, self._now_ns = self._now_ns, time.monotonic_ns()
             elapsed_s = (self._now_ns - before_ns) * 1e-9
         device = self._device
@@ -112,7 +113,7 @@ class Grip:
         self._place_m[:] = place_m
 
     def _force_n(self) -> Any:
-        if self._target_m is None or self._blind > _BLIND_TURNS:
+        if self._target_m is None or self._blind > _BLIND_TICKS:
             return np.zeros(3)
         force_n = _STIFFNESS_NPM * (self._target_m - self._place_m) - _DAMPING_NSPM * self._velocity_mps
         size = float(np.linalg.norm(force_n))
@@ -121,7 +122,7 @@ class Grip:
     def wait(self, answered: Callable[[], str | None]) -> str:
         """Keep it where it is until there is an answer; return that."""
         while (answer := answered()) is None:
-            self.turn()
+            self.tick()
         return answer
 
     def come(self, place_m: Any) -> None:
@@ -133,16 +134,16 @@ class Grip:
             It does not come to rest.
         """
         way = np.asarray(place_m) - self._target_m
-        turns = max(int(np.linalg.norm(way) / (_PACE_MPS * _TURN_S)), 1)
+        ticks = max(int(np.linalg.norm(way) / (_PACE_MPS * _TICK_S)), 1)
         began = self._target_m.copy()
-        for k in range(turns):
-            self._target_m = began + way * ((k + 1) / turns)
-            self.turn()
+        for k in range(ticks):
+            self._target_m = began + way * ((k + 1) / ticks)
+            self.tick()
         still = 0
-        for _ in range(round(_PATIENCE_S / _TURN_S)):
-            self.turn()
+        for _ in range(round(_PATIENCE_S / _TICK_S)):
+            self.tick()
             still = still + 1 if np.linalg.norm(self._velocity_mps) < _STILL_MPS else 0
-            if still >= _STILL_TURNS:
+            if still >= _STILL_TICKS:
                 return
         raise DeviceError(
             "the grip does not come to rest: let nothing touch it, hang the weight on a short string, and start again"
@@ -151,12 +152,12 @@ class Grip:
     def weigh(self) -> tuple[Any, Any]:
         """Return the mean encoder counts and motor units (each (3,)) of some tenths of a second."""
         counts, units = np.zeros(3), np.zeros(3)
-        for _ in range(_WEIGHED_TURNS):
-            self.turn()
+        for _ in range(_WEIGHED_TICKS):
+            self.tick()
             held_at, held_with = self._device.held
             counts += held_at
             units += held_with
-        return counts / _WEIGHED_TURNS, units / _WEIGHED_TURNS
+        return counts / _WEIGHED_TICKS, units / _WEIGHED_TICKS
 
 
 def hang(grip: Grip, weight_n: float, ask: Ask) -> Notes:

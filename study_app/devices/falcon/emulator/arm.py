@@ -40,7 +40,7 @@ MOST_FORCE_N = 10.0
 """The greatest force of the motors at the grip [N]; beyond it all three torques are reduced by one factor.
 
 Novint advertised more than 8.9 N (2 lbf). Full torque units give 9.8 to 10.2 N across the axis with the gain of Martin
-& Hillier 2009, which agrees, but 24.8 N along it, which nobody has reported of a Falcon with its 30 W supply. What
+& Hillier 2009, which agrees, but 24.8 N along it, which is not reported of any Falcon with its 30 W supply. What
 saturates, each motor or their supply, and at how much, is not published: uncertain by 1 N across, by more along z.
 """
 LEAST_LEVER_M = 0.012

@@ -2,7 +2,7 @@
 
 In front of it is one C function of the signature of ``libusb_bulk_transfer`` (``bulk``), whose handle is the address of
 the emulator's memory, and the bridge's control requests. Everything happens in emulated time (``ftdi``) and
-depends on nothing but what it is told and the ``random`` it was made with.
+depends on nothing but its commands and the ``random`` it was made with.
 """
 
 from __future__ import annotations
@@ -80,37 +80,37 @@ class Emulator(HandOrders):
         self.serial = serial
         self.geometry = geometry_named(geometry) if isinstance(geometry, str) else geometry
         self.recorded: list[tuple[int, int]] = []
-        self._memory = memory
+        self.memory = memory
         self._address = int(memory.ctypes.data)
         random = random or Random(0)  # noqa: S311 - faults and tremor keep no secrets
         self._tremble(random, tremor_m)
-        self.faults = Faults(self._state.faults, random)
-        power_up(self._state.bridge)
-        set_arms(self._state.arms, self.geometry, units_per_nm, arm_offset_rad)
-        self._state.handle = new_scripted_handle(quantum_m=0.0)
-        self._state.handle.stop_m = STOPS_M
-        self._state.hand.place_m = self._state.hand.aim_m
-        self._state.powered = 1
-        settle(self._state)
+        self.faults = Faults(self.state.faults, random)
+        power_up(self.state.bridge)
+        set_arms(self.state.arms, self.geometry, units_per_nm, arm_offset_rad)
+        self.state.handle = new_scripted_handle(quantum_m=0.0)
+        self.state.handle.stop_m = STOPS_M
+        self.state.hand.place_m = self.state.hand.aim_m
+        self.state.powered = 1
+        settle(self.state)
         if running:
-            run_program(self._state)
+            run_program(self.state)
 
     # The bridge, as a host sees it.
 
     def control(self, request: int, value: int) -> int:
         """Carry out a control request of the bridge; return 0 or a libusb error. ``recorded`` keeps them all."""
         self.recorded.append((request, value))
-        return int(control(self._state, request, value))
+        return int(control(self.state, request, value))
 
     def write(self, data: bytes, timeout_ms: int) -> tuple[int, int]:
         """Transfer bytes out; return 0 or a libusb error, and how many it took."""
         memory = np.frombuffer(data or b"\0", np.uint8)
-        return self._transfer(constants.ENDPOINT_OUT, memory, len(data), timeout_ms)
+        return self.transfer(constants.ENDPOINT_OUT, memory, len(data), timeout_ms)
 
     def read(self, size: int, timeout_ms: int) -> tuple[int, bytes]:
         """Transfer at most ``size`` bytes in, status bytes among them; return 0 or a libusb error, and the bytes."""
         memory = np.zeros(max(size, 1), np.uint8)
-        code, moved = self._transfer(constants.ENDPOINT_IN, memory, size, timeout_ms)
+        code, moved = self.transfer(constants.ENDPOINT_IN, memory, size, timeout_ms)
         return code, memory[:moved].tobytes()
 
     def poll(self, size: int) -> tuple[int, bytes]:
@@ -119,15 +119,16 @@ class Emulator(HandOrders):
         ``ERROR_TIMEOUT`` means that it is not over: before ``next_event_ns`` nothing more comes.
         """
         memory, moved = np.zeros(max(size, 1), np.uint8), records(INT, 1)[0]
-        code = int(poll(self._state, memory.ctypes.data, size, moved))
+        code = int(poll(self.state, memory.ctypes.data, size, moved))
         return code, memory[: moved.value].tobytes()
 
     @property
     def next_event_ns(self) -> int:
         """When a transfer in that is not over may go on [ns]."""
-        return int(next_event_ns(self._state))
+        return int(next_event_ns(self.state))
 
-    def _transfer(self, endpoint: int, memory: Any, length: int, timeout_ms: int) -> tuple[int, int]:
+    def transfer(self, endpoint: int, memory: Any, length: int, timeout_ms: int) -> tuple[int, int]:
+        """Transfer ``length`` bytes of ``memory`` at an endpoint; return 0 or a libusb error, and how many moved."""
         moved = np.zeros(1, np.int32)
         call = bulk().ctypes
         code = call(self._address, endpoint, memory.ctypes.data, length, moved.ctypes.data, timeout_ms)
@@ -150,33 +151,33 @@ class Emulator(HandOrders):
 
     def claimed(self) -> None:
         """Hear that a program has taken the bridge: whoever holds the grip is ready to home it."""
-        self._state.run.stroke_due = 1
+        self.state.run.stroke_due = 1
 
     # Time.
 
     def follow_clock(self, address: int) -> None:
         """Let the int64 [ns] at this address be the time from the next transfer on; 0: its own again."""
-        self._state.bridge.clock = address
-        self._state.bridge.joined = 0
+        self.state.bridge.clock = address
+        self.state.bridge.joined = 0
 
     @property
     def now_ns(self) -> int:
         """How far its time has come [ns]."""
-        return int(self._state.bridge.now_ns)
+        return int(self.state.bridge.now_ns)
 
     def pause(self, seconds: float) -> None:
         """Let emulated time pass, hand and handle move."""
-        let_pass(self._state, round(seconds * 1e9))
+        let_pass(self.state, round(seconds * 1e9))
 
     def look(self) -> None:
         """Let it come up to the present of its clock: hear what has arrived, move for a while at most."""
-        look(self._state)
+        look(self.state)
 
     # What it is and does.
 
     def power(self, on: bool) -> None:
         """Plug its mains adapter in, or pull it: then its program is lost and its arms are limp."""
-        supply(self._state, 1 if on else 0)
+        supply(self.state, 1 if on else 0)
 
     def take(self, fault: str) -> None:
         """Take a fault as a command line gives it: ``drop=0.01``, ``frozen`` or ``power-off``."""
@@ -188,86 +189,86 @@ class Emulator(HandOrders):
     @property
     def powered(self) -> bool:
         """Whether the mains adapter is plugged in."""
-        return bool(self._state.powered)
+        return bool(self.state.powered)
 
     @property
     def running(self) -> bool:
         """Whether its program is loaded and runs."""
-        return bool(self._state.powered) and int(self._state.loader.state) == RUNNING
+        return bool(self.state.powered) and int(self.state.loader.state) == RUNNING
 
     @property
     def loaded(self) -> int:
         """Bytes of firmware it took since it was last reset."""
-        return int(self._state.loader.loaded)
+        return int(self.state.loader.loaded)
 
     @property
     def homed(self) -> int:
         """Arms that found their index: arm 1 is bit 0."""
-        return int(self._state.run.homed)
+        return int(self.state.run.homed)
 
     @property
     def lights(self) -> int:
         """The lights that are on, as FLAG_GREEN, FLAG_BLUE and FLAG_RED."""
-        return int(self._state.run.lights)
+        return int(self.state.run.lights)
 
     @property
     def torques(self) -> tuple[int, int, int]:
-        """What the motors were last told [units]; 0 without power."""
-        first, second, third = self._state.run.torque
+        """The last torque command [units]; 0 without power."""
+        first, second, third = self.state.run.torque
         return int(first), int(second), int(third)
 
     @property
     def highest_torque(self) -> int:
-        """The greatest torque it was ever told, in size [units]."""
-        return int(self._state.run.highest)
+        """The largest torque command so far [units]."""
+        return int(self.state.run.highest)
 
     @property
     def highest_unhomed_torque(self) -> int:
         """The greatest of them while an arm was not homed."""
-        return int(self._state.run.highest_unhomed)
+        return int(self.state.run.highest_unhomed)
 
     @property
     def excessive(self) -> int:
         """Packets with a torque beyond what the motors take."""
-        return int(self._state.run.excessive)
+        return int(self.state.run.excessive)
 
     @property
     def packets(self) -> int:
         """Well-formed packets it heard."""
-        return int(self._state.run.packets)
+        return int(self.state.run.packets)
 
     @property
     def refused(self) -> int:
         """Bytes it heard that belong to no packet."""
-        return int(self._state.run.refused)
+        return int(self.state.run.refused)
 
     @property
     def force_n(self) -> tuple[float, float, float]:
         """The force of its motors on the hand, by virtual work [N]."""
-        feel(self._state)
-        x, y, z = self._state.arms.force_n
+        feel(self.state)
+        x, y, z = self.state.arms.force_n
         return float(x), float(y), float(z)
 
     @property
     def position_m(self) -> tuple[float, float, float]:
         """Where the grip is [m, hand frame]."""
-        x, y, z = self._state.handle.position_m
+        x, y, z = self.state.handle.position_m
         return float(x), float(y), float(z)
 
     @property
     def weight_n(self) -> float:
         """Of what hangs on the grip [N]."""
-        return float(self._state.weight_n)
+        return float(self.state.weight_n)
 
     @weight_n.setter
     def weight_n(self, weight_n: float) -> None:
-        self._state.weight_n = weight_n
+        self.state.weight_n = weight_n
 
     @property
     def held(self) -> bool:
         """Whether the hand holds the grip."""
-        return bool(self._state.handle.held)
+        return bool(self.state.handle.held)
 
     @held.setter
     def held(self, held: bool) -> None:
-        self._state.handle.held = int(held)
+        self.state.handle.held = int(held)

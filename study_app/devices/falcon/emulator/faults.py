@@ -90,7 +90,7 @@ class Faults:
         self._state.chance[_place(name)] = chance
 
     def once(self, name: str, times: int = 1) -> None:
-        """Let it happen at the next turns, so many times."""
+        """Let it happen at the next ticks, so many times."""
         self._state.due[_place(name)] = times
 
     def happened(self, name: str) -> int:

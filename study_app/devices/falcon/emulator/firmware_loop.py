@@ -1,6 +1,6 @@
 """The emulated Falcon at work: packets in, torques out, and a handle in somebody's hand that both of them move.
 
-What is invented, because nobody published it: mass, friction and hand (those of the scripted device), where the arms'
+What is invented, because it is not published: mass, friction and hand (those of the scripted device), where the arms'
 indices are, how fast it answers, that a torque stays until the next packet, and that one beyond the range is cut off.
 """
 
@@ -225,7 +225,7 @@ def _load(e: Any) -> None:
 
 @kernel
 def _stroke(e: Any, now_ns: int) -> None:
-    """Pull out, push in, pull out and go to the middle, if homing wants it and nobody else wants anything.
+    """Pull out, push in, pull out and go to the middle, if homing needs it and no other command is active.
 
     And again, as a person would, whenever an arm is not homed or the blue light asks to pull out.
     """

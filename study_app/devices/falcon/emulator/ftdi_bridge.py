@@ -77,11 +77,11 @@ def begin(bridge: Any) -> int:
     if bridge.clock == 0:
         bridge.now_ns += USB_NS
         return 0
-    told = _word_at(bridge.clock).value
-    if bridge.joined == 0 or told < bridge.now_ns - _BACK_NS:
+    clock_ns = _word_at(bridge.clock).value
+    if bridge.joined == 0 or clock_ns < bridge.now_ns - _BACK_NS:
         bridge.joined = 1
-        return int(told - bridge.now_ns)
-    bridge.now_ns = max(bridge.now_ns, told)
+        return int(clock_ns - bridge.now_ns)
+    bridge.now_ns = max(bridge.now_ns, clock_ns)
     return 0
 
 

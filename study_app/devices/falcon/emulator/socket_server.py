@@ -35,7 +35,7 @@ from study_app.devices.falcon.transport.socket_frames import (
 from study_app.devices.falcon.wire import constants
 from study_app.errors import DeviceError
 
-_IDLE_S: Final = 0.02  # how long nobody may ask before it is looked at anyway
+_IDLE_S: Final = 0.02  # longest time without a request before the clock is checked
 _MOST_BYTES: Final = 1 << 17
 _MOST_PENDING: Final = 16  # requests of a client; further ones stay in its socket
 _REFUSALS: Final = {
@@ -173,7 +173,7 @@ class EmulatorServer:
         client.asked += more
 
     def _dismiss(self, client: _Client) -> None:
-        """Let a client go; whatever it told the motors last stays."""
+        """Let a client go; its last torque command stays."""
         self._clients.pop(client.connection, None)
         client.connection.close()
         if self._owner is client:
@@ -278,7 +278,7 @@ def _listen(path: Path) -> socket.socket:
     if family is None:
         raise DeviceError("a Falcon cannot be served here: this system's Python has no Unix sockets")
     if path.exists() or path.is_symlink():
-        raise DeviceError(f"{path} exists already: name another socket, or remove it if nobody serves there")
+        raise DeviceError(f"{path} exists already: name another socket, or remove it if no program serves it")
     door = socket.socket(family, socket.SOCK_STREAM)
     try:
         door.bind(str(path))

@@ -220,7 +220,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
     def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
         """Transfer bytes out."""
         code, moved = self._claimed(dev_handle).write(bytes(data), timeout)
-        if moved == 0 or code != constants.ERROR_TIMEOUT:  # what went before the time was out is told, as libusb's does
+        if moved == 0 or code != constants.ERROR_TIMEOUT:  # what went before the time was out is reported, as by libusb
             _check(code)
         return moved
 
@@ -249,9 +249,9 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
             return len(data)
         if (bmRequestType, bRequest, wValue >> 8) != (_DEVICE_TO_HOST, _GET_DESCRIPTOR, _STRING_DESCRIPTOR):
             _check(constants.ERROR_PIPE)
-        told = _string_descriptor(wValue & 0xFF, emulator.serial)[: len(data)]
-        data[: len(told)] = type(data)("B", told)
-        return len(told)
+        descriptor = _string_descriptor(wValue & 0xFF, emulator.serial)[: len(data)]
+        data[: len(descriptor)] = type(data)("B", descriptor)
+        return len(descriptor)
 
     def reset_device(self, dev_handle: _Handle) -> None:
         """Reset the bridge's port; the device behind it goes on."""

@@ -1,4 +1,4 @@
-"""What was measured of one Falcon with a weight or a scale: motor units for a newton metre, and its arms' offset.
+"""What was measured of one Falcon with a weight or a scale: motor units per newton metre, and its arms' offset.
 
 Two published gains differ by half, so a force in newtons is known only of a device that was calibrated. Until then the
 gain that gives the weaker forces is used, and the receipt says that none was. A calibration is kept by the device's

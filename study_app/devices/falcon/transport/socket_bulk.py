@@ -103,7 +103,7 @@ def _all(file: int, address: int, size: Any, out: bool) -> bool:
 
 @kernel
 def _spill(handle: int, file: int, size: Any) -> bool:
-    """Receive ``size`` bytes that nobody wants."""
+    """Receive ``size`` bytes and discard them."""
     left = size
     while left > 0:
         some = min(left, constants.USB_PACKET)

@@ -38,7 +38,7 @@ class Transport(Protocol):
 
     @property
     def serial(self) -> str | None:
-        """Its serial number, where it tells one."""
+        """Its serial number, if it reports one."""
         ...
 
     def control(self, request: int, value: int) -> None:
@@ -91,7 +91,9 @@ def open_transport(name: str) -> Transport:
 
         return SocketTransport(argument)
     if kind != "falcon":
-        raise DeviceNotFound(f"'{name}' is no way to a Falcon; use falcon, falcon:SERIAL or falcon-socket:PATH")
+        raise DeviceNotFound(
+            f"'{name}' is not a connection to a Falcon; use falcon, falcon:SERIAL or falcon-socket:PATH"
+        )
     serial = argument or None
     try:
         return PyUsbTransport(serial=serial)

@@ -24,14 +24,14 @@ MOST_OWED: Final = 4
 SLOWER_READS: Final = 8
 FASTER_READS: Final = 200
 GIVEN_UP_READS: Final = 32
-RETEST_TURNS: Final = 30
-"""So long at least the motors are told something new in every turn, after a measurement."""
+RETEST_TICKS: Final = 30
+"""For at least this many ticks after a measurement the motors receive a new command in every tick."""
 ALL_HOMED: Final = 0b111
 BELIEVED: Final = 3
 """So many packets in a row must say that an arm is no longer homed: one may have been garbled."""
 
 LEAP: Final = 24.0
-"""Counts by which an arm may miss where its motion would have taken it: 0.7 to 1.4 mm of the grip within a turn."""
+"""Counts by which an arm may miss where its motion would have taken it: 0.7 to 1.4 mm of the grip within a tick."""
 DOUBTS: Final = 2  # so many replies in a row may be doubted
 
 
@@ -95,7 +95,7 @@ def _measure_delay(falcon: Any, packets: int) -> None:
 
 @kernel
 def give_up_measurement(falcon: Any) -> None:
-    """Send after all, and for some turns whatever comes; believe what of the delay has shown so far."""
+    """Send after all, and for some ticks whatever comes; believe what of the delay has shown so far."""
     falcon.delay = max(falcon.delay, falcon.testing)
     falcon.testing = 0
     falcon.retest = MOST_DELAY
@@ -107,7 +107,7 @@ def _believe_delay(falcon: Any, found: int) -> None:
     falcon.measured = 0
     falcon.unsure = 0
     falcon.astray = 0
-    falcon.retest = RETEST_TURNS
+    falcon.retest = RETEST_TICKS
 
 
 @kernel

@@ -50,6 +50,29 @@ def draw_key(
     return width
 
 
+class KeyCap(QWidget):
+    """A key cap as a widget, in a language's direction."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._text = ""
+        self._scale = 1.0
+
+    def show_key(self, text: str, scale: float) -> None:
+        """Show a key, or none."""
+        self._text, self._scale = text, scale
+        width, height = key_size(text, scale)
+        self.setFixedSize(round(width) + 2, round(height) + 2)
+        self.setVisible(bool(text))
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+        """Draw it."""
+        painter = page_painter(self)
+        draw_key(painter, 1, self.height() / 2, self._text, self._scale)
+        painter.end()
+
+
 class GoButton(QPushButton):
     """The filled button of a participant's page, with the key that presses it; never disabled."""
 
@@ -57,7 +80,7 @@ class GoButton(QPushButton):
         super().__init__(text, parent)
         self._key = key
         self._scale = 1.0
-        self._ringed = False
+        self.ringed = False
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setAutoDefault(False)
@@ -89,7 +112,7 @@ class GoButton(QPushButton):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(theme.accent_hover if lit else theme.accent))
         painter.drawRoundedRect(body, radius, radius)
-        if self.hasFocus() and self._ringed:
+        if self.hasFocus() and self.ringed:
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(theme.text), 2))
             painter.drawRoundedRect(body.adjusted(-3, -3, 3, 3), radius + 3, radius + 3)
@@ -113,7 +136,7 @@ class GoButton(QPushButton):
 
     def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
         """Show the ring where the keyboard led here; a page that begins here has its key cap to say so."""
-        self._ringed = event.reason() in KEYBOARD
+        self.ringed = event.reason() in KEYBOARD
         super().focusInEvent(event)
 
     def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802

@@ -96,7 +96,7 @@ class LanguageButton(QRadioButton):
 
 
 class LanguageSwitch(QGroupBox):
-    """The languages beside each other: Tab comes to the page's own, arrows choose the one beside it.
+    """The languages in one line: Tab comes to the page's own, arrows choose its neighbour.
 
     ``chosen`` comes with the code of another than the page's.
     """

@@ -38,6 +38,12 @@ def direction(words: Words) -> Qt.LayoutDirection:
     return Qt.LayoutDirection.RightToLeft if words.right_to_left else Qt.LayoutDirection.LeftToRight
 
 
+def beginning(widget: QWidget) -> Qt.AlignmentFlag:
+    """Return where lines begin in a widget, in whatever language their words are."""
+    right = widget.layoutDirection() == Qt.LayoutDirection.RightToLeft
+    return Qt.AlignmentFlag.AlignAbsolute | (Qt.AlignmentFlag.AlignRight if right else Qt.AlignmentFlag.AlignLeft)
+
+
 def mirrored(place: QRectF, width: float) -> QRectF:
     """Return a place as a mirror in the middle of ``width`` shows it."""
     return QRectF(width - place.right(), place.top(), place.width(), place.height())
@@ -79,10 +85,6 @@ class PageWidget(QWidget):
     def words_scale(self) -> float:
         """How much larger than designed words are."""
         return words_scale(self.width(), self.height(), self._text_scale)
-
-    def placed(self, place: QRectF) -> QRectF:
-        """Return where something that lies at ``place`` in a page read from left to right lies in this one."""
-        return mirrored(place, self.width()) if self.mirrored else place
 
     def lay_out(self, scale: float) -> None:
         """Place everything for the present size."""

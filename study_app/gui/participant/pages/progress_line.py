@@ -20,7 +20,8 @@ def progress_words(progress: Progress, words: Words) -> tuple[str, str]:
     counted = progress.part is not None and progress.parts > 1
     part = words.part.format(part=progress.part, parts=progress.parts) if counted else ""
     named = progress.label and progress.of > 1
-    setting = words.setting.format(label=progress.label, of=progress.of) if named else progress.label
+    template = words.setting_at_most if progress.at_most else words.setting
+    setting = template.format(label=progress.label, of=progress.of) if named else progress.label
     return part, setting
 
 

@@ -1,4 +1,4 @@
-"""What a screen reader is told at once, beyond names and states that it asks for."""
+"""Announcements to a screen reader, beyond the names and states that it asks for."""
 
 from __future__ import annotations
 

@@ -72,8 +72,8 @@ class TextWidget(ReadingPage):
             column, words, clock, button=(page.button, key), progress=progress, parent=parent, text_scale=text_scale
         )
         self._stays_until_s = page.stays_until_s
-        self._count = QLabel(self)
-        self._count.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
+        self.count_label = QLabel(self)
+        self.count_label.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
         self._ticker = QTimer(self)
         self._ticker.setInterval(TICK_MS)
         self._ticker.timeout.connect(self.tick)
@@ -103,15 +103,15 @@ class TextWidget(ReadingPage):
     @property
     def count(self) -> str:
         """The words of the count, "" when it is over."""
-        return self._count.text()
+        return self.count_label.text()
 
     def tick(self) -> None:
         """Count down; when the time is over, put the button where the count was."""
         assert self.button is not None  # noqa: S101  # these pages have one
         left = self.seconds_left
-        self._count.setText(self._words.continue_in.format(seconds=left) if left else "")
-        self._count.adjustSize()
-        self._count.setVisible(left > 0)
+        self.count_label.setText(self._words.continue_in.format(seconds=left) if left else "")
+        self.count_label.adjustSize()
+        self.count_label.setVisible(left > 0)
         self._place_count()
         if left:
             self.button.hide()
@@ -133,14 +133,14 @@ class TextWidget(ReadingPage):
     def lay_out(self, scale: float) -> None:
         """Place the count where the button will be."""
         super().lay_out(scale)
-        self._count.setFont(font("card", scale=self.words_scale * 1.125, weight=500, tabular=True))
-        self._count.adjustSize()
+        self.count_label.setFont(font("card", scale=self.words_scale * 1.125, weight=500, tabular=True))
+        self.count_label.adjustSize()
         self._place_count()
 
         self._place_decline()
 
     def _below_button(self, width: int) -> int:
-        """Leave room for the button that declines, where the column is too narrow for both beside each other."""
+        """Leave room for the button that declines, where the column is too narrow for both in one line."""
         if self.decline is None or self.button is None:
             return 0
         self.decline.set_scale(self.words_scale)
@@ -152,7 +152,7 @@ class TextWidget(ReadingPage):
         return round(16 * self.words_scale)
 
     def _place_decline(self) -> None:
-        """Put the button that declines beside the other one, or under it."""
+        """Put the button that declines next to the other one, or below it."""
         if self.decline is None or self.button is None:
             return
         place, size = self.button.geometry(), self.decline.size()
@@ -168,9 +168,9 @@ class TextWidget(ReadingPage):
 
     def _place_count(self) -> None:
         assert self.button is not None  # noqa: S101  # these pages have one
-        place, size = self.button.geometry(), self._count.size()
+        place, size = self.button.geometry(), self.count_label.size()
         left = place.right() - size.width() - 3 if self.mirrored else place.left() + 4
-        self._count.move(left, place.center().y() - size.height() // 2)
+        self.count_label.move(left, place.center().y() - size.height() // 2)
 
     def _lay_out_head(self, scale: float, margin: int, top: int) -> int:
         """Put the languages into the upper corner where lines end."""
@@ -182,7 +182,7 @@ class TextWidget(ReadingPage):
         return top + height - 8
 
     def _room_for_languages(self, margin: int) -> float:
-        """Return the largest scale at which the languages stand beside each other in the window."""
+        """Return the largest scale at which the languages fit in one line of the window."""
         assert self.languages is not None  # noqa: S101  # asked only where there are some
         self.languages.set_scale(1.0)
         return max(1.0, (self.width() - 2 * margin) / self.languages.width())

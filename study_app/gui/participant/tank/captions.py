@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QRegion
 
+from study_app.gui.participant.intervals.interval_marks import draw_interval
 from study_app.gui.participant.pages.key_caps import draw_key, key_size
 from study_app.gui.participant.pages.page_widget import mirrored, words_scale
 from study_app.gui.participant.pages.progress_line import BEGINNING, draw_progress
 from study_app.gui.participant.tank.frame import Placed, TaskShown
 from study_app.gui.theme.theme import PARTICIPANT, font
-from study_app.protocol.model import Explore, Reach
+from study_app.protocol.model import Explore, Follow, Reach
 from study_app.session.pages import TaskPage
 
 if TYPE_CHECKING:
@@ -49,6 +50,10 @@ class Captions:
         self._line: float
         self._way = Qt.LayoutDirection.RightToLeft if words.right_to_left else Qt.LayoutDirection.LeftToRight
         self.lay_out(*DESIGNED_FOR, 0.84 * DESIGNED_FOR[1])
+
+    def turn_to(self, page: TaskPage) -> None:
+        """Write the words of another interval of the same trial."""
+        self._page = page
 
     def below(self, width: float, height: float) -> float:
         """Return the height [px] that instruction and foot need under the tank; the same for most instructions."""
@@ -115,30 +120,34 @@ class Captions:
         key, _ = key_size(self._words.escape_key, 1.1 * self._fine)
         return key + 12 * self._fine + QFontMetricsF(self._pause_font).horizontalAdvance(self._words.pause_hint) + 4
 
-    def things(self, task: TaskShown | None, depth: int = 0) -> dict[str, Placed]:
+    def things(self, task: TaskShown | None, hint: str = "") -> dict[str, Placed]:
         """Return what can change among the words."""
         return {
             "count": Placed(self._counted(task), self._count),
-            "hint": Placed(self._hint_words(task, depth), self._hint),
+            "hint": Placed(self._hint_words(task, hint), self._hint),
         }
 
-    def draw(self, painter: QPainter, region: QRegion, task: TaskShown | None, depth: int = 0) -> None:
-        """Draw the words in ``region``; ``depth`` is where the lit target is: -1 further away, 1 nearer, 0 not told."""
+    def draw(self, painter: QPainter, region: QRegion, task: TaskShown | None, hint: str = "") -> None:
+        """Draw the words in ``region``; ``hint`` is how the ball gets into its target, "" where it needs none."""
         page, words = self._page, self._words
         painter.setLayoutDirection(self._way)
         if page.progress is not None and region.intersects(self._head.toAlignedRect()):
             draw_progress(painter, self._head, page.progress, words, scale=self._head_scale, share=0.5)
+        if page.interval is not None:
+            draw_interval(painter, self._width, self._head.center().y(), page.interval, words, self._head_scale)
         if isinstance(page.task, Reach) and region.intersects(self._count.toAlignedRect()):
             self._draw_count(painter, task)
         if region.intersects(self._instruction.toAlignedRect()):
-            _text(painter, self._instruction, CENTRED, page.instruction, self._instruction_font, PARTICIPANT.text)
+            rest = page.interval if page.interval is not None and page.interval.resting else None
+            said = page.instruction if rest is None else rest.announced
+            _text(painter, self._instruction, CENTRED, said, self._instruction_font, PARTICIPANT.text)
         if region.intersects(self._placed(self._foot).toAlignedRect()):
             self._draw_foot(painter)
-        hint = self._hint_words(task, depth)
-        if hint and region.intersects(self._hint.toAlignedRect()):
-            strong = hint.startswith((words.continue_now, words.further_away, words.nearer)) or hint == words.time_is_up
+        hints = self._hint_words(task, hint)
+        if hints and region.intersects(self._hint.toAlignedRect()):
+            strong = bool(hint) or hints.startswith(words.continue_now) or hints == words.time_is_up
             colour = PARTICIPANT.text if strong else PARTICIPANT.text3
-            _text(painter, self._hint, int(Qt.AlignmentFlag.AlignCenter), hint, self._small, colour)
+            _text(painter, self._hint, int(Qt.AlignmentFlag.AlignCenter), hints, self._small, colour)
 
     @property
     def _head_scale(self) -> float:
@@ -154,6 +163,8 @@ class Captions:
         both = words.seconds_left.format(seconds=COUNTED_DOWN_S)
         if isinstance(self._page.task, Reach):
             return tuple(f"{away} · {both}" for away in (words.further_away, words.nearer, words.time_is_up))
+        if isinstance(self._page.task, Follow):
+            return words.back_to_target, words.further_away, words.nearer
         return f"{words.continue_now} · {both}", words.continue_in.format(seconds=999), counted, words.time_is_up
 
     def _draw_foot(self, painter: QPainter) -> None:
@@ -162,12 +173,14 @@ class Captions:
         key, _ = key_size(words.escape_key, 1.1 * fine)
         cap = self._placed(QRectF(self._foot.left(), self._foot.top(), key, self._foot.height()))
         draw_key(painter, cap.left(), cap.center().y(), words.escape_key, 1.1 * fine)
-        beside = self._foot.adjusted(key + 12 * fine, 0, 0, 0)
-        _text(painter, self._placed(beside), BEGINNING, words.pause_hint, self._pause_font, PARTICIPANT.text2)
+        words_at = self._foot.adjusted(key + 12 * fine, 0, 0, 0)
+        _text(painter, self._placed(words_at), BEGINNING, words.pause_hint, self._pause_font, PARTICIPANT.text2)
 
-    def _hint_words(self, task: TaskShown | None, depth: int) -> str:
-        """Return how long it takes until the participant may or must go on, and in which depth the target is."""
+    def _hint_words(self, task: TaskShown | None, hint: str) -> str:
+        """Return how the ball gets into its target, and how long it takes until the participant may or must go on."""
         todo, words = self._page.task, self._words
+        if isinstance(todo, Follow) or (self._page.interval is not None and self._page.interval.resting):
+            return hint  # a count would distract from the pace, whose end is no surprise
         elapsed_s = task.elapsed_s if task else 0.0  # before the first view nothing has happened yet
         left = math.ceil(todo.limit_s - elapsed_s)
         if left <= 0:
@@ -179,8 +192,7 @@ class Captions:
                 return words.continue_in.format(seconds=wait)
             return words.continue_now if left > COUNTED_DOWN_S else f"{words.continue_now} · {counted}"
         counts = todo.duration_s is not None or left <= COUNTED_DOWN_S
-        away = {0: "", -1: words.further_away, 1: words.nearer}[depth]
-        return " · ".join(filter(None, (away, counted if counts else "")))
+        return " · ".join(filter(None, (hint, counted if counts else "")))
 
     def _counted(self, task: TaskShown | None) -> tuple[int, int | None]:
         if task is not None:

@@ -34,6 +34,8 @@ class TaskShown(Protocol):
     def dwell(self) -> float: ...  # noqa: D102
     @property
     def elapsed_s(self) -> float: ...  # noqa: D102
+    @property
+    def target_m(self) -> Point | None: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)

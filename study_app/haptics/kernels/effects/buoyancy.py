@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from study_app.haptics.kernels.compiled import part
-from study_app.haptics.model.layout import EFFECT_BUOYANCY
+from study_app.haptics.model.effects.buoyancy import BIT
 
 
 @part
@@ -21,7 +21,7 @@ def buoyancy_force(model: Any) -> None:
     weighing = 0.0
     for i in range(parameters.liquids):
         liquid, local = model.liquids[i], model.liquid_states[i]
-        if liquid.effects & EFFECT_BUOYANCY:
+        if liquid.effects & BIT:
             lift_n += liquid.buoyancy.lift_n * local.share
             weighing += local.border
     state.lift_n[1] = lift_n - parameters.weight_n * min(weighing, 1.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from study_app.haptics.kernels.compiled import part
-from study_app.haptics.model.effects.records import CURRENT_CHANNEL, CURRENT_UNIFORM
+from study_app.haptics.kernels.vector import copy
+from study_app.haptics.model.effects.current import CURRENT_CHANNEL, CURRENT_UNIFORM
 from study_app.haptics.model.layout import Record
 
 
@@ -33,3 +34,4 @@ def current_velocity(liquid: Record, local: Record, state: Record) -> None:
             flow[0], flow[1], flow[2] = turning_mps * z, 0.0, -turning_mps * x
     for axis in range(3):
         local.motion_mps[axis] -= flow[axis]
+    copy(flow, state.drift_mps)

@@ -5,7 +5,12 @@ from __future__ import annotations
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import norm
 from study_app.haptics.model import laws
-from study_app.haptics.model.effects.records import LAW_BROWN_LAWLER, LAW_CONSTANT, LAW_HAIDER_LEVENSPIEL
+from study_app.haptics.model.effects.drag import (
+    LAW_BROWN_LAWLER,
+    LAW_CONSTANT,
+    LAW_HAIDER_LEVENSPIEL,
+    LAW_LINEAR,
+)
 from study_app.haptics.model.layout import Record
 
 _schiller_naumann = part(laws.schiller_naumann)
@@ -19,12 +24,17 @@ def drag_force(liquid: Record, local: Record, state: Record) -> None:
 
     A is the frontal area of the ball, φ the share of it in the liquid. C_d is the body's own, or that of a sphere at
     Re = ρ|w|D/µ (``laws``): there as a multiple of Stokes' −3πµD w, finite at rest, where C_d is not.
+    Only the constant law grows as the square of a speed. The linear law is a damper, F = −(b/s) w with the damping b at
+    the hand and the scene's scale s: F = −b v at the hand.
     """
     w = local.relative_mps
     resistance_nspm = resistance(liquid.drag, norm(w))
     for axis in range(3):
-        local.drag.force_n[axis] = -resistance_nspm * w[axis] * local.frontal
-        state.force_n[axis] += local.drag.force_n[axis]
+        force_n = -resistance_nspm * w[axis] * local.frontal
+        state.force_n[axis] += force_n
+        local.damping_n[axis] += force_n
+    if liquid.drag.law != LAW_CONSTANT:
+        state.linear = 1
 
 
 @part
@@ -32,6 +42,8 @@ def resistance(drag: Record, speed_mps: float) -> float:
     """Return |F|/|w| [N·s/m] of the whole ball at a relative speed."""
     if drag.law == LAW_CONSTANT:
         return float(drag.factor_kg_m * speed_mps)
+    if drag.law == LAW_LINEAR:
+        return float(drag.damping_nspm)
     return float(drag.stokes_nspm * _over_stokes(drag.law, drag.reynolds_spm * speed_mps))
 
 

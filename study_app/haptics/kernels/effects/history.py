@@ -16,9 +16,9 @@ import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import part
-from study_app.haptics.kernels.vector import clear
-from study_app.haptics.model.effects.records import EXPONENTIALS
-from study_app.haptics.model.layout import Record
+from study_app.haptics.kernels.vector import clear, square
+from study_app.haptics.model.effects.history import EXPONENTIALS
+from study_app.haptics.model.layout import ESTIMATOR_KALMAN, Record
 
 TIMES = (0.1, 0.3, 1.0, 3.0, 10.0, 40.0, 190.0, 1000.0, 6500.0, 50000.0)  # t̃_i
 WEIGHTS = (
@@ -34,38 +34,64 @@ WEIGHTS = (
     0.63661146557001,
 )  # a_i
 NOTHING = 1e-30
+PERIOD_S = 1.0  # of the sway whose inertia counts as a storage
 ROUNDING_S = 1e-9  # so that a window of whole ticks holds as many of them, however their sum is rounded
 
 
 @part
 def basset_force(
-    liquid: Record, local: Record, state: Record, intervals: Any, exponentials: Any, interval_s: float
+    parameters: Record,
+    liquid: Record,
+    local: Record,
+    state: Record,
+    rows: Any,
+    delay_ticks: int,
+    interval_s: float,
 ) -> None:
     """Add the history force, (3,) [N], to the force; φ is the share of the volume in the liquid.
 
-    w is smoothed over τ before, as for the added mass.
+    w is smoothed over τ before, as for the added mass. A loop is stable with a part of it. It holds the energy of its
+    inertia in a sway of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24).
     """
     history, tracks = liquid.history, local.history
-    if tracks.primed == 0:
+    intervals, exponentials = rows.intervals, rows.exponentials
+    if local.ticks == 0:
         _begin(history, tracks, local.relative_mps, exponentials)
     _fade(history, exponentials, interval_s)
     _append(history, tracks, local.relative_mps, intervals, interval_s)
-    clear(tracks.force_n)
-    oldest_s = _integrate(history, tracks, intervals)
+    force_n = local.inertia_n[local.inertial]
+    local.inertial += 1
+    clear(force_n)
+    oldest_s = _integrate(history, tracks, intervals, force_n)
     for i in range(EXPONENTIALS):
         exponential = exponentials[history.tail_row + i]
         for axis in range(3):
-            tracks.force_n[axis] += exponential.memory[axis]
+            force_n[axis] += exponential.memory[axis]
     _hand_on(history, tracks, intervals, exponentials, oldest_s)
     for axis in range(3):
-        tracks.force_n[axis] *= -history.factor_kg_rs * local.share
-        state.force_n[axis] += tracks.force_n[axis]
+        force_n[axis] *= -history.factor_kg_rs * local.share
+        state.force_n[axis] += force_n[axis]
+    inertia_kg = 0.5 * history.factor_kg_rs * local.share * math.sqrt(PERIOD_S)
+    state.returnable_j += (
+        0.5 * liquid.inertia_share[delay_ticks] * inertia_kg * _storing_square(parameters, local, tracks)
+    )
+
+
+@part
+def _storing_square(parameters: Record, local: Record, tracks: Record) -> float:
+    """Return the square of the velocity [m²/s²] by which it holds energy: smoothed, as of the added mass."""
+    if parameters.estimator != ESTIMATOR_KALMAN:
+        return float(square(local.motion_mps))
+    square_m2ps2 = 0.0
+    for axis in range(3):
+        smoothed_mps = local.motion_mps[axis] + tracks.smoothed_mps[axis] - local.relative_mps[axis]
+        square_m2ps2 += smoothed_mps * smoothed_mps
+    return square_m2ps2
 
 
 @part
 def _begin(history: Record, tracks: Record, w: Any, exponentials: Any) -> None:
     """Begin at the present velocity, as if it had always been so."""
-    tracks.primed = 1
     tracks.first = 0
     tracks.held = 0
     for axis in range(3):
@@ -101,7 +127,7 @@ def _append(history: Record, tracks: Record, w: Any, intervals: Any, interval_s:
 
 
 @part
-def _integrate(history: Record, tracks: Record, intervals: Any) -> float:
+def _integrate(history: Record, tracks: Record, intervals: Any, force_n: Any) -> float:
     """Add ∫ dw/dτ (t − τ)^(−½) dτ over the window to the force; return how long ago its oldest interval began."""
     age_s = root = 0.0
     for back in range(1, tracks.held + 1):
@@ -111,7 +137,7 @@ def _integrate(history: Record, tracks: Record, intervals: Any) -> float:
         weight = 2.0 * (longer - root)
         root = longer
         for axis in range(3):
-            tracks.force_n[axis] += weight * interval.acceleration_mps2[axis]
+            force_n[axis] += weight * interval.acceleration_mps2[axis]
     return age_s
 
 

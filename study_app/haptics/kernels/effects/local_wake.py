@@ -19,18 +19,22 @@ import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import part
-from study_app.haptics.kernels.effects.wake import NOTHING_MPS, REST_MPS, response
+from study_app.haptics.kernels.effects.wake import NOTHING_MPS, REST_MPS, response, returnable_j
 from study_app.haptics.kernels.vector import clear, norm
-from study_app.haptics.model.effects.records import CELLS
+from study_app.haptics.model.effects.local_wake import CELLS
 from study_app.haptics.model.layout import Record
 
 FARTHEST = 40.0  # r²/2σ² beyond which a cell is not felt: e^-40
 
 
 @part
-def local_wake_velocity(liquid: Record, local: Record, state: Record, cells: Any, interval_s: float) -> None:
+def local_wake_velocity(
+    parameters: Record, liquid: Record, local: Record, state: Record, cells: Any, interval_s: float
+) -> None:
     """Set the liquid's velocity at the body, ``local.wake_mps`` (3,) [m/s], from the cells near it."""
     wake, tracks, out = liquid.local_wake, local.local_wake, local.wake_mps
+    if local.ticks == 0:
+        _clear(tracks)
     for axis in range(3):
         tracks.drift_m[axis] += (state.velocity_mps[axis] - local.motion_mps[axis]) * interval_s
     clear(out)
@@ -59,6 +63,7 @@ def local_wake_velocity(liquid: Record, local: Record, state: Record, cells: Any
     gain = response(size_mps * speeds / squares, wake.exponent)
     for axis in range(3):
         out[axis] *= gain
+    state.returnable_j += returnable_j(parameters, liquid, out, wake.length)
 
 
 @part
@@ -85,7 +90,7 @@ def deposit_local_wake(liquid: Record, local: Record, state: Record, cells: Any,
 
 
 @part
-def clear_local_wake(tracks: Record) -> None:
+def _clear(tracks: Record) -> None:
     """Forget everything, as if nothing had ever been stored."""
     tracks.first = 0
     tracks.cells = 0

@@ -17,8 +17,10 @@ import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import part
+from study_app.haptics.kernels.effects.drag import resistance
 from study_app.haptics.kernels.vector import clear, copy, distance, norm
-from study_app.haptics.kernels.wake_segments import renew, store, tail
+from study_app.haptics.kernels.wake_segments import empty, renew, store, tail
+from study_app.haptics.model.effects.drag import LAW_CONSTANT
 from study_app.haptics.model.layout import Record
 
 REST_MPS = 1e-3
@@ -28,9 +30,11 @@ NOTHING_MPS = 1e-30
 
 
 @part
-def wake_velocity(liquid: Record, local: Record, segments: Any) -> None:
+def wake_velocity(parameters: Record, liquid: Record, local: Record, state: Record, segments: Any) -> None:
     """Set the liquid's velocity at the body, ``local.wake_mps`` (3,) [m/s], from the wake so far."""
     wake, out = local.wake, local.wake_mps
+    if local.ticks == 0:
+        empty(liquid.wake, wake, segments)
     tail(liquid.wake, wake, segments, out)
     size_mps = norm(out)
     if size_mps < NOTHING_MPS:
@@ -40,6 +44,20 @@ def wake_velocity(liquid: Record, local: Record, segments: Any) -> None:
     gain = response(size_mps / mean_mps, liquid.wake.exponent)
     for axis in range(3):
         out[axis] *= gain
+    state.returnable_j += returnable_j(parameters, liquid, out, liquid.wake.length)
+
+
+@part
+def returnable_j(parameters: Record, liquid: Record, wake_mps: Any, length: int) -> float:
+    """Return the most energy [J, scene] that a wake of ``length`` N gives to a body: max R(u - v) (u - v) v, for N T.
+
+    For a constant coefficient that power is (4/27) c u³, at v = u/3; R of the other laws grows less, so R(u) u²/4
+    bounds it.
+    """
+    u_mps = norm(wake_mps)
+    share = 4.0 / 27.0 if liquid.drag.law == LAW_CONSTANT else 0.25
+    power_w = float(share * resistance(liquid.drag, u_mps) * u_mps * u_mps)
+    return float(power_w * length * parameters.period_s)
 
 
 @part

@@ -74,14 +74,14 @@ def begin_filter(parameters: Record, filtered: Record) -> None:
 @part
 def take_force(state: Record, safety: Record) -> None:
     """Take the mean force that acted since the last sample, as late as the loop is believed to be."""
-    account, filtered = safety.account, state.kalman
-    late = account.turn - safety.delay_ticks
-    late_n = account.acted_n[late if late >= 0 else late + account.acted_n.shape[0]]
-    lasted_s = account.impulse_s + safety.turn_s
+    passivity, filtered = safety.passivity, state.kalman
+    late = passivity.row - safety.delay_ticks
+    late_n = passivity.acted_n[late if late >= 0 else late + passivity.acted_n.shape[0]]
+    lasted_s = passivity.impulse_s + safety.tick_s
     for axis in range(3):
         filtered.force_n[axis] = late_n[axis]
         if lasted_s > 0.0:
-            filtered.force_n[axis] = (account.acted_impulse_ns[axis] + late_n[axis] * safety.turn_s) / lasted_s
+            filtered.force_n[axis] = (passivity.acted_impulse_ns[axis] + late_n[axis] * safety.tick_s) / lasted_s
     filtered.believed_ticks = safety.delay_ticks
 
 
@@ -137,13 +137,13 @@ def _correct(parameters: Record, state: Record, filtered: Record, interval_s: fl
     aa = p[5] + qt
 
     variance_m2 = pp + 0.5 * parameters.count_m * parameters.count_m + TIMING_S * TIMING_S * speed_m2ps2
-    told = 1.0
+    measured = 1.0
     if filtered.repeated:
         filtered.repeated = 0
     elif _repeats(parameters, state, filtered, t, variance_m2):
         filtered.repeated = 1
-        told = 0.0
-    to_p, to_v, to_a = told * pp / variance_m2, told * pv / variance_m2, told * pa / variance_m2
+        measured = 0.0
+    to_p, to_v, to_a = measured * pp / variance_m2, measured * pv / variance_m2, measured * pa / variance_m2
     p[0], p[1], p[2] = pp * (1.0 - to_p), pv * (1.0 - to_p), pa * (1.0 - to_p)
     p[3], p[4], p[5] = vv - to_v * pv, va - to_v * pa, aa - to_a * pa
 
@@ -167,14 +167,14 @@ def _correct(parameters: Record, state: Record, filtered: Record, interval_s: fl
         squares_m2 += left_m * left_m
 
     uncertain = filtered.per_kg_variance
-    gain = told * uncertain / (responses_m2 * uncertain + variance_m2)
+    gain = measured * uncertain / (responses_m2 * uncertain + variance_m2)
     per_kg = filtered.per_kg + gain * products_m2
     per_kg += (USUAL_PER_KG - per_kg) * t / FORGETTING_S
     filtered.per_kg = min(max(per_kg, 0.0), 1.0 / parameters.mass_kg)
     filtered.per_kg_variance = uncertain - gain * uncertain * responses_m2 + LEARNING_PKG2S * t
     for axis in range(3):
         filtered.estimate_mps[axis] = filtered.velocity_mps[axis] + filtered.response_mps[axis] * filtered.per_kg
-    return float(told * squares_m2 / (variance_m2 + responses_m2 * uncertain))
+    return float(measured * squares_m2 / (variance_m2 + responses_m2 * uncertain))
 
 
 @part

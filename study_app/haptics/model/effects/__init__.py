@@ -1,1 +1,20 @@
-"""Records of the effects."""
+"""The effects: one descriptor a module, found by importing every module of this folder."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Final
+
+from study_app.haptics.model.effect import Effect
+
+EFFECTS: Final[tuple[Effect, ...]] = tuple(
+    sorted((import_module(f"{__name__}.{it.name}").EFFECT for it in iter_modules(__path__)), key=lambda it: it.bit)
+)
+"""Every effect, in the order of its bit."""
+
+NAMED: Final = {effect.name: effect for effect in EFFECTS}
+"""The same by name."""
+
+if len({effect.bit for effect in EFFECTS}) < len(EFFECTS) or len(NAMED) < len(EFFECTS):
+    raise ValueError(f"two effects share a name or a bit: {[(effect.name, effect.bit) for effect in EFFECTS]}")

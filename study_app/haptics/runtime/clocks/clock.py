@@ -34,7 +34,7 @@ class Clock(Protocol):
     """What the servo asks of a clock.
 
     ``now`` and ``sleep`` are C functions, ``context`` is the address of the clock's own memory, handed to both, and
-    ``runs`` tells whether time passes by itself.
+    ``runs``: whether time passes by itself.
     """
 
     now: Any
@@ -56,7 +56,8 @@ class SystemClock:
 
     Parameters
     ----------
-    spin_us : how long before a deadline a sleep ends early, to look at the clock until it is there; default: what this
+    spin_us : float, optional
+        How long before a deadline a sleep ends early, to look at the clock until it is there [µs]; by default what this
         system's timer needs. It takes up to ``spin_us`` of a core's time every period, which `spun_ns` counts.
 
     Raises
@@ -71,9 +72,9 @@ class SystemClock:
         self.spin_us = platform.SPIN_US if spin_us is None else spin_us
         if not 0.0 <= self.spin_us <= MOST_SPIN_US:
             raise StudyError(f"a spin lasts 0 to {MOST_SPIN_US:g} µs before a deadline, not {spin_us:g}")
-        self._memory = platform.open_clock(round(1000 * self.spin_us))
+        self.memory = platform.open_clock(round(1000 * self.spin_us))
         self.now, self.sleep = _system_functions()
-        self.context = int(self._memory.ctypes.data)
+        self.context = int(self.memory.ctypes.data)
 
     def now_ns(self) -> int:
         """Return the time [ns]."""
@@ -96,7 +97,7 @@ class SystemClock:
     @property
     def spun_ns(self) -> int:
         """How long all sleeps together looked at the clock instead of sleeping [ns]."""
-        return int(self._memory[0].spun_ns)
+        return int(self.memory[0].spun_ns)
 
 
 class VirtualClock:
@@ -109,14 +110,14 @@ class VirtualClock:
 
     def __init__(self, start_ns: int = 0) -> None:
         self.suspension_ns = 0
-        self._memory = records(VIRTUAL, 1)
-        self._memory[0].now_ns = start_ns
+        self.memory = records(VIRTUAL, 1)
+        self.memory[0].now_ns = start_ns
         self.now, self.sleep = _virtual_functions()
-        self.context = int(self._memory.ctypes.data)
+        self.context = int(self.memory.ctypes.data)
 
     def now_ns(self) -> int:
         """Return the time [ns]."""
-        return int(self._memory[0].now_ns)
+        return int(self.memory[0].now_ns)
 
     def suspended_ns(self) -> int:
         """Return ``suspension_ns``."""
@@ -128,8 +129,10 @@ def raise_priority(blocks: Blocks = (), *, real_time: bool = True) -> Grant:
 
     Parameters
     ----------
-    blocks : the thread's memory, of which none is locked where this is empty
-    real_time : False: stay an ordinary thread, whose timers are exact nevertheless
+    blocks : Blocks
+        The thread's memory, of which none is locked where this is empty.
+    real_time : bool
+        False: stay an ordinary thread, whose timers are exact nevertheless.
     """
     grant = platform.raise_priority(real_time=real_time)
     if not (blocks and real_time):

@@ -42,5 +42,5 @@ class Grant:
 
 
 REFUSED = "the system grants no more"
-NOT_ASKED = Grant("normal", "no more was asked for")
+NOT_ASKED = Grant("normal", "no more was requested")
 NO_THREAD = Grant("none", "not in a thread of its own")

@@ -38,11 +38,11 @@ _clock_nanosleep = external("clock_nanosleep", types.int32(types.int32, types.in
 _PR_SET_TIMERSLACK = 29
 _PRIORITY = 60  # of 1 to 99: above ordinary real-time audio, below the kernel's own threads
 _NICE = -15
-_LOCK_ALL = 1 | 2 | 4  # what is there, what comes, and each page once it is used: nothing is fetched that nobody uses
+_LOCK_ALL = 1 | 2 | 4  # what is there, what comes, and each page once it is used: unused pages are not loaded
 
 RIGHTS = (
-    'for real-time turns write "USER - rtprio 70" and "USER - memlock unlimited", with your user\'s name, into '
-    "/etc/security/limits.d/liquid-study.conf and log in anew, or install rtkit"
+    'for real-time priority write "USER - rtprio 70" and "USER - memlock unlimited", with your user\'s name, into '
+    "/etc/security/limits.d/liquid-study.conf and log in again, or install rtkit"
 )
 MEMORY = 'to lock it write "USER - memlock unlimited" into /etc/security/limits.d/liquid-study.conf and log in anew'
 

@@ -14,10 +14,10 @@ from study_app.haptics.runtime.clocks.grants import NOT_ASKED, REFUSED, Blocks, 
 
 SPIN_US = 0.0  # by default the timer is trusted
 
-_TIMEBASE = np.dtype(
+TIMEBASE = np.dtype(
     [("numerator", np.int64), ("denominator", np.int64), ("spin_ns", np.int64), ("spun_ns", np.int64)], align=True
 )
-_timebase_at = record_at(_TIMEBASE)
+_timebase_at = record_at(TIMEBASE)
 
 _mach_absolute_time = external("mach_absolute_time", types.int64())
 _mach_wait_until = external("mach_wait_until", types.int32(types.int64))
@@ -27,7 +27,7 @@ _COMPUTATION_NS = 150_000
 _CONSTRAINT_NS = 500_000
 _PERIOD_NS = 1_000_000
 
-RIGHTS = "this system grants real-time turns to any program: close other audio and video programs"
+RIGHTS = "this system grants real-time priority to any program: close other audio and video programs"
 MEMORY = "to lock it raise the limit: ulimit -l unlimited"
 
 
@@ -48,7 +48,7 @@ def open_clock(spin_ns: int) -> Any:
     """Return the memory of a clock: nanoseconds = ticks · numerator / denominator."""
     info = _TimebaseInfo()
     ctypes.CDLL(None).mach_timebase_info(ctypes.byref(info))
-    memory = records(_TIMEBASE, 1)
+    memory = records(TIMEBASE, 1)
     memory[0].numerator = info.numerator
     memory[0].denominator = info.denominator
     memory[0].spin_ns = spin_ns
@@ -77,7 +77,7 @@ def sleep(context: int, deadline_ns: int) -> Any:
 
 
 def raise_priority(*, real_time: bool = True) -> Grant:
-    """Promise the scheduler short turns in return for starting them on time."""
+    """Promise the scheduler short ticks in return for starting them on time."""
     if not real_time:
         return NOT_ASKED
     base = open_clock(0)[0]

@@ -28,8 +28,10 @@ def make_real_time(thread: int, address: str | None = None) -> int:
 
     Parameters
     ----------
-    thread : the system's id of it
-    address : path of the bus' socket; default: the system bus
+    thread : int
+        The system's id of the thread.
+    address : str, optional
+        Path of the bus' socket; by default the system bus.
 
     Raises
     ------
@@ -54,9 +56,12 @@ def make_high_priority(thread: int, nice: int, address: str | None = None) -> in
 
     Parameters
     ----------
-    thread : the system's id of it
-    nice : the level wished for, below 0
-    address : path of the bus' socket; default: the system bus
+    thread : int
+        The system's id of the thread.
+    nice : int
+        The level wished for, below 0.
+    address : str, optional
+        Path of the bus' socket; by default the system bus.
 
     Raises
     ------
@@ -109,7 +114,7 @@ class _Bus:
             return int(struct.unpack_from("<q", answer, 8)[0])
         if kind == b"i":
             return int(struct.unpack_from("<i", answer, 4)[0])
-        raise OSError(f"the real-time service says {name} in an unknown way")
+        raise OSError(f"the real-time service sent {name} in an unknown form")
 
     def call(
         self, service: str, path: str, interface: str, member: str, signature: str = "", body: bytes = b""
@@ -136,10 +141,10 @@ class _Bus:
         """Return kind and body of the next message; signals are among them."""
         head = self._receive(16)
         if head[:1] != b"l":
-            raise OSError("the bus speaks big-endian, on a machine that does not")
+            raise OSError("the bus uses big-endian byte order, unlike this machine")
         _, kind, _, _, length, _, fields = struct.unpack("<cBBBIII", head)
         if length + fields > _LONGEST:
-            raise OSError("what answers is no bus")
+            raise OSError("the reply is not from a bus")
         return kind, self._receive(fields + -fields % 8 + length)[fields + -fields % 8 :]
 
     def _receive(self, count: int) -> bytes:

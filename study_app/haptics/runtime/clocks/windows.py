@@ -21,11 +21,11 @@ from study_app.haptics.runtime.clocks.grants import NOT_ASKED, REFUSED, Blocks, 
 
 SPIN_US = 500.0  # the timer may be this late; the rest is waited for by looking at the counter
 
-_COUNTER = np.dtype(
+COUNTER = np.dtype(
     [("frequency_hz", np.int64), ("timer", np.intp), ("spin_ns", np.int64), ("spun_ns", np.int64)], align=True
 )
 _INT64 = np.dtype([("value", np.int64)], align=True)
-_counter_at = record_at(_COUNTER)
+_counter_at = record_at(COUNTER)
 _int64_at = record_at(_INT64)
 _int64_on_stack = stack_memory(1)
 
@@ -42,13 +42,13 @@ _TIME_CRITICAL = 15
 _MMCSS_CRITICAL = 2
 _TIMER_PERIOD_MS = 1
 
-RIGHTS = "for real-time turns start the service Multimedia Class Scheduler (services.msc: MMCSS)"
+RIGHTS = "for real-time priority start the service Multimedia Class Scheduler (services.msc: MMCSS)"
 MEMORY = "to lock it close other programs: the working set is too small"
 
 
 def open_clock(spin_ns: int) -> Any:
     """Return the memory of a clock: the counter's frequency and a timer of its own, closed with the memory."""
-    memory = records(_COUNTER, 1)
+    memory = records(COUNTER, 1)
     memory[0].spin_ns = spin_ns
     if sys.platform == "win32":
         kernel32 = ctypes.WinDLL("kernel32")

@@ -103,6 +103,7 @@ def test_counts_at_which_a_local_search_failed_are_fitted() -> None:
     assert fit(counts, "logistic", (0.0, 0.5), (0.0, 0.5)).log_likelihood > capped.log_likelihood
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_no_counts_raise_and_no_other_search_finds_a_higher_likelihood(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -155,6 +156,7 @@ def people_who_notice(rng: np.random.Generator, n: int, spread_ms: float, never:
     return np.where(rng.random(chance.shape) < chance, 6.0, 2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("n", "spread_ms", "never"), [(5, 0, 0), (12, 0, 0), (12, 35, 0), (12, 60, 0), (12, 15, 1 / 6)]
 )
@@ -167,6 +169,7 @@ def test_the_interval_covers_the_threshold_of_people_who_differ(n: int, spread_m
     assert covered >= binom.ppf(0.05, len(printed), 0.93)
 
 
+@pytest.mark.slow
 def test_a_threshold_needs_a_rise_at_the_alpha_that_was_decided() -> None:
     answers = np.array([[2, 6, 6, 6], [2, 2, 6, 6], [2, 2, 6, 6], [2, 6, 6, 6]])  # p is 1 in 4 · 6 · 6 · 4
     usual = noticed(answers, (0, 50, 100, 150))
@@ -221,7 +224,7 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
 @pytest.mark.parametrize(
     ("yes", "note"),
     [
-        ([0] * 7, "nobody noticed anything up to 300"),
+        ([0] * 7, "no participant noticed anything up to 300"),
         ([5] * 7, "everybody noticed"),
         ([5, 4, 3, 2, 1, 0, 0], "not shown to rise with the level"),
         ([1, 0, 0, 1, 0, 1, 1], "not shown to rise with the level"),

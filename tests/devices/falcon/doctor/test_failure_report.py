@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import pytest
 
 from study_app.devices.doctor_report import NOTHING_WRONG, lines
-from study_app.devices.falcon.diagnosis import MODES
 from study_app.devices.falcon.doctor.failure_report import report
-from study_app.devices.falcon.failure_modes import OPEN, Facts
+from study_app.devices.falcon.facts import OPEN, Facts
+from study_app.devices.falcon.failure_modes import MODES
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def test_nothing_looked_at_is_not_called_well_mode_for_mode():
     assert [finding.id for finding in found.findings] == [mode.id for mode in MODES]
     assert [finding.number for finding in found.findings] == list(range(1, len(MODES) + 1))
     assert found.unseen
-    assert found.conclusion.startswith("Nothing wrong was found. Not looked at: ")
+    assert found.conclusion.startswith("Nothing wrong was found. Not checked: ")
 
 
 def test_a_falcon_in_order():
@@ -81,8 +81,8 @@ def test_a_report_states_what_was_tested_and_what_is_wrong_first():
     told = lines(report(Seen(Facts(platform="linux", usb="access"), "the Falcon cannot be used")))
     numbered = [line for line in told if line[:2].strip().isdigit()]
     states = [line[4:17].strip() for line in numbered]
-    assert states == sorted(states, key=("FOUND", "not looked at", "ok").index)
-    assert numbered[0].endswith("it opens for the administrator alone")
+    assert states == sorted(states, key=("FOUND", "not checked", "ok").index)
+    assert numbered[0].endswith("only the administrator can open it")
     in_order = lines(report(Seen(WELL)))
-    assert any(line.split() == ["5", "ok", "its", "firmware", "is", "there"] for line in in_order)
+    assert any(line.split() == ["5", "ok", "its", "firmware", "is", "available"] for line in in_order)
     assert not any("there is no firmware" in line for line in in_order)

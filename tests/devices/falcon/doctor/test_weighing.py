@@ -15,6 +15,8 @@ from study_app.devices.falcon.mechanics.calibration import fit, left_over
 from study_app.devices.falcon.mechanics.geometry import GEOMETRIES
 from study_app.errors import DeviceError, DeviceLost
 
+pytestmark = pytest.mark.slow
+
 WEIGHT_N = 0.4 * GRAVITY_MPS2
 
 
@@ -23,7 +25,7 @@ def emulated(**options):
 
 
 def helper(emulator, weight_n=WEIGHT_N, *, readings=None, lags=0):
-    """Return what does as it is asked, some turns later, and the list of what that was."""
+    """Return what does as it is asked, some ticks later, and the list of what that was."""
     asked = []
 
     def ask(kind, _words):
@@ -115,7 +117,7 @@ class TestTheGrip:
             emulator.reach_to(-0.04, 0.0, 0.0)
             pushes = []
             for _ in range(1500):
-                grip.turn()
+                grip.tick()
                 pushes.append(np.linalg.norm(emulator.force_n))
             assert max(pushes) == pytest.approx(2.0, rel=0.01)
 
@@ -139,9 +141,9 @@ class TestTheGrip:
             grip = Grip(device, virtual=True)
             emulator.reach_to(0.03, 0.0, 0.0)
             for _ in range(1500):
-                grip.turn()
+                grip.tick()
             assert emulator.torques != (0, 0, 0)
             emulator.faults.chance("drop", 1.0)
             for _ in range(40):
-                grip.turn()
+                grip.tick()
             assert emulator.torques == (0, 0, 0)

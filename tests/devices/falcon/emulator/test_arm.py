@@ -64,6 +64,7 @@ def test_where_it_searched_from_does_not_matter(name, place, before):
     assert arms.angle_rad == pytest.approx(closed_form(name, place), abs=1e-12)
 
 
+@pytest.mark.slow
 @given(geometries, places, st.tuples(*[st.floats(-4000, 4000)] * 3))
 def test_a_small_step_gets_the_work_that_the_torques_do(name, place, torque):
     step_m = np.array([3e-6, -4e-6, 5e-6])

@@ -11,8 +11,8 @@ from study_app.errors import DeviceError
 from tests.devices.falcon.support.emulated import HOMING, at_work, counts_in, exchanged, home, packet, still, stripped
 
 
-def replies_to(emulator, turns):
-    return [exchanged(emulator, flags=HOMING, patience=3) for _ in range(turns)]
+def replies_to(emulator, ticks):
+    return [exchanged(emulator, flags=HOMING, patience=3) for _ in range(ticks)]
 
 
 def test_a_dropped_reply_is_missing_but_its_torque_is_not():
@@ -113,7 +113,7 @@ def test_a_switch_is_off_until_it_is_switched_on(name):
 def test_a_fault_can_be_named_with_its_chance(name):
     emulator = still()
     emulator.take(f"{name}=0.25")
-    assert emulator._state.faults.chance[CHANCES.index(name)] == 0.25
+    assert emulator.state.faults.chance[CHANCES.index(name)] == 0.25
 
 
 def test_the_power_can_be_taken_by_name():

@@ -232,8 +232,8 @@ def test_torques_push_the_handle_against_the_hand_as_virtual_work_says(place):
     name, step_m = emulator.geometry.name, 1e-5
     for axis in range(3):
         step = np.eye(3)[axis] * step_m
-        turns = np.subtract(closed_form(name, at + step), closed_form(name, at - step)) / (2 * step_m)
-        force = float(np.dot(-np.array(torques) / 6616.0, turns))
+        ticks = np.subtract(closed_form(name, at + step), closed_form(name, at - step)) / (2 * step_m)
+        force = float(np.dot(-np.array(torques) / 6616.0, ticks))
         assert emulator.force_n[axis] == pytest.approx(force, abs=2e-4)
         assert (at[axis] - place[axis]) * 500 == pytest.approx(force, abs=0.11)  # spring of the hand, Coulomb friction
 

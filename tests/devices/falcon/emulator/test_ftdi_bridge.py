@@ -117,7 +117,7 @@ def test_what_finds_the_chips_buffer_full_is_lost():
         emulator.pause(1e-3)
     code, data = emulator.read(1024, 10)
     assert (code, len(stripped(data))) == (0, 256)
-    assert emulator._state.bridge.lost == 64
+    assert emulator.state.bridge.lost == 64
     assert len(exchanged(emulator)) == 16
 
 
@@ -173,7 +173,7 @@ def test_unplugged_it_is_gone_and_comes_back_as_after_power_up():
 
 def test_an_endpoint_that_is_none_is_not_found():
     emulator = still()
-    assert emulator._transfer(0x83, np.zeros(64, np.uint8), 64, 10) == (constants.ERROR_NOT_FOUND, 0)
+    assert emulator.transfer(0x83, np.zeros(64, np.uint8), 64, 10) == (constants.ERROR_NOT_FOUND, 0)
 
 
 def test_status_may_be_any_but_its_place():

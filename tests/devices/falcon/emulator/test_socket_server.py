@@ -18,11 +18,13 @@ if numba.config.DISABLE_JIT:
 if not hasattr(socket, "AF_UNIX"):
     pytest.skip("no Unix sockets here", allow_module_level=True)
 
-from study_app.cli.falcon import state_of
+from study_app.cli.devices import state_of
 from study_app.devices.falcon.emulator.socket_server import EmulatorServer
 from study_app.devices.falcon.wire import constants
 from study_app.errors import DeviceError
 from tests.devices.falcon.support.emulated import HOMING, packet, still
+
+pytestmark = pytest.mark.slow
 
 CONTROL, OUT, IN, DESCRIPTOR = 1, 2, 3, 4
 PATIENCE_S = 60.0

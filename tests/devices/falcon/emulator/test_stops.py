@@ -17,6 +17,7 @@ from tests.devices.falcon.support.emulated import at_work, exchanged, home
 STRONGEST = [(4095, 4095, 4095), (-4095, 4095, -4095), (-4095, -4095, -4095)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("geometry", sorted(GEOMETRIES))
 @pytest.mark.parametrize("torques", STRONGEST)
 def test_thrown_beyond_its_reach_the_handle_stops_and_no_force_grows_without_bound(geometry, torques):

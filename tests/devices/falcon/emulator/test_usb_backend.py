@@ -148,8 +148,8 @@ def test_one_program_has_it_until_it_lets_go():
 
 def test_compiled_code_gets_the_same_falcon_and_its_time():
     emulator = still(running=True)
-    backend, device = claimed(emulator)
-    assert backend.c_calls(device._ctx.handle) == emulator.calls()
+    backend, _ = claimed(emulator)
+    assert backend.c_calls(backend.open_device(backend.emulators[0])) == emulator.calls()
     before_s = backend.now_s()
     backend.pause(0.5)
     assert backend.now_s() - before_s == pytest.approx(0.5, abs=1e-3)

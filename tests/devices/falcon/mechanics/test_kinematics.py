@@ -61,6 +61,7 @@ class TestPositions:
                     assert np.abs(counts).max() < 1660  # about the range that is known of the encoders
         angles_at(mechanism, (0, 0, OUT_STROKE_M + 0.005))
 
+    @pytest.mark.slow
     @given(position_m=inside, seen_m=inside)
     def test_forward_finds_what_inverse_was_asked_for_from_anywhere(self, mechanism, position_m, seen_m):
         assume(reachable(mechanism, position_m))
@@ -144,6 +145,7 @@ class TestForces:
         # near the end of reach the angles bend so much that a slope over a micrometre is coarser
         assert np.abs(rates - slopes).max() < 1e-6 * max(1.0, np.abs(rates).max() ** 2)
 
+    @pytest.mark.slow
     @given(position_m=inside, force_n=forces, step=forces)
     def test_torques_do_the_work_of_the_force_along_any_step(self, mechanism, position_m, force_n, step):
         assume(reachable(mechanism, position_m))
@@ -159,6 +161,7 @@ class TestForces:
         moved = angles_at(mechanism, (0, 0, 0.1275)) - angles_at(mechanism, (0, 0, 0.1265))
         assert torque_nm @ moved == pytest.approx(1.0 * 0.001, rel=1e-4)
 
+    @pytest.mark.slow
     @given(torque_nm=st.tuples(*(st.floats(-5, 5) for _ in range(3))).map(np.array))
     def test_too_great_a_demand_keeps_its_direction_and_never_wraps(self, mechanism, torque_nm):
         units = np.zeros(3, np.int64)

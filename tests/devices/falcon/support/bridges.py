@@ -170,13 +170,13 @@ class Server(threading.Thread):
             with self.news:
                 self.requests.append((kind, at, value, length, timeout_ms, data))
                 self.news.notify_all()
-            answer = self._answer(kind)
+            answer = self.answer(kind)
             if kind == self.hang_up_at:
                 client.sendall(answer[:5])
                 return
             client.sendall(answer)
 
-    def _answer(self, kind):
+    def answer(self, kind):
         code, data = self.answers.get(kind, (0, b""))
         if kind == BULK_IN and kind not in self.answers:
             code, data = (0, self.incoming.pop(0)) if self.incoming else (constants.ERROR_TIMEOUT, b"")
@@ -213,6 +213,8 @@ class D2xx:
         move = ctypes.CFUNCTYPE(DWORD, POINTER, POINTER, DWORD, ctypes.POINTER(DWORD))
         self.FT_Read, self.FT_Write = move(self._read), move(self._write)
         self.FT_GetQueueStatus = ctypes.CFUNCTYPE(DWORD, POINTER, ctypes.POINTER(DWORD))(self._queue)
+        self.FT_CreateDeviceInfoList = ctypes.CFUNCTYPE(DWORD, ctypes.POINTER(DWORD))(self._list)
+        self.FT_Open = ctypes.CFUNCTYPE(DWORD, DWORD, ctypes.POINTER(POINTER))(self._open)
         self.FT_SetTimeouts = ctypes.CFUNCTYPE(DWORD, POINTER, DWORD, DWORD)(self._set_timeouts)
 
     def __getattr__(self, name):
@@ -225,17 +227,17 @@ class D2xx:
 
         return function
 
-    def FT_CreateDeviceInfoList(self, count):  # noqa: N802 - the library's names
-        count._obj.value = len(self.devices)
+    def _list(self, count):
+        count[0] = len(self.devices)
         return self.status
 
-    def FT_GetDeviceInfoDetail(self, index, flags, kind, ids, place, serial, description, handle):  # noqa: N802
+    def FT_GetDeviceInfoDetail(self, index, flags, kind, ids, place, serial, description, handle):  # noqa: N802 - the library's name
         serial.value, description.value = (text.encode() for text in self.devices[index])
         return self.status
 
-    def FT_Open(self, index, handle):  # noqa: N802
+    def _open(self, index, handle):
         self.calls.append(("FT_Open", index))
-        handle._obj.value = 0x1234
+        handle[0] = 0x1234
         return self.status
 
     def _read(self, handle, data, length, count):

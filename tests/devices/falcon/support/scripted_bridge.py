@@ -90,8 +90,8 @@ class FakeBridge:
         return SUCCESS
 
 
-class Turns:
-    """An exchange over a fake bridge, turned as the servo would."""
+class Ticks:
+    """An exchange over a fake bridge, run as the servo would."""
 
     def __init__(self):
         self.bridge = FakeBridge()
@@ -101,8 +101,8 @@ class Turns:
         self.reading, self.command = new_reading(), new_command()
         self.now_ns = 1000 * MS
 
-    def turn(self, *replies, force_n=(0.0, 0.0, 0.0), after_ns=MS):
-        """Take a turn in which ``replies`` come, glued together; return what read and write answered."""
+    def tick(self, *replies, force_n=(0.0, 0.0, 0.0), after_ns=MS):
+        """Take a tick in which ``replies`` come, glued together; return what read and write answered."""
         self.now_ns += after_ns
         if replies:
             self.bridge.queue.append(MODEM_STATUS + b"".join(replies))
@@ -112,15 +112,15 @@ class Turns:
 
     def open_gate(self):
         """Home it, pull the grip out and wait until all force passes."""
-        self.turn()
+        self.tick()
         self.pull_out()
         while self.falcon.share < 1.0:
-            self.turn(reply())
+            self.tick(reply())
 
     def pull_out(self):
         """Pull the grip out and let it go back, faster than any hand but seen for long enough at either end."""
         for place_m in (OUT_M, OUT_M, OUT_M, CENTRE_M, CENTRE_M):
-            self.turn(reply(place_m))
+            self.tick(reply(place_m))
 
     @property
     def position_m(self):
@@ -131,16 +131,16 @@ class Turns:
         return torques_in(self.bridge.sent[-1])
 
 
-def force_of(turns, place_m):
+def force_of(ticks, place_m):
     """Return the force that the last torques make at a place, by virtual work and differences."""
-    mechanism = turns.falcon.mechanism
+    mechanism = ticks.falcon.mechanism
 
     def theta_at(place):
         theta = np.zeros(3)
         assert inverse(mechanism, np.add(place, [0, 0, GEOMETRY.centre_m]), theta) == REACHED
         return theta
 
-    torque_nm = -np.array(turns.torques) / UNITS_PER_NM
+    torque_nm = -np.array(ticks.torques) / UNITS_PER_NM
     return np.array(
         [
             torque_nm @ (theta_at(np.add(place_m, step)) - theta_at(np.subtract(place_m, step))) / 2e-6

@@ -18,19 +18,21 @@ from study_app.devices.registry import open_device
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 
+pytestmark = pytest.mark.slow
+
 PUSHES_AND_DIES = """
 import os, signal, sys, time
 from study_app.devices.registry import open_device
 from study_app.haptics.model.layout import new_command, new_reading
 device, reading, command = open_device(sys.argv[1]), new_reading(), new_command()
 command[0].force_n = (0.0, 0.0, 2.0)
-turns = 0
-while abs(device.held[1]).max() < 100 and turns < 20_000:
-    turns += 1
+ticks = 0
+while abs(device.held[1]).max() < 100 and ticks < 20_000:
+    ticks += 1
     device.read.ctypes(device.context, time.monotonic_ns(), reading.ctypes.data)
     device.write.ctypes(device.context, command.ctypes.data)
-    device._transport.pause(0.001)
-print(device._guard.watching, flush=True)
+    device.transport.pause(0.001)
+print(device.guard.watching, flush=True)
 os.kill(os.getpid(), getattr(signal, sys.argv[2]))
 """
 
@@ -41,9 +43,9 @@ def server(tmp_path):
         yield server
 
 
-def test_the_servo_turns_on_it_and_its_end_is_without_torque(server):
+def test_the_servo_ticks_on_it_and_its_end_is_without_torque(server):
     told = []
-    with open_device(f"falcon-socket:{server.path}", tell=told.append) as device:
+    with open_device(f"falcon-socket:{server.path}", progress=told.append) as device:
         assert told == [STROKES, PULL_OUT, READY]
         described = device.describe()
         servo = Servo(device, clock=VirtualClock())  # as fast as replies come: no reply is late for a busy machine

@@ -79,6 +79,7 @@ def test_a_request_is_eight_bytes_and_what_is_sent(path):
     }
 
 
+@pytest.mark.slow
 @both
 def test_transfers_go_through(server, path, kind):
     transport = SocketTransport(str(path))
@@ -144,7 +145,7 @@ def test_signals_do_not_cut_a_transfer(server, path, kind):
     transport = SocketTransport(str(path))
     way = kind(transport)
     way.read()
-    this_thread, answer, silent = threading.get_ident(), server._answer, threading.Event()
+    this_thread, answer, silent = threading.get_ident(), server.answer, threading.Event()
 
     def interrupted(kind):
         for _ in range(50):
@@ -153,7 +154,7 @@ def test_signals_do_not_cut_a_transfer(server, path, kind):
         silent.set()
         return answer(kind)
 
-    server._answer = interrupted
+    server.answer = interrupted
     server.incoming = [b"\x01\x60ok"]
     before = signal.signal(signal.SIGUSR1, lambda _signal, _frame: None)
     try:
@@ -164,12 +165,13 @@ def test_signals_do_not_cut_a_transfer(server, path, kind):
     transport.close()
 
 
+@pytest.mark.slow
 def test_an_answer_that_is_late_is_not_taken_for_the_next(server, path, monkeypatch):
     monkeypatch.setattr(unix_socket, "_GRACE_S", 0)
     monkeypatch.setattr(unix_socket, "LONGEST_TIMEOUT_MS", 1000)  # then an answer has a second
     transport = SocketTransport(str(path))
-    answer, given_up = server._answer, threading.Event()
-    server._answer = lambda kind: (given_up.wait(30), answer(kind))[1]
+    answer, given_up = server.answer, threading.Event()
+    server.answer = lambda kind: (given_up.wait(30), answer(kind))[1]
     with pytest.raises(FalconLost):
         transport.control(0, 0)
     given_up.set()
@@ -205,13 +207,13 @@ def test_a_server_that_goes_while_asked_who_it_is(server, path):
 
 @compiled
 def test_the_records_are_the_framing():
-    from study_app.devices.falcon.transport import socket_bulk
+    from study_app.devices.falcon.transport.socket_bulk import CONNECTION
     from study_app.devices.falcon.transport.socket_frames import ANSWER, REQUEST
 
-    record = np.zeros(1, socket_bulk._REQUEST)
+    record = np.zeros(1, CONNECTION["request"])
     record[0] = (2, 0x81, 0x1234, 0x5678, 0x9ABC)
     assert record.tobytes() == REQUEST.pack(2, 0x81, 0x1234, 0x5678, 0x9ABC)
-    answer = np.zeros(1, socket_bulk._ANSWER)
+    answer = np.zeros(1, CONNECTION["answer"])
     answer[0] = (-4, 7)
     assert answer.tobytes() == ANSWER.pack(-4, 7)
 
@@ -223,6 +225,7 @@ def test_a_read_of_other_than_whole_packets_is_refused(server, path):
     transport.close()
 
 
+@pytest.mark.slow
 @compiled
 def test_an_emulated_falcon_is_booted_and_answers_through_its_socket(path):
     from study_app.devices.falcon.boot import boot, configure, is_running, measure_round_trip, set_event_character

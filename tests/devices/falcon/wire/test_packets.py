@@ -190,6 +190,7 @@ def test_a_million_random_bytes_make_no_packet():
     assert stream.encoders == [9, 8, 7]
 
 
+@pytest.mark.slow
 @given(
     st.lists(
         st.sampled_from([b"<", b">", b"A", b"P", b"Q", b"\xc0", b"\x00", reply((1, 2, 3)), reply(unknown=0x3C)])

@@ -8,12 +8,12 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QPixmap
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication, QLabel, QScrollArea
 
 from study_app.gui.participant.pages.notices import NoticeWidget, PauseWidget
 from study_app.gui.participant.pages.page_widget import page_scale
 from study_app.gui.participant.pages.progress_line import ProgressLine, progress_words
-from study_app.gui.participant.pages.reading_page import ReadingPage
+from study_app.gui.participant.pages.reading_page import Column, ReadingPage
 from study_app.gui.participant.pages.text_page import TextWidget
 from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import PausePage, Progress, TroublePage
@@ -92,7 +92,7 @@ def test_text_and_button_fit_every_window(qtbot: Any, size: tuple[int, int]) -> 
     widget = TextWidget(text_page(paragraphs=("A sentence about the study. " * 12,) * 2), ENGLISH, ManualClock())
     opened(qtbot, widget, size)
     assert widget.button is not None
-    column, area = widget._column, widget._scroll
+    column, area = widget.findChild(Column), widget.findChild(QScrollArea)
     assert column.height() == area.height()  # nothing to scroll
     assert area.geometry().bottom() < widget.button.geometry().top()
     assert widget.rect().contains(widget.button.geometry())
@@ -103,9 +103,9 @@ def test_text_too_long_for_the_window_scrolls_and_keeps_the_button(qtbot: Any) -
     widget = TextWidget(text_page(paragraphs=("A sentence about the study. " * 30,) * 4), ENGLISH, ManualClock())
     opened(qtbot, widget, (1024, 640))
     assert widget.button is not None
-    assert widget._column.height() > widget._scroll.height()
+    assert widget.findChild(Column).height() > widget.findChild(QScrollArea).height()
     assert widget.rect().contains(widget.button.geometry())
-    assert widget._scroll.verticalScrollBarPolicy() == Qt.ScrollBarPolicy.ScrollBarAlwaysOn
+    assert widget.findChild(QScrollArea).verticalScrollBarPolicy() == Qt.ScrollBarPolicy.ScrollBarAlwaysOn
 
 
 def test_pause_resumes_with_enter_not_with_space(qtbot: Any) -> None:

@@ -6,14 +6,15 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPoint, QRectF, Qt
+from PySide6.QtCore import QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QFontMetricsF
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.gui.participant.pages.column_labels import Heading
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.participant.pages.questionnaire_grid import LEAST_CELL, Asked, grid, holds, parts
-from study_app.gui.participant.pages.statement_row import WRAP_LEFT, Row
+from study_app.gui.participant.pages.questionnaire_grid import LEAST_CELL, POINTS, Asked, grid, parts
+from study_app.gui.participant.pages.statement_field import WRAP_LEFT, StatementField
 from study_app.gui.theme.theme import font
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import ItemView, QuestionnairePage
@@ -49,8 +50,8 @@ class Shown:
         QApplication.processEvents()
 
     @property
-    def rows(self) -> tuple[Row, ...]:
-        return self.widget.rows
+    def rows(self) -> tuple[StatementField, ...]:
+        return self.widget.fields
 
     @property
     def told(self) -> list[Any]:
@@ -66,7 +67,7 @@ class Shown:
             QTest.keyClick(self.focus, key)
 
     def click(self, row: int, column: int) -> None:
-        cell = self.rows[row].cells[column]
+        cell = self.rows[row].options[column]
         QTest.mouseClick(cell, Qt.MouseButton.LeftButton, pos=QPoint(2, 2))
 
 
@@ -76,7 +77,7 @@ def shown(qtbot: Any) -> Shown:
 
 
 def test_nothing_is_preset(shown: Shown) -> None:
-    assert not any(cell.isChecked() for row in shown.rows for cell in row.cells)
+    assert not any(cell.isChecked() for row in shown.rows for cell in row.options)
     assert shown.told == []
     assert shown.widget.message == ""
 
@@ -95,7 +96,7 @@ def test_key_answers_and_moves_on(shown: Shown) -> None:
     shown.press(KEY.Key_6, KEY.Key_5)
     assert [(e.item, e.value) for e in shown.told] == [("item1", 6), ("item2", 5)]
     assert shown.focus is shown.rows[2]
-    assert shown.rows[0].cells[5].isChecked()
+    assert shown.rows[0].options[5].isChecked()
 
 
 def test_nine_keys_and_enter_make_the_whole_exact_sequence(shown: Shown) -> None:
@@ -121,7 +122,7 @@ def test_change_is_told_repetition_is_not(shown: Shown) -> None:
     shown.click(0, 2)
     shown.click(0, 3)
     assert [e.value for e in shown.told] == [3, 4]
-    assert [cell.isChecked() for cell in shown.rows[0].cells] == [False] * 3 + [True] + [False] * 3
+    assert [cell.isChecked() for cell in shown.rows[0].options] == [False] * 3 + [True] + [False] * 3
 
 
 def test_arrows_move_between_rows_and_point_in_a_row(shown: Shown) -> None:
@@ -157,7 +158,7 @@ def test_continue_names_and_marks_what_is_missing_and_goes_there(shown: Shown) -
     assert shown.widget.button.isEnabled()
     shown.widget.button.click()
     assert shown.widget.message == "Two statements still need an answer: 5 and 8."
-    assert [row.item.number for row in shown.rows if row.missing] == [5, 8]
+    assert [row.view.number for row in shown.rows if row.missing] == [5, 8]
     assert shown.focus is shown.rows[4]
     assert len(shown.told) == told
     assert "Please answer" in shown.rows[4].accessibleDescription()
@@ -186,11 +187,11 @@ def test_optional_items_may_stay_open(qtbot: Any) -> None:
 
 
 def test_cannot_judge_is_there_only_where_the_protocol_allows_it(qtbot: Any) -> None:
-    assert all(len(row.cells) == 7 for row in Shown(qtbot, questionnaire(), (1366, 768)).rows)
+    assert all(len(row.options) == 7 for row in Shown(qtbot, questionnaire(), (1366, 768)).rows)
     shown = Shown(qtbot, questionnaire(cannot_judge="Cannot judge"), (1366, 768))
     shown.click(8, 7)
     assert shown.told == [Chosen(shown.told[0].at_s, "item9", None)]
-    assert shown.rows[8].answered
+    assert shown.rows[8].is_answered
     assert 9 not in shown.widget.missing
     assert "Cannot judge" in shown.rows[8].accessibleDescription()
 
@@ -198,7 +199,7 @@ def test_cannot_judge_is_there_only_where_the_protocol_allows_it(qtbot: Any) -> 
 def test_ends_and_middle_are_labelled_and_the_column_pointed_at(shown: Shown) -> None:
     fixed = (LABELS[0], LABELS[3], LABELS[6])
     assert set(fixed) <= set(shown.widget.heading)
-    QTest.mouseMove(shown.rows[2].cells[1])
+    QTest.mouseMove(shown.rows[2].options[1])
     QApplication.processEvents()
     assert shown.widget.heading == (LABELS[0], LABELS[1], LABELS[3], LABELS[6])
     QTest.mouseMove(shown.widget, QPoint(5, 5))
@@ -209,8 +210,8 @@ def test_ends_and_middle_are_labelled_and_the_column_pointed_at(shown: Shown) ->
 def test_choices_come_back_after_a_pause_without_being_told_again(qtbot: Any) -> None:
     page = questionnaire(cannot_judge="Cannot judge", chosen=(("item1", 6), ("item3", None)))
     shown = Shown(qtbot, page, (1366, 768))
-    assert shown.rows[0].cells[5].isChecked()
-    assert shown.rows[2].cells[7].isChecked()
+    assert shown.rows[0].options[5].isChecked()
+    assert shown.rows[2].options[7].isChecked()
     assert shown.told == []
     assert shown.focus is shown.rows[1]
     assert shown.widget.missing == (2, 4, 5, 6, 7, 8, 9)
@@ -219,10 +220,14 @@ def test_choices_come_back_after_a_pause_without_being_told_again(qtbot: Any) ->
 def test_names_for_a_screen_reader(shown: Shown) -> None:
     row = shown.rows[4]
     assert row.accessibleName() == "5. This liquid behaves like honey."
-    assert row.accessibleDescription() == "not answered"
-    assert row.cells[4].accessibleName() == "5 Somewhat agree"
+    assert row.accessibleDescription() == "no answer yet"
+    assert row.options[4].accessibleName() == "5 Somewhat agree"
     shown.click(4, 4)
     assert row.accessibleDescription() == "chosen: 5 Somewhat agree"
+
+
+def place_in(row: StatementField, part: QWidget) -> QRect:
+    return QRect(part.mapTo(row, QPoint(0, 0)), part.size())
 
 
 SIZES = [(1366, 768), (1920, 1080), (1280, 720), (1024, 640), (1280, 1024), (2560, 1440)]
@@ -233,19 +238,22 @@ SIZES = [(1366, 768), (1920, 1080), (1280, 720), (1024, 640), (1280, 1024), (256
 def test_nine_statements_fit_without_scrolling(qtbot: Any, size: tuple[int, int], judge: str | None) -> None:
     shown = Shown(qtbot, questionnaire(cannot_judge=judge), size)
     area = shown.widget.rect()
-    below = shown.widget.button.geometry().top()
+    below = shown.widget.foot.geometry().top()
     for before, after in pairwise(shown.rows):
         assert before.geometry().bottom() <= after.geometry().top()
     for row in shown.rows:
         assert row.isVisible()
         assert area.contains(row.geometry())
         assert row.geometry().bottom() < below
-        for cell in row.cells:
-            assert min(cell.width(), cell.height()) >= LEAST_CELL
-            assert row.rect().contains(cell.geometry())
-            assert cell.geometry().left() > shown.widget._grid.statement_left
-        for one, other in pairwise(row.cells):
-            assert one.geometry().right() < other.geometry().left()
+        places = [place_in(row, cell) for cell in row.options]
+        words = place_in(row, row.statement)
+        for place in places:
+            assert min(place.width(), place.height()) >= LEAST_CELL
+            assert row.rect().contains(place)
+            assert place.left() > words.right()
+        for one, other in pairwise(places):
+            assert one.right() < other.left()
+        assert words.height() >= row.statement.heightForWidth(words.width()) - 1
 
 
 @pytest.mark.parametrize("size", [(1366, 768), (1024, 640), (860, 640)], ids=str)
@@ -256,32 +264,33 @@ def test_long_dutch_texts_are_not_clipped(qtbot: Any, size: tuple[int, int]) -> 
     for row in shown.rows:
         if not row.isVisible():
             continue
-        _face, _note, height, note = row._fitted(shown.widget._grid, row._note())
+        _face, _note, height, note = row.fitted(row.sizes, row.note)
         assert height + note <= row.height()
     for column in range(7):
-        shown.widget._heading.point(column)
-        for label in shown.widget._heading._columns():
-            place = shown.widget._heading._place(label)
-            metrics = QFontMetricsF(font("label", scale=shown.widget._grid.scale, weight=600))
+        heading = shown.widget.findChild(Heading)
+        heading.point(column)
+        for label in heading.columns():
+            place = heading.column_area(label)
+            metrics = QFontMetricsF(font("label", scale=shown.rows[0].sizes.scale, weight=600))
             bounds = metrics.boundingRect(QRectF(0, 0, place.width(), 1e4), WRAP_LEFT, DUTCH_LABELS[label])
             assert bounds.height() <= place.height() + 1
             assert bounds.width() <= place.width() + 1
-            assert place.right() <= shown.widget._heading.width() + 1
-        places = [shown.widget._heading._place(c) for c in sorted(shown.widget._heading._columns())]
+            assert place.right() <= heading.width() + 1
+        places = [heading.column_area(c) for c in sorted(heading.columns())]
         for one, other in pairwise(places):
             assert one.right() <= other.left() + 1
 
 
 def test_small_window_shows_five_a_page_and_asks_page_by_page(qtbot: Any) -> None:
     shown = Shown(qtbot, questionnaire(), (880, 640))
-    visible = [row.item.number for row in shown.rows if row.isVisible()]
+    visible = [row.view.number for row in shown.rows if row.isVisible()]
     assert visible == [1, 2, 3, 4, 5]
     assert [event.item for event in shown.events] == [f"item{n}" for n in visible]
-    assert [tab.text() for tab in shown.widget._tabs] == ["1–5", "6–9"]
+    assert [tab.text() for tab in shown.widget.tabs] == ["1–5", "6–9"]
     shown.press(*[KEY.Key_3] * 4, KEY.Key_Return)
     assert shown.widget.message == "One statement still needs an answer: 5."
     shown.press(KEY.Key_3, KEY.Key_Return)
-    assert [row.item.number for row in shown.rows if row.isVisible()] == [6, 7, 8, 9]
+    assert [row.view.number for row in shown.rows if row.isVisible()] == [6, 7, 8, 9]
     assert shown.focus is shown.rows[5]
     shown.widget.grab()
     QApplication.processEvents()
@@ -296,22 +305,23 @@ def test_growing_window_brings_all_statements_back(qtbot: Any) -> None:
     shown = Shown(qtbot, questionnaire(), (880, 640))
     shown.widget.resize(1366, 768)
     assert all(row.isVisible() for row in shown.rows)
-    assert shown.widget._tabs == []
+    assert shown.widget.tabs == []
 
 
-def test_grid_keeps_cells_large_and_rows_above_the_foot() -> None:
+def test_grid_keeps_cells_large_and_the_row_within_its_width() -> None:
     for width in range(800, 2600, 60):
         for height in range(600, 1500, 60):
             for judge in (0, 60):
-                asked = Asked(9, 470, lambda _scale, _judge: 34, lambda _width: 20, judge)
-                made = (grid(width, height, asked, per_page) for per_page in parts(9, width))
-                places = next(one for one in made if holds(one))
-                for placed in (places, places.mirrored()):
-                    assert min(placed.cell_width, placed.cell_height) >= LEAST_CELL
-                    assert placed.rows_top + placed.per_page * placed.pitch <= placed.foot_top
-                    assert placed.statement_width >= 120
-                    assert placed.cell(0)[0] >= 0
-                    assert placed.cell(6)[0] + placed.cell_width <= placed.row_width
+                margin = 40 if width >= 1100 else 24
+                across = grid(width, height, Asked(470, judge), margin)
+                made = (across.with_rows(height - 210, per_page) for per_page in parts(9, width))
+                sizes = next(one for one in made if one.holds)
+                assert min(sizes.cell_width, sizes.cell_height) >= LEAST_CELL
+                assert sizes.cell_height <= sizes.pitch
+                assert sizes.statement_width >= 120
+                scale = POINTS * sizes.cell_pitch - 6 * sizes.scale + 16 * sizes.scale
+                taken = sizes.number_width + sizes.statement_width + scale + sizes.judge_gap + sizes.judge_width
+                assert taken == pytest.approx(width - 2 * margin)
 
 
 def test_parts_are_as_even_as_they_can_be() -> None:
@@ -320,18 +330,10 @@ def test_parts_are_as_even_as_they_can_be() -> None:
     assert list(parts(3, 1366)) == [3, 3, 2, 1]
 
 
-def test_mirrored_places_keep_the_order_of_the_scale() -> None:
-    places = grid(1366, 768, Asked(9, 470, lambda _scale, _judge: 34, lambda _width: 20, 60), 9)
-    mirror = places.mirrored()
-    assert [mirror.cell(n)[0] for n in range(7)] == sorted(mirror.cell(n)[0] for n in range(7))
-    assert mirror.cell(7)[0] < mirror.cell(0)[0] < mirror.statement_left < mirror.number_left
-    assert mirror.mirrored().cells_left == pytest.approx(places.cells_left)
-
-
 def test_heading_gives_way_when_two_labels_would_touch(qtbot: Any) -> None:
     shown = Shown(qtbot, questionnaire(labels=DUTCH_LABELS), (860, 640))
-    shown.widget._heading.point(1)
+    shown.widget.findChild(Heading).point(1)
     assert DUTCH_LABELS[1] in shown.widget.heading
     assert DUTCH_LABELS[0] not in shown.widget.heading
-    shown.widget._heading.point(-1)
+    shown.widget.findChild(Heading).point(-1)
     assert shown.widget.heading == (DUTCH_LABELS[0], DUTCH_LABELS[3], DUTCH_LABELS[6])

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QScroller
+from PySide6.QtWidgets import QApplication, QScrollArea, QScroller
 
 from study_app.gui.participant.pages.text_page import TextWidget
 from study_app.protocol.wording.languages import words
@@ -73,13 +73,14 @@ def test_a_break_counts_down_and_then_offers_its_button(qtbot: Any) -> None:
     assert [type(event) for event in opened.told] == [Continue]
 
 
+@pytest.mark.slow
 def test_the_count_ticks_by_itself_and_stops_at_the_end(qtbot: Any) -> None:
     opened = Opened(qtbot, text_page("break", stays_until_s=130.0))
     opened.clock.now_s = 119.5
     qtbot.waitUntil(lambda: opened.page.count == ENGLISH.continue_in.format(seconds=11))
     opened.clock.now_s = 131.0
     qtbot.waitUntil(lambda: opened.page.count == "")
-    assert not opened.page._ticker.isActive()
+    assert not opened.page.findChild(QTimer).isActive()
 
 
 def test_a_break_that_comes_back_after_its_time_waits_no_more(qtbot: Any) -> None:
@@ -92,7 +93,7 @@ def test_a_break_that_comes_back_after_its_time_waits_no_more(qtbot: Any) -> Non
 @pytest.mark.parametrize("language", ["en", "ar"])
 def test_the_count_stands_where_the_button_will_be(qtbot: Any, language: str) -> None:
     opened = Opened(qtbot, text_page("break", stays_until_s=130.0), language=language)
-    count, button = opened.page._count.geometry(), opened.page.button
+    count, button = opened.page.count_label.geometry(), opened.page.button
     assert button is not None
     place = button.geometry()
     assert abs(count.center().y() - place.center().y()) <= 1
@@ -107,7 +108,7 @@ def test_the_count_stands_where_the_button_will_be(qtbot: Any, language: str) ->
 
 def test_a_long_text_is_read_by_the_keyboard_alone(qtbot: Any) -> None:
     opened = Opened(qtbot, text_page(paragraphs=LONG), (1024, 640))
-    bar = opened.page._scroll.verticalScrollBar()
+    bar = opened.page.findChild(QScrollArea).verticalScrollBar()
     button = opened.page.button
     assert button is not None
     assert button.hasFocus()
@@ -126,20 +127,20 @@ def test_a_long_text_is_read_by_the_keyboard_alone(qtbot: Any) -> None:
 
 def test_a_page_of_it_keeps_a_line_of_the_page_before(qtbot: Any) -> None:
     opened = Opened(qtbot, text_page(paragraphs=LONG), (1024, 640))
-    bar = opened.page._scroll.verticalScrollBar()
+    bar = opened.page.findChild(QScrollArea).verticalScrollBar()
     opened.press(Qt.Key.Key_PageDown)
     assert 0.5 * bar.pageStep() < bar.value() < bar.pageStep()
 
 
 def test_a_long_text_follows_a_finger(qtbot: Any) -> None:
     opened = Opened(qtbot, text_page(paragraphs=LONG), (1024, 640))
-    assert QScroller.hasScroller(opened.page._scroll.viewport())
+    assert QScroller.hasScroller(opened.page.findChild(QScrollArea).viewport())
 
 
 @pytest.mark.parametrize("language", ["en", "ar"])
 def test_the_scroll_bar_stands_beside_the_text_where_lines_end(qtbot: Any, language: str) -> None:
     opened = Opened(qtbot, text_page(paragraphs=LONG), (1024, 640), language)
-    area, button = opened.page._scroll, opened.page.button
+    area, button = opened.page.findChild(QScrollArea), opened.page.button
     assert button is not None
     column = area.viewport().mapTo(opened.page, area.viewport().rect().topLeft()).x()
     if language == "ar":
@@ -207,4 +208,4 @@ def test_many_languages_fit_the_smallest_window(qtbot: Any) -> None:
     opened = Opened(qtbot, text_page("consent", languages=("en", "nl", "de", "fr", "ar")), (1024, 640))
     assert opened.page.languages is not None
     assert opened.page.rect().contains(opened.page.languages.geometry())
-    assert opened.page.languages.geometry().bottom() < opened.page._scroll.geometry().top()
+    assert opened.page.languages.geometry().bottom() < opened.page.findChild(QScrollArea).geometry().top()

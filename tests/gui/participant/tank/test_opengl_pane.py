@@ -13,6 +13,8 @@ import pytest
 from study_app.gui.display.opengl import IN_SOFTWARE, has_card, renderer
 from tests.real_windows import needs_display, virtual_display
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[4]
 FRAMES = 30
 
@@ -27,7 +29,7 @@ from study_app.gui.display.opengl import has_card, renderer
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.protocol.wording.languages import words
 from tests.gui.small import task_page, view
-from tests.gui.participant.test_tank_widget import pixels
+from tests.gui.participant.tank.painted import pixels
 
 sys.excepthook = lambda *error: (sys.__excepthook__(*error), os._exit(1))
 app = QApplication([])

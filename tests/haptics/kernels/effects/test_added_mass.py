@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from study_app.haptics.model.effects.added_mass import AddedMass
+from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import AddedMass, Box, Uniform
+from study_app.haptics.model.scene import Box
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import UNBENT, Hand, examples, liquid, moving, scene, vectors
 
@@ -94,8 +96,8 @@ def test_what_was_before_the_liquid_is_no_acceleration_when_it_is_entered_again(
 def test_a_body_that_was_lost_and_found_is_not_accelerated():
     hand = Hand(heavy())
     for tick in range(50):
-        felt = hand.turn((1e-5 * tick**2, 0.0, 0.0))
+        felt = hand.tick((1e-5 * tick**2, 0.0, 0.0))
     assert felt.force_n[0] < -0.1
     for _ in range(6):
-        hand.turn((np.nan, 0.0, 0.0))
-    assert not any(hand.turn((0.02, 0.0, 0.0)).force_n.any() for _ in range(5))
+        hand.tick((np.nan, 0.0, 0.0))
+    assert not any(hand.tick((0.02, 0.0, 0.0)).force_n.any() for _ in range(5))

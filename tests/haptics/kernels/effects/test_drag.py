@@ -2,9 +2,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
+from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.laws import LAWS, drag_n
-from study_app.haptics.model.scene import Body, Drag, Given
+from study_app.haptics.model.limits import slope_limit
+from study_app.haptics.model.scene import Body, Given
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import UNBENT, WATER_FACTOR, examples, liquid, moving, scene, vectors
 
@@ -50,6 +53,7 @@ def viscous(law, density, viscosity, **fields):
     return scene(liquid(density, viscosity_pa_s=viscosity, drag=Drag(law=law)), knee=UNBENT, **fields)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["constant", *LAWS])
 @settings(max_examples=examples(50), deadline=None)
 @given(
@@ -81,6 +85,7 @@ def test_real_liquids_are_as_strong_as_published(law, density, viscosity, at_hal
     assert felt[1] == pytest.approx(-8, rel=0.07)
 
 
+@pytest.mark.compiled
 def test_a_coasting_ball_slows_down_as_the_exact_solution_says():
     # m v' = -c v²: from 1 m/s to 0.10526 m/s in one second for m/c = 0.1/0.85, by the time m dv/F takes.
     body = Body(drag_coefficient=2 * 0.85 / (1000 * np.pi * 0.034**2))
@@ -89,3 +94,35 @@ def test_a_coasting_ball_slows_down_as_the_exact_solution_says():
     resisting = np.linalg.norm(vectors(force, "force"), axis=1)
     assert 0.1 * np.trapezoid(1 / resisting, v) == pytest.approx(1.0, rel=1e-6)
     assert v[0] == pytest.approx(0.10526316, abs=1e-8)
+
+
+@settings(max_examples=examples(200), deadline=None)
+@given(
+    velocity=st.tuples(speeds, speeds, speeds),
+    scale=st.floats(0.01, 100),
+    damping=st.floats(0.01, 200),
+    diameter=st.floats(0.001, 1),
+)
+def test_a_linear_damper_resists_the_hand_alike_at_any_scale_with_any_ball_and_knee(velocity, scale, damping, diameter):
+    damper = liquid(drag=Drag(law="linear", damping_nspm=damping))
+    hand = np.array(velocity) / scale
+    force = vectors(simulate(scene(damper, scale=scale, body=Body(diameter_m=diameter)), moving([velocity])), "force")
+    assert force[0] == pytest.approx(-damping * hand, rel=1e-12, abs=1e-100)
+
+
+def test_the_slope_limit_of_a_linear_damper_is_on_its_damping():
+    """A damper at the limit is sent whole; one beyond it is sent as the limit."""
+    most = slope_limit(1e-3, 1)
+    hand_mps = 0.05
+    for damping, expected in ((0.999 * most, 0.999 * most), (1.5 * most, most)):
+        damper = scene(liquid(drag=Drag(law="linear", damping_nspm=damping)), scale=7.0)
+        sent = simulate(damper, moving([(7.0 * hand_mps, 0.0, 0.0)] * 200)).device_fx_n[-1]
+        assert sent == pytest.approx(-expected * hand_mps, rel=1e-9)
+
+
+def test_only_the_linear_law_has_a_damping():
+    with pytest.raises(ValidationError, match='is missing: it is needed by the drag law "linear"'):
+        Drag(law="linear")
+    with pytest.raises(ValidationError, match='belongs to the drag law "linear"'):
+        Drag(law="constant", damping_nspm=8)
+    assert Drag().model_dump() == {"law": "constant"}

@@ -4,8 +4,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.haptics.kernels.effects.history import TIMES, WEIGHTS
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.effects.history import History
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, Drag, History
+from study_app.haptics.model.scene import Box
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import COMPILED, UNBENT, examples, liquid, moving, scene, vectors
@@ -39,6 +41,7 @@ def test_the_exponentials_are_the_kernel_within_a_percent_up_to_a_hundred_window
     assert abs(kernel * np.sqrt(tau) - 1).max() <= 0.007
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="tens of thousands of ticks are for compiled code")
 @pytest.mark.parametrize(
     ("fluid", "hertz", "damping_nspm", "inertia_kg"),
@@ -110,8 +113,8 @@ def test_measured_velocities_are_smoothed_first():
 
 def test_it_owns_rows_for_its_window_at_the_rate_of_the_scene():
     few, many = (pack(tank(**HONEY, rate_hz=rate, history={"window_s": 0.05})) for rate in (500.0, 2000.0))
-    assert (len(few.intervals), len(many.intervals)) == (29, 104)
-    assert len(few.exponentials) == 10
+    assert (len(few.rows.intervals), len(many.rows.intervals)) == (29, 104)
+    assert len(few.rows.exponentials) == 10
 
 
 def test_after_leaving_the_past_is_forgotten():

@@ -4,10 +4,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.evaluation.reference_model import local_wakes
-from study_app.haptics.model.effects.records import CELLS
+from study_app.haptics.model.effects.current import Uniform
+from study_app.haptics.model.effects.local_wake import CELLS, LocalWake
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.paths import path
-from study_app.haptics.model.scene import Box, LocalWake, Uniform
+from study_app.haptics.model.scene import Box
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import COMPILED, UNBENT, WATER_FACTOR, Hand, examples, liquid, moving, scene, vectors
@@ -46,6 +47,7 @@ PATHS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="seconds of motion are for compiled code")
 @pytest.mark.parametrize("name", PATHS)
 @pytest.mark.parametrize(("length", "worst"), [(300, 0.01), (1700, 0.06)])
@@ -73,6 +75,7 @@ def test_what_fades_counts_less_in_the_response_too(exponent):
     )
 
 
+@pytest.mark.compiled
 def test_who_leaves_fast_after_a_stop_feels_nothing_and_who_returns_does():
     there, back = ((0.0, 0.0, 2.0), 0.3), ((0.0, 0.0, -2.0), 0.3)
     motion, (_, stopped, left, _, returned, _) = legs(
@@ -149,6 +152,7 @@ def test_a_current_carries_it_along(seed, current, exponent):
     assert vectors(simulate(flowing, river), "wake") == pytest.approx(still, abs=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(40), deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
@@ -167,13 +171,13 @@ def test_whatever_the_motion_it_never_outruns_the_body_and_loses_no_element(seed
         elif turn == 1:
             speed, heading = 0.5, random.normal(size=3)
         place = place + speed * STEP_S * heading / np.linalg.norm(heading)
-        sample = hand.turn(place)
+        sample = hand.tick(place)
         fastest = max(fastest, float(np.linalg.norm(sample.velocity_mps)))
         assert np.linalg.norm(sample.wake_mps) <= fastest * (1 + 1e-12)
         tracks = hand.model.liquid_states[0].local_wake
         rows = (tracks.first + np.arange(tracks.cells)) % CELLS
         assert tracks.held == min(turn, length)
-        assert hand.model.cells["count"][rows].sum() == tracks.held
+        assert hand.model.rows.cells["count"][rows].sum() == tracks.held
 
 
 def test_the_oldest_cells_are_merged_and_nothing_of_them_is_lost():
@@ -181,9 +185,9 @@ def test_the_oldest_cells_are_merged_and_nothing_of_them_is_lost():
     hand.sweep(2.0, 600)  # 12 m of path: 176 diameters
     tracks = hand.model.liquid_states[0].local_wake
     assert tracks.cells == CELLS
-    motion = hand.model.cells["velocity_mps"].sum(axis=0)
-    assert motion[0] == pytest.approx(hand.model.cells["speed_mps"].sum())
-    assert hand.model.cells["count"].sum() == 600
+    motion = hand.model.rows.cells["velocity_mps"].sum(axis=0)
+    assert motion[0] == pytest.approx(hand.model.rows.cells["speed_mps"].sum())
+    assert hand.model.rows.cells["count"].sum() == 600
 
 
 def test_out_of_the_liquid_it_is_forgotten():
@@ -205,5 +209,5 @@ def test_vertical_motion_enters_only_where_asked(axes, rises):
 
 def test_it_owns_its_cells_and_nothing_else():
     model = pack(tank())
-    assert (len(model.cells), len(model.elements), len(model.intervals)) == (CELLS, 0, 0)
-    assert len(pack(scene()).cells) == 0
+    assert (len(model.rows.cells), len(model.rows.elements), len(model.rows.intervals)) == (CELLS, 0, 0)
+    assert len(pack(scene()).rows.cells) == 0

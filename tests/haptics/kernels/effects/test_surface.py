@@ -97,6 +97,7 @@ def test_what_goes_by_volume_meets_the_part_under_the_surface(effect):
     assert whole[19] > 0.1
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("effects", "velocity"),
     [(("drag",), (1.0, -1.0, 0.0)), (("buoyancy",), (0, -1.0, 0)), (("drag", "buoyancy"), (0.0, -1.0, 0.5))],
@@ -107,6 +108,7 @@ def test_nothing_steps_at_the_surface(effects, velocity):
     assert abs(np.diff(force, axis=0)).max() < 0.01 * abs(force).max()
 
 
+@pytest.mark.compiled
 def test_buoyancy_does_not_even_bend_there():
     y_m = np.linspace(TOP_M + 0.05, TOP_M - 0.05, 2001)
     force = simulate(pool("buoyancy"), through(y_m, (0, 0, 0))).fy_n

@@ -18,6 +18,7 @@ from tests.haptics.scenes import (
 from tests.haptics.tails import LEGS, LONGEST, PACES, difference, tank, wakes, walk
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(120), deadline=None)
 @given(wake=wakes(), legs=LEGS, pace=st.sampled_from(list(PACES)), rate_hz=st.sampled_from([1000.0, 400.0, 2000.0]))
 def test_the_wake_equals_its_definition(wake, legs, pace, rate_hz):
@@ -25,6 +26,7 @@ def test_the_wake_equals_its_definition(wake, legs, pace, rate_hz):
     assert difference(felt, walk(legs, pace)) <= 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="a million ticks are for compiled code")
 @pytest.mark.parametrize(
     ("decay", "ticks", "interval_s"),

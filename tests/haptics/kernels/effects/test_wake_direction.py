@@ -38,7 +38,7 @@ def test_reaches_feel_alike_however_far_they_bow(kind, bow, hz):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("heading", [0.0, 0.7])
 @pytest.mark.parametrize("hand_mps", [0.1, 0.2, 0.3])
-def test_after_a_stop_tremor_does_not_turn_the_push_away_from_the_motion(hand_mps, heading, seed):
+def test_after_a_stop_tremor_does_not_tick_the_push_away_from_the_motion(hand_mps, heading, seed):
     random = np.random.default_rng(seed)
     times_s = np.arange(4000) / 1000
     along = np.array([np.cos(heading), 0.0, np.sin(heading)])

@@ -64,7 +64,8 @@ def test_noise_at_5_mm_per_second(velocity, least, most):
     assert v.mean() == pytest.approx(0.005, rel=0.02)
 
 
-def test_the_line_is_quieter_and_sooner_than_ewma_and_foaw_turns_first():
+@pytest.mark.compiled
+def test_the_line_is_quieter_and_sooner_than_ewma_and_foaw_ticks_first():
     def turned(velocity):
         t_s = np.arange(300) / 1000
         v = felt(velocity, quantised(np.where(t_s < 0.15, 0.1 * t_s, 0.1 * (0.3 - t_s))))[150:, 0]
@@ -78,6 +79,7 @@ def test_the_line_is_quieter_and_sooner_than_ewma_and_foaw_turns_first():
 irregular = st.lists(st.floats(0.2e-3, 5e-3), min_size=2, max_size=40).map(np.array)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(60), deadline=None)
 @given(interval_s=irregular, v=st.tuples(*[st.floats(-2, 2)] * 3))
 @pytest.mark.parametrize("velocity", [Line(), Foaw(tolerance_m=1e-6), Raw()], ids=["line", "foaw", "raw"])
@@ -86,6 +88,7 @@ def test_even_motion_is_found_exactly_however_the_clock_jitters(velocity, interv
     assert felt(velocity, positions_m, interval_s)[1:] == pytest.approx(np.tile(v, (len(interval_s) - 1, 1)), abs=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(60), deadline=None)
 @given(
     x_m=st.lists(st.floats(-0.01, 0.01), min_size=2, max_size=40),
@@ -126,6 +129,7 @@ def test_foaw_is_its_definition_in_space(seed):
     assert v[1:] == pytest.approx(np.array(expected), rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.compiled
 def test_foaw_prefers_no_direction():
     random = np.random.default_rng(5)
     p_m = np.cumsum(random.normal(0, 3e-6, (300, 3)).cumsum(axis=0), axis=0)
@@ -144,9 +148,9 @@ def test_what_was_before_a_loss_of_the_body_is_forgotten(velocity):
     hand = Hand(scene(scale=1, velocity=velocity))
     hand.sweep(0.2, 50)
     for _ in range(5):
-        hand.turn((np.nan, 0, 0))
-    assert not hand.turn((0.03, 0, 0)).velocity_mps.any()
-    assert hand.turn((0.0302, 0, 0)).velocity_mps[0] == pytest.approx(0.2)
+        hand.tick((np.nan, 0, 0))
+    assert not hand.tick((0.03, 0, 0)).velocity_mps.any()
+    assert hand.tick((0.0302, 0, 0)).velocity_mps[0] == pytest.approx(0.2)
 
 
 def test_only_an_estimator_that_looks_back_owns_a_window():

@@ -9,7 +9,7 @@ from study_app.haptics.kernels.estimators import kalman
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import ESTIMATOR_EWMA, LIMITER_ESTIMATOR, records
-from study_app.haptics.model.limits import bearable, table
+from study_app.haptics.model.limits import damping_limits, table
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Kalman, Scene
 from study_app.haptics.runtime.offline import simulate
@@ -19,6 +19,8 @@ from study_app.validation.stability.damping_boundary import boundary_nspm
 from study_app.validation.stability.trace_measures import fast_part
 from study_app.validation.stability.withheld_force import measure
 from tests.haptics.scenes import COMPILED, HONEY, UNBENT, WATER, Hand, scene, vectors
+
+pytestmark = pytest.mark.slow
 
 COUNT_M = 38e-6
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
@@ -87,9 +89,9 @@ def test_it_is_its_definition_with_late_and_missing_samples(delay_ticks):
         place = place + 1e-3 * speed
         after_ns = int(random.uniform(0.6e6, 1.6e6))
         fresh = k == 0 or random.random() > 0.2
-        sample = moved.turn(place if fresh else None, after_ns=after_ns)
-        turn_s = after_ns * 1e-9 if k else 0.0
-        impulse, since_s = impulse + sent[-1 - delay_ticks] * turn_s, since_s + turn_s
+        sample = moved.tick(place if fresh else None, after_ns=after_ns)
+        tick_s = after_ns * 1e-9 if k else 0.0
+        impulse, since_s = impulse + sent[-1 - delay_ticks] * tick_s, since_s + tick_s
         if fresh:
             places.append(place)
             intervals.append(since_s or 1e-3)
@@ -156,11 +158,11 @@ def test_it_is_stable_at_any_tick(period_s):
 @compiled
 def test_the_limit_holds_where_the_delay_is_wrong_by_one():
     """At 1 kHz and one tick the limit itself is that of a loop that is one tick later than believed."""
-    assert bearable(1e-3, 1, Kalman()).drag_nspm <= boundary_nspm(Kalman(), 1e-3, 2, believed=1) * 1.01
-    assert bearable(1e-3, 1, Kalman()).drag_nspm >= 45
+    assert damping_limits(1e-3, 1, Kalman()).drag_nspm <= boundary_nspm(Kalman(), 1e-3, 2, believed=1) * 1.01
+    assert damping_limits(1e-3, 1, Kalman()).drag_nspm >= 45
     for entry in table():
         if entry.estimator == "kalman":
-            assert entry.bearable.drag_nspm < boundary_nspm(Ewma(), entry.period_s, entry.delay_ticks)
+            assert entry.limits.drag_nspm < boundary_nspm(Ewma(), entry.period_s, entry.delay_ticks)
 
 
 @compiled
@@ -194,7 +196,7 @@ def test_nothing_of_a_motion_is_left_in_denormal_numbers():
     moved = hand()
     moved.sweep(0.2, 100)
     for _ in range(9000):
-        moved.turn((0.02, 0.0, 0.0))
+        moved.tick((0.02, 0.0, 0.0))
     state = moved.model.state[0].kalman
     for name in ("offset_m", "velocity_mps", "acceleration_mps2", "response_m", "response_mps", "passed_n", "input_n"):
         left = np.abs(state[name])
@@ -226,8 +228,8 @@ def test_where_the_delay_changes_ewma_takes_over_without_a_jump_and_gives_back_a
     for k, place in enumerate(strokes(1400)):
         if k == 300:
             moved.safety[0].delay_ticks = usual.safety[0].delay_ticks = 2
-        samples.append(moved.turn(place))
-        others.append(usual.turn(place))
+        samples.append(moved.tick(place))
+        others.append(usual.tick(place))
     flagged = np.array([bool(sample.limiters & LIMITER_ESTIMATOR) for sample in samples])
     assert np.flatnonzero(flagged).tolist() == list(range(300, 1300))
     v, ewma = (np.array([s.velocity_mps[0] for s in rows]) for rows in (samples, others))
@@ -240,12 +242,12 @@ def test_where_the_delay_changes_ewma_takes_over_without_a_jump_and_gives_back_a
 def test_positions_far_coarser_than_the_device_says_are_trouble():
     moved = hand()
     random = np.random.default_rng(3)
-    quiet = [moved.turn(place) for place in np.round(strokes(300) / COUNT_M) * COUNT_M]
-    wild = [moved.turn(place + random.normal(0, 2e-3, 3)) for place in strokes(60)]
+    quiet = [moved.tick(place) for place in np.round(strokes(300) / COUNT_M) * COUNT_M]
+    wild = [moved.tick(place + random.normal(0, 2e-3, 3)) for place in strokes(60)]
     assert not any(sample.limiters & LIMITER_ESTIMATOR for sample in quiet)
     assert not wild[5].limiters & LIMITER_ESTIMATOR
     assert any(sample.limiters & LIMITER_ESTIMATOR for sample in wild[:30])
-    calm = [moved.turn((0.0, 0.0, 0.0)) for _ in range(1200)]
+    calm = [moved.tick((0.0, 0.0, 0.0)) for _ in range(1200)]
     assert calm[900].limiters & LIMITER_ESTIMATOR
     assert not calm[-1].limiters & LIMITER_ESTIMATOR
 
@@ -256,14 +258,14 @@ def test_a_repeated_sample_in_motion_says_nothing_and_a_stop_is_believed_at_its_
     repeated[[300, 330]] = places[[299, 329]]
     usual, moved = hand(), hand()
     for k, (place, other) in enumerate(zip(places, repeated, strict=True)):
-        v, u = moved.turn(other).velocity_mps[0], usual.turn(place).velocity_mps[0]
+        v, u = moved.tick(other).velocity_mps[0], usual.tick(place).velocity_mps[0]
         assert moved.model.state[0].kalman.repeated == (k in {300, 330})
         assert v == pytest.approx(u, abs=0.06), k  # of up to 3.8 m/s; 0.4 where the sample counted
-    stopped = [moved.turn(places[-1]) for _ in range(60)]
+    stopped = [moved.tick(places[-1]) for _ in range(60)]
     assert abs(stopped[-1].velocity_mps[0]) < 0.05
     slow = hand()
     for place in np.round(strokes(400) / 10 / COUNT_M) * COUNT_M:  # often within the same count
-        slow.turn(place)
+        slow.tick(place)
         assert not slow.model.state[0].kalman.repeated
 
 
@@ -273,7 +275,7 @@ def test_what_it_did_is_computed_again_to_the_last_bit():
     for k, place in enumerate(strokes(700)):
         if k == 400:
             moved.safety[0].delay_ticks = 2
-        samples[k] = moved.turn(place)
+        samples[k] = moved.tick(place)
     again = samples.copy()
     again.velocity_mps = again.force_n = 0.0
     safety = new_safety()

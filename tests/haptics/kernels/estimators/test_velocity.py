@@ -28,6 +28,7 @@ def test_the_second_moves_the_estimate_by_alpha():
     assert felt(np.array([0.0, 1e-3])) == pytest.approx([0.0, 0.1])
 
 
+@pytest.mark.compiled
 def test_steady_acceleration_is_followed_nine_samples_late():
     t_s = np.arange(3000) / 1000
     v = felt(0.5 * t_s**2)
@@ -41,6 +42,7 @@ def test_a_step_of_speed_is_there_to_99_percent_after_44_samples():
     assert v[1:] == pytest.approx(1 - 0.9 ** np.arange(1, 100))
 
 
+@pytest.mark.compiled
 def test_white_noise_of_position_is_quieted_to_a_tenth():
     noise = np.random.default_rng(1).normal(0, 1e-5, 20_000)
     gain = np.std(felt(noise)[200:]) / (1e-5 / 1e-3)

@@ -34,9 +34,10 @@ def all_numbers(model):
             return [value for name in record.dtype.names for value in flat(record[name])]
         return [record.ravel()] if record.dtype == np.float64 else []
 
-    return np.concatenate([value for rows in model[2:] for value in flat(np.asarray(rows))])
+    return np.concatenate([value for rows in model.arrays[2:] for value in flat(np.asarray(rows))])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("felt", [tank(), tank(exponent=0.25), tank(exponent=2.0)], ids=["1", "1/4", "2"])
 @pytest.mark.parametrize("speed_mps", [0.0, 5e-324, 1e-300, 1e-4])
 def test_hazard_06_rest_has_no_direction(felt, speed_mps):
@@ -50,17 +51,18 @@ def test_hazard_06_rest_has_no_direction(felt, speed_mps):
     assert not vectors(table, "wake")[170:].any()
 
 
+@pytest.mark.slow
 def test_hazard_06_a_hand_may_rest_for_ten_seconds():
     hand = Hand(LIGHT_OIL)
     last = hand.sweep(0.2, 200)[-1]
     rested = pass_time(hand, last.position_m, 10_000 if COMPILED else 300)
     assert np.isfinite(all_numbers(hand.model)).all()
     assert not rested.wake_mps.any()
-    assert hand.turn((0.0402, 0, 0)).force_n[0] < 0
+    assert hand.tick((0.0402, 0, 0)).force_n[0] < 0
 
 
 @pytest.mark.parametrize("angle_deg", [30.0, 45.0, 52.3, 60.0, 90.0, 120.0])
-def test_hazard_07_a_turn_of_exactly_the_breaking_angle_does_not_break(angle_deg):
+def test_hazard_07_a_tick_of_exactly_the_breaking_angle_does_not_break(angle_deg):
     random = np.random.default_rng(int(angle_deg))
     for heading, before, after in zip(random.uniform(0, 2 * np.pi, 25), *random.uniform(0.01, 9, (2, 25)), strict=True):
         straight = np.array([np.cos(heading), 0, np.sin(heading)])
@@ -79,11 +81,12 @@ def test_hazard_07_no_rounding_breaks_a_straight_line_even_at_a_breaking_angle_o
         speeds = random.uniform(0.01, 9, 60)
         hand = Hand(tank(breaking_angle_deg=0.0).model_copy(update={"scale": 1.0, "velocity": Ewma(alpha=1.0)}))
         for path_m in np.cumsum(speeds) * 1e-3:
-            hand.turn(path_m * np.array([np.cos(heading), 0, np.sin(heading)]))
+            hand.tick(path_m * np.array([np.cos(heading), 0, np.sin(heading)]))
         assert hand.model.liquid_states[0].wake.held > 50
         assert hand.model.liquid_states[0].wake.last_segment == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heading", [0.0, 0.3, np.pi / 4, 1.2])
 @pytest.mark.parametrize("hand_mps", [0.005, 0.02])
 def test_hazard_08_an_encoders_chatter_does_not_split_slow_motion(heading, hand_mps):
@@ -91,8 +94,8 @@ def test_hazard_08_an_encoders_chatter_does_not_split_slow_motion(heading, hand_
     places = np.outer(path_m, [np.cos(heading), 0, np.sin(heading)])
     smooth, counted = Hand(WATER), Hand(WATER)
     for place in places:
-        expected = smooth.turn(place)
-        felt = counted.turn(np.round(place / 38e-6) * 38e-6)
+        expected = smooth.tick(place)
+        felt = counted.tick(np.round(place / 38e-6) * 38e-6)
         assert np.linalg.norm(felt.force_n - expected.force_n) < 0.02
     tracks = counted.model.liquid_states[0].wake
     if heading == 0.0:
@@ -100,7 +103,7 @@ def test_hazard_08_an_encoders_chatter_does_not_split_slow_motion(heading, hand_
 
 
 def path_at(times_s):
-    """Return a path that begins at rest, turns and stops, (n, 3) [m, scene]."""
+    """Return a path that begins at rest, ticks and stops, (n, 3) [m, scene]."""
     moving_s = np.minimum(times_s, 2.0)
     x = 0.9 * (moving_s - np.sin(np.pi * moving_s) / np.pi)
     return np.column_stack([x, 0 * x, 0.3 * (1 - np.cos(np.pi * moving_s / 2)) ** 2])
@@ -129,11 +132,11 @@ def test_hazard_09_the_force_does_not_depend_on_the_time_between_samples(pace, d
 def test_hazard_10_a_clock_that_jumps_counts_as_02_to_20_ms(jump_ns, taken_s):
     felt = tank(decay=0.95).model_copy(update={"scale": 1.0})
     hand = Hand(felt)
-    before = [hand.turn((2e-4 * k, 0, 0)) for k in range(61)][-1]
-    jumped = hand.turn((2e-4 * 61, 0, 0), after_ns=jump_ns)
+    before = [hand.tick((2e-4 * k, 0, 0)) for k in range(61)][-1]
+    jumped = hand.tick((2e-4 * 61, 0, 0), after_ns=jump_ns)
     moved = before.velocity_mps[0] + (1 - 0.9 ** (taken_s / 1e-3)) * (2e-4 / taken_s - before.velocity_mps[0])
     assert jumped.velocity_mps[0] == pytest.approx(moved)
-    after = hand.turn((2e-4 * 62, 0, 0))
+    after = hand.tick((2e-4 * 62, 0, 0))
     stirred = 0.95 ** (taken_s / 1e-3) * jumped.wake_mps[0] + jumped.velocity_mps[0] / 100
     assert after.wake_mps[0] == pytest.approx(stirred)
 
@@ -143,7 +146,7 @@ def test_hazard_10_a_clock_that_jumps_counts_as_02_to_20_ms(jump_ns, taken_s):
 def test_hazard_10_a_clock_that_jumps_does_no_harm(felt, jump_ns):
     hand, before = Hand(felt), np.zeros(3)
     for k in range(160):
-        sample = hand.turn((0.0002 * k, -0.01, 0.0), after_ns=jump_ns if k == 60 else TICK_NS)
+        sample = hand.tick((0.0002 * k, -0.01, 0.0), after_ns=jump_ns if k == 60 else TICK_NS)
         assert np.isfinite(sample.force_n).all()
         assert np.linalg.norm(sample.device_force_n) <= 8 * (1 + 1e-12)
         assert np.linalg.norm(sample.device_force_n - before) <= SLEW_N + 1e-9
@@ -155,6 +158,7 @@ def test_hazard_10_a_clock_that_jumps_does_no_harm(felt, jump_ns):
 NONSENSE = [(np.nan,) * 3, (0.0, np.inf, 0.0), (-np.inf, 0.0, np.nan), (1e300, 0.0, 0.0), (0.0, 0.0, 1.7e308)]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("felt", ALL.values(), ids=ALL)
 @pytest.mark.parametrize("first", [False, True], ids=["later", "first"])
 def test_hazard_11_after_a_spell_of_nonsense_the_model_recovers_within_ten_ticks(felt, first):
@@ -164,11 +168,11 @@ def test_hazard_11_after_a_spell_of_nonsense_the_model_recovers_within_ten_ticks
         place = (0.02 * np.sin(0.01 * k), -0.01, 0.0)
         nonsense = rng.random() < 0.1 or (first and k < 3)
         with np.errstate(all="ignore"):
-            hand.turn(NONSENSE[k % len(NONSENSE)] if nonsense else place)
-        calm.turn(place)
+            hand.tick(NONSENSE[k % len(NONSENSE)] if nonsense else place)
+        calm.tick(place)
         assert np.isfinite(all_numbers(hand.model)).all()
     for k in range(200, 210):
-        after, expected = (one.turn((0.02 * np.sin(0.01 * k), -0.01, 0.0)) for one in (hand, calm))
+        after, expected = (one.tick((0.02 * np.sin(0.01 * k), -0.01, 0.0)) for one in (hand, calm))
     assert after.velocity_mps == pytest.approx(expected.velocity_mps, rel=0.02, abs=1e-3)
     # What was refused is not in the wake: one in ten of its elements.
     assert np.linalg.norm(after.force_n - expected.force_n) < 0.12 * np.linalg.norm(expected.force_n)
@@ -180,7 +184,7 @@ def test_hazard_11_whoever_finds_the_body_again_finds_numbers():
     hand.sweep(0.1, 200)
     with np.errstate(all="ignore"):
         for k in range(30):
-            hand.turn(NONSENSE[k % 3])
+            hand.tick(NONSENSE[k % 3])
             assert np.isfinite(all_numbers(hand.model)).all()
     found = hand.sweep(0.1, 20, start_m=0.3)
     assert found[0].velocity_mps[0] == 0.0
@@ -193,7 +197,7 @@ def test_hazard_11_no_place_beyond_a_hands_reach_is_a_new_beginning(felt, far_m)
     hand = Hand(felt)
     hand.sweep(0.1, 200)
     for k in range(40):
-        lost = hand.turn((0.0, -far_m, far_m * (1 - 1e-12 * (k % 2))))
+        lost = hand.tick((0.0, -far_m, far_m * (1 - 1e-12 * (k % 2))))
         assert lost.limiters & LIMITER_GLITCH
         assert np.isfinite(all_numbers(hand.model)).all()
         assert np.isfinite(lost.force_n).all()
@@ -207,19 +211,19 @@ def test_hazard_11_no_place_beyond_a_hands_reach_is_a_new_beginning(felt, far_m)
 def test_hazard_12_a_jump_of_100_metres_a_second_is_not_felt(felt, jump_m):
     hand = Hand(felt)
     for k in range(40):
-        before = hand.turn((2e-4 * k, -0.01, 0.0))
-    glitch = hand.turn(np.array([0.008, -0.01, 0.0]) + jump_m)
+        before = hand.tick((2e-4 * k, -0.01, 0.0))
+    glitch = hand.tick(np.array([0.008, -0.01, 0.0]) + jump_m)
     assert glitch.limiters & LIMITER_GLITCH
     assert (glitch.velocity_mps == before.velocity_mps).all()
     assert (glitch.force_n == before.force_n).all()
-    after = hand.turn((0.0082, -0.01, 0.0))
+    after = hand.tick((0.0082, -0.01, 0.0))
     assert after.velocity_mps[0] == pytest.approx(before.velocity_mps[0], rel=0.02)
 
 
 def test_hazard_12_the_fastest_hand_that_is_believed_meets_the_knee_before_its_speed_is_squared():
     bent, unbent = Hand(scene(scale=10)), Hand(scene(scale=10, knee=UNBENT))
     for k in range(200):
-        felt, square = (hand.turn((9.9e-3 * k, 0.0, 0.0)) for hand in (bent, unbent))
+        felt, square = (hand.tick((9.9e-3 * k, 0.0, 0.0)) for hand in (bent, unbent))
     assert -square.force_n[0] > 8000
     lowered = 5 + np.sqrt(1 + 2 * (99 - 5)) - 1
     assert felt.velocity_mps[0] == pytest.approx(lowered, rel=1e-6)

@@ -11,7 +11,7 @@ number  hazard                                                       tested in
 19, 20  wrap of the ring, order of one tick                          here
 ======  ===========================================================  =======================
 
-A wake equals its definition over random walks in ``test_wake``; on any path the energy account holds in
+A wake equals its definition over random walks in ``test_wake``; on any path the passivity controller holds in
 ``test_energy``.
 """
 
@@ -23,8 +23,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from study_app.haptics.model.effects.local_wake import LocalWake
+from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.layout import SAFETY, SAMPLE
-from study_app.haptics.model.scene import Knee, LocalWake, Raw, Wake
+from study_app.haptics.model.scene import Knee, Raw
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import (
@@ -76,7 +78,7 @@ def test_hazard_02_what_is_stored_does_not_grow_without_bound():
     tracks = hand.model.liquid_states[0].wake
     assert LAMBDA ** (2 * length) < tracks.scale <= 1.0
     speed = np.linalg.norm(circle[1] - circle[0]) * 1000
-    assert hand.model.elements.speed_mps.max() < speed / LAMBDA ** (2 * length)
+    assert hand.model.rows.elements.speed_mps.max() < speed / LAMBDA ** (2 * length)
     expected = speed * (LAMBDA ** np.arange(length)).sum() / length
     assert np.linalg.norm(sample.wake_mps) == pytest.approx(expected, rel=1e-9)
 
@@ -92,7 +94,9 @@ def floats(dtype):
 
 @pytest.mark.parametrize("felt", EVERYTHING.values(), ids=EVERYTHING)
 def test_hazard_03_all_that_is_kept_has_double_precision(felt):
-    kinds = {kind for rows in pack(felt) for kind in floats(rows.dtype)} | set(floats(SAMPLE)) | set(floats(SAFETY))
+    kinds = (
+        {kind for rows in pack(felt).arrays for kind in floats(rows.dtype)} | set(floats(SAMPLE)) | set(floats(SAFETY))
+    )
     assert kinds == {np.dtype(np.float64)}
 
 
@@ -104,6 +108,7 @@ def test_hazard_03_after_5000_ticks_88_percent_of_an_element_is_left():
     assert left == pytest.approx(0.8824955, abs=5e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="hundreds of thousands of ticks")
 def test_hazard_04_taking_away_what_falls_off_does_not_drift():
     length, ticks = 5000, 400_000
@@ -119,10 +124,11 @@ def test_hazard_04_taking_away_what_falls_off_does_not_drift():
         assert felt.wake_x_mps[k] == pytest.approx(exact, rel=4e-15, abs=0.0)
 
 
-@pytest.mark.parametrize("turn", [0.0, 1.0, np.pi])
-def test_hazard_04_a_fast_burst_that_has_fallen_off_leaves_nothing_behind(turn):
+@pytest.mark.slow
+@pytest.mark.parametrize("tick", [0.0, 1.0, np.pi])
+def test_hazard_04_a_fast_burst_that_has_fallen_off_leaves_nothing_behind(tick):
     length = 50
-    heading = turn * np.arange(length)
+    heading = tick * np.arange(length)
     burst = 1e4 * np.column_stack([np.cos(heading), np.zeros(length), np.sin(heading)]) + 1 / 3
     crumb = np.zeros((length + 1, 3))
     crumb[0] = (0.001, 0.0, 0.0007)
@@ -132,6 +138,7 @@ def test_hazard_04_a_fast_burst_that_has_fallen_off_leaves_nothing_behind(turn):
     assert simulate(felt, motion).wake_x_mps[-1] == pytest.approx(0.001 / length, rel=1e-9)
 
 
+@pytest.mark.compiled
 def test_hazard_05_after_a_stop_the_wake_goes_without_a_step():
     legs = [np.tile([np.cos(heading), 0, np.sin(heading)], (170, 1)) for heading in np.radians([0, 60])]
     stop = moving(1.5 * np.concatenate([*legs * 6, np.zeros((1750, 3))]))
@@ -155,6 +162,7 @@ def test_hazard_17_at_no_rate_does_a_wake_outrun_the_body(length, rate_hz):
     assert (towed.fx_n <= 1e-12).all()
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("name", THESIS)
 @pytest.mark.parametrize("speed_mps", [0.02, 0.5, 2.0, 20.0])
 def test_hazard_17_towing_for_ten_seconds_is_never_a_push(name, speed_mps):
@@ -170,6 +178,7 @@ def test_hazard_17_whatever_the_wake_steady_motion_is_never_pushed_on(wake, spee
     assert (table.fx_n <= 1e-12).all()
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(60), deadline=None)
 @given(wake=wakes(st.just(7)), legs=LEGS)
 def test_hazard_19_a_ring_of_seven_wraps_without_a_slip(wake, legs):
@@ -184,11 +193,11 @@ def test_hazard_19_every_element_held_is_counted_in_one_segment(seed, span_m):
     place = np.zeros(3)
     for _ in range(60):
         place = place + random.choice([0.0, 1e-4, 1e-3]) * random.choice([-1, 0, 1], 3)
-        hand.turn(place)
+        hand.tick(place)
         tracks = hand.model.liquid_states[0].wake
         rows = np.arange(tracks.first_segment, tracks.last_segment + 1) % 7
         held = np.arange(tracks.stored - tracks.held, tracks.stored) % 7
-        assert hand.model.segments.count[rows].sum() == hand.model.elements.moving[held].sum()
+        assert hand.model.rows.segments.count[rows].sum() == hand.model.rows.elements.moving[held].sum()
         assert tracks.held <= 7
 
 
@@ -203,8 +212,8 @@ def test_hazard_20_the_first_tick_of_a_motion_meets_a_liquid_at_rest(felt):
 @pytest.mark.parametrize("felt", [WATER, LIGHT_OIL, EVERYTHING["places"]], ids=["water", "light_oil", "places"])
 def test_hazard_20_so_does_the_hand_in_the_servo(felt):
     hand = Hand(felt.model_copy(update={"knee": Knee(law="none")}))
-    hand.turn((0.0, -0.02, 0.0))
-    moved = [hand.turn((0.0003 * k, -0.02, 0.0)) for k in (1, 2)]
+    hand.tick((0.0, -0.02, 0.0))
+    moved = [hand.tick((0.0003 * k, -0.02, 0.0)) for k in (1, 2)]
     assert not moved[0].wake_mps.any()
     assert moved[0].velocity_mps.any()
     assert moved[1].wake_mps[0] > 0.0

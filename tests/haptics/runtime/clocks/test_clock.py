@@ -96,7 +96,7 @@ def test_what_the_system_grants_is_said_in_words():
 
 def test_an_ordinary_thread_is_left_one():
     grant = in_a_thread(lambda: raise_priority(((0, 0),), real_time=False))
-    assert str(grant) == "normal (no more was asked for)"
+    assert str(grant) == "normal (no more was requested)"
 
 
 def refuse(*_):
@@ -218,7 +218,7 @@ def test_a_spin_takes_over_before_the_deadline_and_is_counted():
 
 
 @pytest.mark.parametrize("spin_us", [-1.0, 1001.0, float("nan")])
-def test_a_spin_longer_than_a_turn_is_refused(spin_us):
+def test_a_spin_longer_than_a_tick_is_refused(spin_us):
     with pytest.raises(StudyError, match="a spin lasts 0 to 1000 µs"):
         SystemClock(spin_us=spin_us)
 
@@ -241,7 +241,7 @@ class FakeWindows:
         self.functions = {"QueryPerformanceCounter": counter, "SetWaitableTimer": timer, "WaitForSingleObject": wait}
         for name, function in self.functions.items():
             binding.add_symbol(name, ctypes.cast(function, ctypes.c_void_p).value)
-        self.memory = records(clock_windows._COUNTER, 1)
+        self.memory = records(clock_windows.COUNTER, 1)
         self.memory[0].frequency_hz = COUNTER_HZ
         self.memory[0].timer = 7
         self.memory[0].spin_ns = 500_000
@@ -312,7 +312,7 @@ def test_macos_time_and_sleep_go_by_the_timebase_of_apple_silicon():
     )
     for name, function in zip(("mach_absolute_time", "mach_wait_until"), functions, strict=True):
         binding.add_symbol(name, ctypes.cast(function, ctypes.c_void_p).value)
-    memory = records(macos._TIMEBASE, 1)
+    memory = records(macos.TIMEBASE, 1)
     memory[0].numerator, memory[0].denominator = 125, 3
     now, sleep_until = c_function(NOW, macos.now), c_function(SLEEP, macos.sleep)
     context = memory.ctypes.data

@@ -1,0 +1,139 @@
+"""Blocks of levels, summarised: times to answer by code; once the key is open, the answers at each level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+from scipy.stats import t as student
+
+from study_app.analysis.results.levels import LevelAnswers, LevelsFound, Summary
+from study_app.analysis.results.question_answers import GroupAnswers
+from study_app.analysis.statistics.outcome import Array, clopper_pearson
+from study_app.analysis.tables.compared_blocks import setting_name
+from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.analysis.tables.measures import quartiles_or_none
+from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.tracks import answers_timed, tracks
+from study_app.protocol.trials.design import Reply
+
+SUMMARIES: Final[dict[Reply, Summary]] = {"choice": "share", "rating": "mean", "number": "geometric mean"}
+"""How the answers at a level are summarised, by the reply that the design asks for."""
+
+
+def levels_found(study: Study) -> tuple[LevelsFound, ...]:
+    """Return what was answered in every main block of levels, in the order of the session."""
+    main = [block for block in study.levels if block.phase == "main"]
+    if not main:
+        return ()
+    timed = answers_timed(study)
+    opened = tracks(study) if study.revealed else None
+    bounds = {one.where.id: one.bounds for one in study.others.questions}
+    return tuple(_block(one, timed[timed["block"] == one.id], opened, bounds.get(one.id)) for one in main)
+
+
+def _block(
+    block: LevelBlock, answers: pd.DataFrame, opened: pd.DataFrame | None, bounds: tuple[float, float] | None
+) -> LevelsFound:
+    counted = answers[answers["counted"] & answers["response"].notna()]
+    stimulus = block.stimulus
+    return LevelsFound(
+        block=block.id,
+        title=block.title,
+        design=block.design.kind,
+        revealed=opened is not None,
+        times=tuple(
+            GroupAnswers(one.code, setting_name(one, block.settings), _times(counted[counted["code"] == one.code]))
+            for one in block.settings
+        ),
+        summary=SUMMARIES[block.design.reply],
+        counts=block.counts,
+        vary=None if stimulus is None else stimulus.vary,
+        level_kind=None if stimulus is None else stimulus.level_kind,
+        spacing="linear" if stimulus is None else stimulus.spacing,
+        guess_rate=block.design.guess_rate if block.has_correct_answer else None,
+        bounds=bounds,
+        answers=() if opened is None else tuple(_answers(block, opened, bounds)),
+    )
+
+
+def _times(answers: pd.DataFrame) -> dict[str, Any]:
+    seconds = answers["response_s"].dropna().to_numpy(dtype=float)
+    low, middle, high = quartiles_or_none(seconds)
+    return {"n": len(seconds), "median": middle, "q1": low, "q3": high}
+
+
+def _answers(block: LevelBlock, opened: pd.DataFrame, bounds: tuple[float, float] | None) -> Iterator[LevelAnswers]:
+    """Yield the answers at each level: those of all participants, then those of each."""
+    rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["response"].notna()]
+    if block.stimulus is None:
+        rows = rows.assign(comparison=rows["track"], place=rows["track"].map(_places(block)))
+        by = ["place"]
+    else:
+        by = ["standard", "level"]
+    for _, at_level in rows.groupby(by, dropna=False, sort=True):
+        yield from _at_level(block, at_level, bounds)
+
+
+def _places(block: LevelBlock) -> dict[str | None, int]:
+    """Return the place of each condition that is compared, in the order of the protocol."""
+    return {setting.condition: place for place, setting in enumerate(block.settings)}
+
+
+def _at_level(block: LevelBlock, rows: pd.DataFrame, bounds: tuple[float, float] | None) -> Iterator[LevelAnswers]:
+    summary = SUMMARIES[block.design.reply]
+    ends = (0.0, 1.0) if summary == "share" else bounds
+    values = rows["success"] if summary == "share" else rows["value"]
+    numbers = values.to_numpy(dtype=float)
+    numbers = np.log(numbers) if summary == "geometric mean" else numbers
+    first = rows.iloc[0]
+    make = partial(
+        LevelAnswers,
+        standard=_number(first["standard"]),
+        level=_number(first["level"]),
+        comparison=first["comparison"] if isinstance(first["comparison"], str) else _number(first["comparison"]),
+    )
+    people = rows["participant"].to_numpy()
+    own = {person: numbers[people == person] for person in sorted(set(people))}
+    means = np.array([one.mean() for one in own.values()])
+    count = int(numbers.sum()) if summary == "share" else None
+    value, low, high = _summarised(summary, means, ends)
+    yield make(None, n=len(numbers), participants=len(own), count=count, value=value, low=low, high=high)
+    for person, one in own.items():
+        value, low, high = _summarised(summary, one, ends)
+        count = None
+        if summary == "share":
+            count = int(one.sum())
+            exact = clopper_pearson(count, len(one))
+            low, high = exact.low, exact.high
+        yield make(person, n=len(one), participants=1, count=count, value=value, low=low, high=high)
+
+
+def _summarised(
+    summary: Summary, values: Array, bounds: tuple[float, float] | None
+) -> tuple[float, float | None, float | None]:
+    """Return the mean of shares, points or logarithms and its 95 % interval within bounds, as numbers of their kind."""
+    low, high = _student(values)
+    if summary == "geometric mean":
+        low, high = (None if end is None else math.exp(end) for end in (low, high))
+        return math.exp(values.mean()), low, high
+    if bounds is not None and low is not None and high is not None:
+        low, high = max(low, bounds[0]), min(high, bounds[1])
+    return float(values.mean()), low, high
+
+
+def _number(value: Any) -> float | None:
+    return None if pd.isna(value) else float(value)
+
+
+def _student(values: Array) -> tuple[float | None, float | None]:
+    """Return the 95 % interval of a mean (Student 1908); None for a single value and for equal ones."""
+    n = len(values)
+    if n < 2 or (spread := float(np.std(values, ddof=1))) == 0.0:
+        return None, None
+    half = float(student.ppf(0.975, n - 1)) * spread / math.sqrt(n)
+    return float(values.mean()) - half, float(values.mean()) + half

@@ -1,0 +1,39 @@
+"""A table that is handed out: its columns and its frame, and what every table says of whether its rows count."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import pandas as pd
+
+from study_app.store.tables.column import Column, header
+from study_app.store.tables.columns import PARTICIPANTS
+
+_STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
+
+JUDGED: Final = (
+    Column("session_status", "text", "How the row's session ended.", levels=_STATUS.levels),
+    Column("excluded", "flag", "true where exclusions.csv leaves out the row's session or trial."),
+    Column("exclusion_reason", "text", "Why it is left out.", may_miss=True),
+    Column(
+        "counted",
+        "flag",
+        "true where the row is in the aggregate and the figures: main trial, completed session, last attempt, not "
+        "excluded.",
+    ),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Delivered:
+    """A table: its name, its columns in their order, and a frame that has them."""
+
+    name: str
+    columns: tuple[Column, ...]
+    frame: pd.DataFrame
+
+
+def delivered(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) -> Delivered:
+    """Return a table with these columns of a frame."""
+    return Delivered(name, columns, frame[list(header(columns))])

@@ -1,0 +1,218 @@
+"""Answers over levels: a panel for all participants with 95 % intervals, and one for each participant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, Final
+
+from matplotlib.axes import Axes
+
+from study_app import figure_style as style
+from study_app.analysis.figures import answer_figures
+from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
+from study_app.analysis.figures.picture import Picture
+from study_app.analysis.results.levels import LevelAnswers, LevelsFound
+from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.words import counted
+from study_app.analysis.tables.study import Study
+
+MOST_PEOPLE: Final = 23
+"""Participants with a panel of their own; the others are in the first panel and in the table."""
+COLUMNS: Final = 4
+PANEL_PT: Final = 84.0
+LEFT_PT: Final = 40.0
+GAP_PT: Final = 16.0
+HEAD_PT: Final = 42.0
+ROW_GAP_PT: Final = 36.0
+FOOT_PT: Final = 26.0
+MOST_TICKS: Final = 5
+ASIDE: Final = 0.025
+"""How far the points of one standard are from those of the next, as a share of the axis."""
+COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
+LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
+
+
+def level_pictures(
+    study: Study,
+    levels: Sequence[LevelsFound],
+    forms: Sequence[str] = style.FORMATS,
+    failures: Failures | None = None,
+) -> Iterator[Picture]:
+    """Draw the answers over levels of every block that has any, in each of ``forms``.
+
+    A figure that fails is left out, and kept in ``failures``.
+    """
+    held = Failures() if failures is None else failures
+    for found in levels:
+        if not found.answers:
+            continue
+        name = f"levels-{found.block}"
+        drawn = held.attempt(f"figure {name}", partial(_picture, study, found, name, forms), block=found.block)
+        if not isinstance(drawn, Failure):
+            yield drawn
+
+
+def _picture(study: Study, found: LevelsFound, name: str, forms: Sequence[str]) -> Picture:
+    files = {
+        form: style.file_bytes(_draw(study, found, style.fonts_for(form)).figure, form, f"{study.name}: {found.title}")
+        for form in forms
+    }
+    simulated = "SIMULATED participants, no people; " if study.simulated else ""
+    own = len(found.people) - MOST_PEOPLE
+    left_out = f" {counted(own, 'more participant')} in the table alone." if own > 0 else ""
+    caption = (
+        f"{found.title}: {summary_words(found)} at each level. First panel: {mean_words(found)} over the participants, "
+        f"bars: its 95 % interval (Student's t); thin: participants. Other panels: each participant with the 95 % "
+        f"interval of the answers.{_chance(found)}{left_out} {simulated}{counted(len(found.people), 'participant')}."
+    )
+    return Picture(found.block, name, caption, files)
+
+
+def summary_words(found: LevelsFound) -> str:
+    """Return what a value at a level is: "share correct", "mean rating", "geometric mean of the numbers"."""
+    if found.summary == "share":
+        return "share correct" if found.counts == "correct" else f"share “{found.counts}”"
+    return "mean rating" if found.summary == "mean" else "geometric mean of the numbers"
+
+
+def mean_words(found: LevelsFound) -> str:
+    """Return what a value of all participants is."""
+    return "geometric mean" if found.summary == "geometric mean" else "mean"
+
+
+def _chance(found: LevelsFound) -> str:
+    return "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
+
+
+@style.own_settings()
+def _draw(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
+    people = found.people[:MOST_PEOPLE]
+    rows = math.ceil((1 + len(people)) / COLUMNS)
+    height = HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + FOOT_PT + 14
+    sheet = Sheet(style.PAGE_WIDTH_PT, height, fonts)
+    sheet.heading(found.title, answer_figures.marks(study), (counted(study.n, "participant"),))
+    _keys(sheet, found)
+    width = (sheet.width_pt - LEFT_PT - MARGIN_PT - (COLUMNS - 1) * GAP_PT) / COLUMNS
+    for number, person in enumerate((None, *people)):
+        row, column = divmod(number, COLUMNS)
+        x, y = LEFT_PT + column * (width + GAP_PT), HEAD_PT + row * (PANEL_PT + ROW_GAP_PT)
+        sheet.text(x, y - 4, "All" if person is None else person, size=7, weight="bold")
+        axes = sheet.axes(x, y, width, PANEL_PT)
+        _panel(axes, found, person, first=column == 0)
+        for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
+            label.set_fontproperties(sheet.font(6.5))
+    unit = "condition" if found.vary is None else f"{LEVELS[found.level_kind]}{found.vary}"
+    sheet.text(LEFT_PT, height - 10, unit, size=7, colour=style.TEXT_SOFT)
+    return sheet
+
+
+def _keys(sheet: Sheet, found: LevelsFound) -> None:
+    """Write what the vertical axis shows, and which colour is which standard."""
+    words = summary_words(found)
+    sheet.text(MARGIN_PT, 28, words[:1].upper() + words[1:], size=7, colour=style.TEXT_SOFT)
+    standards = _standards(found)
+    if len(standards) < 2:
+        return
+    x = sheet.width_pt - MARGIN_PT
+    for standard, colour in reversed(list(zip(standards, COLOURS, strict=False))):
+        words = f"standard {standard:g}"
+        x -= sheet.text_width(words, 7)
+        sheet.text(x, 28, words, size=7, colour=colour)
+        x -= 10
+
+
+def _standards(found: LevelsFound) -> list[float]:
+    return sorted({one.standard for one in found.answers if one.standard is not None})
+
+
+def _panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -> None:
+    places = _places(found)
+    _frame(axes, found, places, first=first)
+    groups: Sequence[float | None] = _standards(found) or [None]
+    for number, (standard, colour) in enumerate(zip(groups, COLOURS, strict=False)):
+        aside = ASIDE * (number - (len(groups) - 1) / 2) * (max(places.values()) - min(places.values()))
+        shown = [one for one in found.answers if one.standard == standard]
+        if person is None and len(groups) == 1:
+            for somebody in found.people:
+                _line(axes, [one for one in shown if one.participant == somebody], places, found)
+        shifted = {level: place + aside for level, place in places.items()}
+        _points(axes, [one for one in shown if one.participant == person], shifted, found, colour)
+
+
+def _line(axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsFound) -> None:
+    axes.plot(
+        [places[_where(one)] for one in points],
+        [_height(found, one.value) for one in points],
+        color=style.PARTICIPANT,
+        linewidth=0.5,
+        alpha=0.7,
+    )
+
+
+def _points(
+    axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsFound, colour: str
+) -> None:
+    xs, ys = [places[_where(one)] for one in points], [_height(found, one.value) for one in points]
+    joined = "none" if found.vary is None else "-"
+    axes.plot(xs, ys, marker="o", markersize=3, color=colour, linewidth=0.9, linestyle=joined)
+    for x, one in zip(xs, points, strict=True):
+        if one.low is not None and one.high is not None:
+            axes.plot([x, x], [_height(found, one.low), _height(found, one.high)], color=colour, linewidth=0.9)
+
+
+def _where(one: LevelAnswers) -> Any:
+    return one.comparison if one.level is None else one.level
+
+
+def _height(found: LevelsFound, value: float) -> float:
+    return math.log10(value) if found.summary == "geometric mean" else value
+
+
+def _places(found: LevelsFound) -> dict[Any, float]:
+    """Return the place of each level on the horizontal axis: its logarithm where levels are spaced so."""
+    levels = list(dict.fromkeys(_where(one) for one in found.of_group))
+    if found.vary is None:
+        return {level: float(place) for place, level in enumerate(levels)}
+    if found.spacing == "linear":
+        return {level: float(level) for level in levels}
+    logs = {level: math.log10(level) for level in levels if level > 0}
+    step = (max(logs.values()) - min(logs.values())) / max(1, len(logs) - 1) if len(logs) > 1 else 0.3
+    return {level: logs.get(level, min(logs.values(), default=0.0) - step) for level in levels}  # 0: left of the least
+
+
+def _frame(axes: Axes, found: LevelsFound, places: Mapping[Any, float], *, first: bool) -> None:
+    """Draw the axes: levels below, shares, points or numbers at the left."""
+    xs = sorted(places.values())
+    margin = 0.5 if found.vary is None else 0.06 * ((xs[-1] - xs[0]) or 1.0)
+    axes.set_xlim(xs[0] - margin, xs[-1] + margin)
+    named = sorted(places, key=lambda level: places[level])
+    step = math.ceil(len(named) / MOST_TICKS)
+    shown = named if found.vary is None else named[::step]
+    axes.set_xticks(
+        [places[level] for level in shown],
+        [level.replace("_", " ") if isinstance(level, str) else f"{level:.3g}" for level in shown],
+    )
+    ticks = _ticks(found)
+    low, high = ticks[0][0], ticks[-1][0]
+    axes.set_ylim(low - 0.04 * (high - low), high + 0.04 * (high - low))
+    axes.set_yticks([at for at, _ in ticks], [words if first else "" for _, words in ticks])
+    axes.hlines([at for at, _ in ticks], *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
+    if found.guess_rate is not None:
+        axes.axhline(found.guess_rate, color=style.AXIS, linewidth=0.6, linestyle=(0, (4, 3)), zorder=1)
+
+
+def _ticks(found: LevelsFound) -> list[tuple[float, str]]:
+    if found.summary == "share":
+        return [(share, f"{100 * share:.0f} %") for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    ends = [end for one in found.answers for end in (one.value, one.low, one.high) if end is not None]
+    if found.summary == "mean":
+        low, high = found.bounds or (min(ends), max(ends))
+        return [(float(point), str(point)) for point in range(math.floor(low), math.ceil(high) + 1)]
+    decades = range(math.floor(math.log10(min(ends))), math.ceil(math.log10(max(ends))) + 1)
+    known = [(math.log10(step) + decade, f"{step * 10.0**decade:g}") for decade in decades for step in (1, 2, 5)]
+    least = max((at for at, _ in known if at <= math.log10(min(ends))), default=known[0][0])
+    most = min((at for at, _ in known if at >= math.log10(max(ends))), default=known[-1][0])
+    inside = [one for one in known if least <= one[0] <= most]
+    return inside if len(inside) <= 2 * MOST_TICKS else [one for one in inside if one[0] == math.floor(one[0])]

@@ -1,0 +1,49 @@
+"""A figure of the report: what it is drawn from, and its bytes in each form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from study_app import figure_style as style
+from study_app.analysis.figures.answer_figures import marks
+from study_app.analysis.results.block_results import BlockFound, Results
+from study_app.analysis.tables.compared_blocks import Block
+from study_app.analysis.tables.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One figure: the block it is of, its name as a file, its caption, and its bytes by form (png, svg, pdf)."""
+
+    block: str
+    name: str
+    caption: str
+    files: dict[str, bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """What a figure of a block is drawn from, its name as a file, and its forms."""
+
+    study: Study
+    block: Block
+    found: BlockFound
+    results: Results
+    name: str
+    forms: Sequence[str]
+
+    @property
+    def simulated(self) -> str:
+        """What a caption says of simulated participants."""
+        return "SIMULATED participants, no people; " if self.study.simulated else ""
+
+    def picture(self, title: str, caption: str, draw: Callable[..., Figure]) -> Picture:
+        """Return the figure that ``draw`` draws with ``title``, the study's ``marks`` and each form's ``fonts``."""
+        files = {}
+        for form in self.forms:
+            figure = draw(title=title, marks=marks(self.study), fonts=style.fonts_for(form))
+            files[form] = style.file_bytes(figure, form, f"{self.study.name}: {title}")
+        return Picture(self.block.id, self.name, caption, files)

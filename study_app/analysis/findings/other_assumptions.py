@@ -1,0 +1,170 @@
+"""The same questions under other assumptions: the mixed model, and a test with incomplete participants."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from study_app.analysis.designs.block_tests import MANY, Asked
+from study_app.analysis.designs.verdicts import alone
+from study_app.analysis.figures.picture import Picture
+from study_app.analysis.report.html_page import heading, paragraph, table
+from study_app.analysis.report.test_rows import judged_row
+from study_app.analysis.results.block_results import BlockFound, Results
+from study_app.analysis.results.finding import Finding, Row
+from study_app.analysis.results.item_test import Tested
+from study_app.analysis.results.not_tested import NotTested
+from study_app.analysis.results.words import interval, number, p_value, short, statistic
+from study_app.analysis.statistics.ordinal import Ordinal, ordinal
+from study_app.analysis.statistics.outcome import FEW, counted
+from study_app.analysis.statistics.skillings_mack import skillings_mack
+from study_app.analysis.tables.measures import Array
+
+OTHERS: Final = "the same asked with other assumptions"
+
+
+@dataclass(frozen=True, slots=True)
+class OtherAssumptions:
+    """The tests by the ``mixed`` model, and with the ``incomplete`` participants too, of each statement."""
+
+    mixed: tuple[Tested, ...] = ()
+    incomplete: tuple[Tested, ...] = ()
+
+
+def _tested(answers: Asked, _found: BlockFound) -> tuple[OtherAssumptions, tuple[NotTested, ...]]:
+    if answers.block.kind == "liquids":
+        return asked_again(answers, None, "the settings")
+    return asked_again(answers, np.array(answers.block.delays_ms)[:, None] / 100, "the delay")
+
+
+def asked_again(answers: Asked, columns: Array | None, what: str) -> tuple[OtherAssumptions, tuple[NotTested, ...]]:
+    """Return the same questions under other assumptions: the mixed model, and with missing answers; and what is not.
+
+    ``columns`` (settings, columns) are what the mixed model tests, ``what`` names it.
+    """
+    if answers.verdicts_only:
+        return OtherAssumptions(), ()
+    absent = []
+    mixed: tuple[Tested, ...] = ()
+    reason = _no_model(answers)
+    if reason:
+        absent.append(NotTested(f"mixed model of {what}", reason))
+    else:
+        models = {}
+        for item in answers.block.items:
+            answers.each(item.short)
+            models[item.id] = ordinal(answers.single[item.id], columns, sessions=answers.sessions[item.id])
+        mixed = tuple(
+            alone(model, item, answers.decided, f"{answers.block.id}: mixed model") for item, model in models.items()
+        )
+    gaps = {item: values for item, values in answers.values.items() if np.isnan(values).any()}
+    incomplete: tuple[Tested, ...] = ()
+    if gaps and answers.k >= 3:
+        incomplete = tuple(
+            alone(
+                skillings_mack(values, draws=answers.draws, seed=answers.seed),
+                item,
+                answers.decided,
+                f"{answers.block.id}: with missing answers",
+            )
+            for item, values in gaps.items()
+        )
+    elif gaps:
+        absent.append(NotTested("test with incomplete participants", "it needs three settings"))
+    return OtherAssumptions(mixed, incomplete), tuple(absent)
+
+
+def _no_model(answers: Asked) -> str:
+    if answers.k < 2:
+        return "there is one setting"
+    if answers.n < FEW:
+        return f"with {counted(answers.n)}, below {FEW}, its estimates and errors would not hold"
+    if answers.n > MANY:
+        return f"it is left out above {MANY} participants, where it takes minutes"
+    return ""
+
+
+def _rows(found: BlockFound) -> Iterator[Row]:
+    asked = FINDING.of(found)
+    for one in asked.mixed:
+        yield judged_row(found, "settings differ, mixed model", one)
+    for one in asked.incomplete:
+        yield judged_row(found, "settings differ, incomplete participants too", one)
+
+
+def _section(found: BlockFound, _results: Results, _pictures: Mapping[str, Picture]) -> Iterator[str]:
+    asked = FINDING.of(found)
+    again = (*asked.mixed, *asked.incomplete)
+    if not again:
+        return
+    yield heading(3, "The same asked with other assumptions")
+    yield table(
+        ("Statement", "Test", "n", "statistic", "p", "effect", "interval", "note"),
+        [
+            [
+                short(found, one.item),
+                one.outcome.test,
+                str(one.outcome.n),
+                statistic(one.outcome),
+                p_value(one.outcome.p),
+                *_effects(found, one),
+                one.outcome.note,
+            ]
+            for one in again
+        ],
+        words=2,
+        last=1,
+    )
+    effects = ""
+    if asked.mixed:
+        per = "per 100 ms of delay" if found.delays_ms else f"against {found.names[0]}"
+        effects = (
+            f"Effects of the mixed model: log odds of a higher answer {per}, 95 % Wald intervals; p by likelihood "
+            "ratio. "
+        )
+    yield paragraph(f"{effects}These p are not corrected and decide nothing.", "soft")
+
+
+def _effects(found: BlockFound, one: Tested) -> tuple[str, str]:
+    outcome = one.outcome
+    if isinstance(outcome, Ordinal) and len(outcome.coefficients) > 1:
+        return (
+            "; ".join(
+                f"{answer} {number(coefficient.estimate)}"
+                for answer, coefficient in zip(found.names[1:], outcome.coefficients, strict=True)
+            ),
+            "; ".join(interval(coefficient.interval) for coefficient in outcome.coefficients),
+        )
+    return number(outcome.effect), interval(outcome.interval)
+
+
+def _common_methods(blocks: Sequence[BlockFound]) -> Iterator[str]:
+    asked = [FINDING.of(found) for found in blocks]
+    if any(one.mixed for one in asked):
+        yield (
+            "As a check, answers were fitted by cumulative logit models with a random intercept for each participant "
+            "(adaptive quadrature, likelihood ratio)."
+        )
+    again = " and Skillings and Mack's test uses those who missed some" if any(one.incomplete for one in asked) else ""
+    yield (
+        "Missing answers were never replaced; tests over several settings use participants who answered under all of "
+        f"them, comparisons of two those who answered under both{again}."
+    )
+
+
+FINDING: Final[Finding[OtherAssumptions]] = Finding(
+    key="again",
+    place=13,
+    what=OTHERS,
+    empty=OtherAssumptions(),
+    tests=_tested,
+    numbers=lambda found: {"mixed": FINDING.of(found).mixed, "incomplete": FINDING.of(found).incomplete},
+    row_place=5,
+    rows=_rows,
+    part="other assumptions",
+    section=_section,
+    common_methods=_common_methods,
+)

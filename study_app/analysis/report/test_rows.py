@@ -1,0 +1,79 @@
+"""The rows of tests.csv: a row a test."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from study_app.analysis.designs.verdicts import ALONE
+from study_app.analysis.results.block_results import BlockFound
+from study_app.analysis.results.item_test import Tested
+from study_app.analysis.statistics.outcome import Outcome
+from study_app.store.tables.column import Column
+
+TESTS: Final = (
+    Column("block", "text", "Id of the block."),
+    Column("question", "text", "What is asked."),
+    Column("item", "text", "Id of the statement; n/a where the test is over several.", may_miss=True),
+    Column("comparison", "text", "Which settings, where not all.", may_miss=True),
+    Column("test", "text", "The test."),
+    Column("n", "integer", "Participants used.", minimum=0),
+    Column("dropped", "integer", "Participants not used, for missing answers.", minimum=0),
+    Column("statistic_name", "text", "What the statistic is."),
+    Column("statistic", "number", "The statistic.", may_miss=True),
+    Column("p", "number", "p, not corrected.", minimum=0, maximum=1, may_miss=True),
+    Column("p_adjusted", "number", "p, corrected within the family.", minimum=0, maximum=1, may_miss=True),
+    Column("smallest_p", "number", "The smallest p that could have come out.", minimum=0, maximum=1, may_miss=True),
+    Column("family", "text", "What is corrected together.", may_miss=True),
+    Column("members", "integer", "Tests in the family.", minimum=1, may_miss=True),
+    Column("correction", "text", "How p is corrected.", may_miss=True),
+    Column("primary", "flag", "true where it was decided on before the study.", may_miss=True),
+    Column("verdict", "text", "What may be said.", may_miss=True),
+    Column("effect_name", "text", "What the effect is."),
+    Column("effect", "number", "The effect.", may_miss=True),
+    Column("low", "number", "Lower end of the effect's interval.", may_miss=True),
+    Column("high", "number", "Upper end of the effect's interval.", may_miss=True),
+    Column("level", "number", "Confidence of the interval.", may_miss=True),
+    Column("interval", "text", "How the interval was made, or why there is none.", may_miss=True),
+    Column("method", "text", "How p was found."),
+    Column("note", "text", "What must be said with it.", may_miss=True),
+)
+
+
+def test_row(found: BlockFound, question: str, outcome: Outcome) -> dict[str, Any]:
+    """Return the row of a test that answers a question about a block; its family and verdict are empty."""
+    interval = outcome.interval
+    blank = {column.name: None for column in TESTS}
+    return blank | {
+        "block": found.id,
+        "question": question,
+        **{
+            field: getattr(outcome, field)
+            for field in (
+                *("test", "n", "dropped", "statistic_name", "statistic", "p", "smallest_p", "method"),
+                *("effect_name", "effect"),
+            )
+        },
+        "low": None if interval is None else interval.low,
+        "high": None if interval is None else interval.high,
+        "level": None if interval is None else interval.level,
+        "interval": outcome.no_interval or None if interval is None else interval.method,
+        "note": outcome.note or None,
+    }
+
+
+def judged_row(found: BlockFound, question: str, one: Tested) -> dict[str, Any]:
+    """Return the row of a test of one statement, with its family and verdict."""
+    return test_row(found, question, one.outcome) | {
+        "item": one.item,
+        "family": one.family,
+        "members": one.members,
+        "correction": one.correction,
+        "p_adjusted": one.p_adjusted,
+        "primary": one.primary,
+        "verdict": one.verdict,
+    }
+
+
+def rows_alone(found: BlockFound, what: str) -> dict[str, Any]:
+    """Return the family of a test that is corrected for no other."""
+    return {"family": f"{found.id}: {what}", "members": 1, "correction": ALONE}

@@ -1,0 +1,1 @@
+"""Results of an evaluation as typed values, the words for them, and what a finding says of itself."""

@@ -1,0 +1,67 @@
+"""What was found in a block of levels: times to answer and, once the key is open, the answers at each level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from study_app.analysis.results.question_answers import GroupAnswers
+
+Summary: TypeAlias = Literal["share", "mean", "geometric mean"]
+
+
+@dataclass(frozen=True, slots=True)
+class LevelAnswers:
+    """The answers at one level, of one participant or, where ``participant`` is None, of all.
+
+    A block that compares conditions has ``comparison`` in place of ``standard`` and ``level``. ``n`` answers of
+    ``participants`` are summarised in ``value``, ``count`` of them are what a share counts. ``low`` and ``high`` are
+    the ends of the 95 % interval: of a participant's share by Clopper and Pearson, otherwise by Student's t, over the
+    answers of one participant, or over the participants' values.
+    """
+
+    participant: str | None
+    standard: float | None
+    level: float | None
+    comparison: float | str | None
+    n: int
+    participants: int
+    count: int | None
+    value: float
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class LevelsFound:
+    """A block of levels.
+
+    ``summary`` says how the answers at a level are summarised, ``counts`` what a share is of ("correct"); ``vary`` is
+    the varied number, ``level_kind`` what a level is (weber, difference, value), both None where conditions are
+    compared; ``guess_rate`` is the share at chance, ``bounds`` are the ends of a scale. Without the key only ``times``
+    are known.
+    """
+
+    block: str
+    title: str
+    design: str
+    revealed: bool
+    times: tuple[GroupAnswers, ...]
+    summary: Summary
+    counts: str
+    vary: str | None = None
+    level_kind: str | None = None
+    spacing: str = "linear"
+    guess_rate: float | None = None
+    bounds: tuple[float, float] | None = None
+    answers: tuple[LevelAnswers, ...] = ()
+
+    @property
+    def of_group(self) -> tuple[LevelAnswers, ...]:
+        """The answers of all participants together, in order of standard and level."""
+        return tuple(one for one in self.answers if one.participant is None)
+
+    @property
+    def people(self) -> tuple[str, ...]:
+        """The participants who answered."""
+        return tuple(sorted({one.participant for one in self.answers if one.participant is not None}))

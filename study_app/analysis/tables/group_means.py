@@ -1,0 +1,68 @@
+"""Groups of participants: how many count in each, and the answers to each statement by group.
+
+Without groups, and until the study is unblinded, there is nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pandas as pd
+
+from study_app.analysis.tables.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class GroupMean:
+    """Answers of one group to one statement on one setting; each participant's mean counts once.
+
+    Attributes
+    ----------
+    n : int
+        How many participants answered.
+    mean : float
+        Mean of the participants' means, in points of the scale.
+    sd : float or None
+        Standard deviation between participants; None for one participant.
+    """
+
+    block: str
+    item: str
+    code: str
+    group: str
+    n: int
+    mean: float
+    sd: float | None
+
+
+def group_counts(study: Study) -> dict[str, int]:
+    """Return how many participants that count each group has, by name."""
+    counts = _members(study)["group"].value_counts()
+    return {str(group): int(counts[group]) for group in sorted(counts.index)}
+
+
+def group_means(study: Study) -> Iterator[GroupMean]:
+    """Yield the answers to each statement of each block, by group, in the order of the blocks."""
+    members = _members(study)
+    if members.empty:
+        return
+    rows = study.responses[study.responses["counted"]].merge(members, on="participant")
+    rows = rows.assign(response=rows["response"].astype("Float64")).dropna(subset=["response"])
+    for block in study.blocks:
+        own = rows[rows["block"] == block.id]
+        for item in block.items:
+            for code in block.codes:
+                here = own[(own["item"] == item.id) & (own["code"] == code)]
+                for group, answers in here.groupby("group"):
+                    means = answers.groupby("participant")["response"].mean().astype(float)
+                    sd = float(means.std()) if len(means) > 1 else None
+                    yield GroupMean(block.id, item.id, code, str(group), len(means), float(means.mean()), sd)
+
+
+def _members(study: Study) -> pd.DataFrame:
+    """Return participant and group of everybody who counts."""
+    if "group" not in study.trials or not study.revealed:
+        return pd.DataFrame(columns=["participant", "group"])
+    rows = study.trials[study.trials["counted"] & study.trials["group"].notna()]
+    return rows[["participant", "group"]].drop_duplicates()

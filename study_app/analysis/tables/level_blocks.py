@@ -1,0 +1,84 @@
+"""Blocks of levels: how their trials are built and, once the key is open, what they vary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from study_app.analysis.tables.compared_blocks import Setting, settings_in, spoken, text_in
+from study_app.protocol.blocks import Phase
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import every_step_of
+from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
+from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials.tracks import design_of, has_correct_answer, stimulus_of
+from study_app.store.blinded.blinding import Key
+from study_app.store.blinded.whole_protocol import whole_protocol
+
+
+@dataclass(frozen=True, slots=True)
+class LevelBlock:
+    """A block with a design.
+
+    ``stimulus`` is what it varies: None where it compares conditions, and while the key is sealed.
+    """
+
+    id: str
+    title: str
+    phase: Phase
+    design: Design
+    stimulus: Stimulus | None
+    settings: tuple[Setting, ...]
+
+    @property
+    def has_correct_answer(self) -> bool:
+        """Whether an answer can be correct."""
+        return has_correct_answer(self.design, self.stimulus)
+
+    @property
+    def counts(self) -> str:
+        """What the share of answers at a level is of."""
+        counted = self.design.success_name
+        chosen = counted == "correct" and self.design.has_correct_answer and not self.has_correct_answer
+        return "comparison chosen" if chosen else counted
+
+    def presents_modulus(self, index: int) -> bool:
+        """Return whether the trial at this place in the block presents the modulus, which is not analysed."""
+        return self.design.first is not None and index == 1
+
+
+def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlock, ...]:
+    """Return the blocks with a design of the protocol in a receipt, in the order of the session.
+
+    Parameters
+    ----------
+    protocol : mapping
+        The protocol as the receipt holds it.
+    key : Key, optional
+        The key, once it was opened.
+
+    Raises
+    ------
+    KeyError, TypeError, AttributeError, ValueError
+        They give no protocol that this version knows.
+    """
+    steps = [step for step in every_step_of(protocol) if "slots" in protocol["blocks"].get(step, {})]
+    whole = whole_protocol(protocol, key) if key is not None and steps else None
+    return tuple(_block(protocol, step, key, whole) for step in steps)
+
+
+def _block(protocol: Mapping[str, Any], step: str, key: Key | None, whole: Protocol | None) -> LevelBlock:
+    table = protocol["blocks"][step]
+    stimulus: Stimulus | None = None
+    if whole is not None:
+        block = whole.blocks[step]
+        design = design_of(whole, block)
+        stimulus = None if block.stimulus is None else stimulus_of(whole, block)
+    elif (written := protocol.get("designs", {}).get(table["design"])) is not None:
+        design = DESIGN_KINDS[written["kind"]].model_validate(written)
+    else:
+        design = default_design(table["design"])
+    title = text_in(table["title"], spoken(protocol))
+    return LevelBlock(step, title, table["phase"], design, stimulus, settings_in(protocol, step, key))

@@ -1,0 +1,86 @@
+"""The trials of blocks of levels once the key is open: standard, level, arrangement, and what the answer counts as."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import pandas as pd
+
+from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.analysis.tables.study import Study
+from study_app.protocol.trials.presentation import arrangement_of
+
+PRESENTATION: Final = ["participant", "session", "trial", "attempt"]
+OF_INTERVALS: Final = ("force_mean_n", "mean_speed_mps")
+"""What a trial's row repeats of each of its intervals."""
+_TYPES: Final = {
+    "track": "string",
+    "comparison": "Float64",
+    "comparison_interval": "Int64",
+    "right": "boolean",
+    "success": "boolean",
+    "analysed": "boolean",
+}
+"""What follows from a trial's arrangement, level and answer."""
+_READ: Final = ("block", "code", "index", "counted", "arrangement", "standard", "level", "response")
+
+
+def answers_timed(study: Study) -> pd.DataFrame:
+    """Return all answers after trials of levels, with ``response_s``: from the question to the first choice [s]."""
+    rows = study.answered
+    if not study.levels:
+        return rows.iloc[:0].assign(response_s=pd.Series(dtype="Float64"))
+    rows = rows[rows["block"].isin([block.id for block in study.levels]).fillna(False)]
+    return rows.assign(response_s=(rows["first_choice_s"] - rows["onset_s"]).astype("Float64").round(6))
+
+
+def tracks(study: Study) -> pd.DataFrame:
+    """Return the last attempt at each trial of levels, with what it presented; the key must be open.
+
+    ``right`` says whether the answer was correct, ``success`` what it counts as for a psychometric function;
+    ``analysed`` is false where the trial does not count or presents the modulus of a magnitude estimation.
+    """
+    by_id = {block.id: block for block in study.levels}
+    rows = study.trials[study.trials["block"].isin(list(by_id))]
+    rows = rows.sort_values("attempt").drop_duplicates(PRESENTATION[:-1], keep="last").sort_index()
+    answers = answers_timed(study)[[*PRESENTATION, "response", "value", "response_s"]]
+    found = rows.merge(_presented(study.intervals), on=PRESENTATION, how="left")
+    found = found.merge(answers, on=PRESENTATION, how="left")
+    found["slot"] = found.groupby(["participant", "session", "block", "code"]).cumcount() + 1
+    track_rows = [_track_row(by_id[row["block"]], row) for row in found[list(_READ)].to_dict("records")]
+    return found.join(pd.DataFrame(track_rows, index=found.index, columns=list(_TYPES)).astype(_TYPES))
+
+
+def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:
+    track = next(one.condition for one in block.settings if one.code == row["code"])
+    found: dict[str, Any] = {**dict.fromkeys(_TYPES, pd.NA), "track": track}
+    found["analysed"] = bool(row["counted"]) and not block.presents_modulus(int(row["index"]))
+    letters = row["arrangement"]
+    if pd.isna(letters) or len(letters) < block.design.intervals:  # the trial ended before its last interval
+        return found
+    if letters.count("C") == 1 and block.design.intervals > 1:
+        found["comparison_interval"] = letters.index("C") + 1
+    if block.stimulus is not None and not pd.isna(row["level"]):
+        standard = None if pd.isna(row["standard"]) else float(row["standard"])
+        found["comparison"] = block.stimulus.comparison(standard, float(row["level"]))
+    if not pd.isna(row["response"]):
+        arrangement, answer = arrangement_of(block.design, letters), str(row["response"])
+        correct, success = block.design.is_correct(arrangement, answer), block.design.success(arrangement, answer)
+        if block.has_correct_answer and correct is not None:
+            found["right"] = correct
+        found["success"] = pd.NA if success is None else success
+    return found
+
+
+def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
+    """Return a row per presentation: standard, level, arrangement, and of each interval force and speed."""
+    ordered = intervals.sort_values([*PRESENTATION, "interval"])
+    letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")
+    groups = ordered.assign(letter=letters).groupby(PRESENTATION, sort=False)
+    found = groups[["standard", "level"]].first()
+    found["arrangement"] = groups["letter"].agg("".join).astype("string")
+    for name in OF_INTERVALS:
+        wide = ordered.pivot(index=PRESENTATION, columns="interval", values=name)
+        found = found.join(wide.rename(columns={number: f"{name}_{number}" for number in wide.columns}))
+    return found.reset_index()

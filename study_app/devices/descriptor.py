@@ -1,0 +1,185 @@
+"""What a device says of itself, as a value: its descriptor.
+
+Loads neither compiler nor driver; what `DeviceDescriptor.open`, ``probe`` and ``doctor`` call does.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from random import Random
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, TypeVar, get_args
+
+from study_app.devices.names import NAME_PATTERN
+from study_app.errors import DeviceError
+
+if TYPE_CHECKING:
+    from study_app.devices.base import Device
+    from study_app.devices.doctor_report import Finding, Report
+
+Kind: TypeAlias = Literal["felt", "seen", "simulated"]
+"""Its force is felt; the liquid is seen, not felt; no participant uses it."""
+
+Icon: TypeAlias = Literal["device", "mouse", "fast_forward"]
+
+READY: Final = "ready"
+DRIVER_READY: Final = "driver ready"
+NONE: Final = "none connected"
+NOT_AVAILABLE: Final = "not available"
+
+Opened = TypeVar("Opened", bound="Device")
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """One way to a device, as it was found.
+
+    ``name`` is for ``--device``, ``by`` the library, ``state`` one of the words above or "connected: ...". ``can`` says
+    what it can and cannot do, ``why`` why it cannot be used now ("" where it can).
+    """
+
+    name: str
+    by: str
+    state: str
+    can: str
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceOption:
+    """A value that a device can be given when it is opened.
+
+    ``name`` is that of the command-line option, ``title`` its label, ``help`` the line of ``--help``. ``about``,
+    ``hint`` and ``placeholder`` are what windows say of it. ``file_filter`` is that of a file dialog, "" where the
+    value is not the path of a file. Without ``in_windows`` only commands take it.
+    """
+
+    name: str
+    title: str
+    help: str
+    about: str = ""
+    hint: str = ""
+    placeholder: str = ""
+    file_filter: str = ""
+    in_windows: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpenRequest:
+    """What a device is opened with; None is the device's own default.
+
+    Attributes
+    ----------
+    argument : what follows the colon of its name, "" where nothing does
+    workspace_m : half extents of where it shall reach [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    random : where the tremor of a device that moves by itself is drawn from
+    progress : is given what to do while it is opened, a line at a time
+    cancelled : is asked whether to give up opening it
+    options : values of its options, by name
+    """
+
+    argument: str = ""
+    workspace_m: tuple[float, float, float] | None = None
+    force_limit_n: float | None = None
+    random: Random | None = None
+    progress: Callable[[str], object] | None = None
+    cancelled: Callable[[], bool] | None = None
+    options: Mapping[str, str | Path] = field(default_factory=dict)
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """Workspace and force limit as keyword arguments, where they are given."""
+        given = {"workspace_m": self.workspace_m, "force_limit_n": self.force_limit_n}
+        return {name: value for name, value in given.items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Doctor:
+    """Examines a device.
+
+    ``findings()`` returns what is tested, before anything was. ``examine(name, options=, faults=, progress=)`` returns
+    a `Report`; ``faults`` are those that an emulated device shall have.
+    """
+
+    findings: Callable[[], tuple[Finding, ...]]
+    examine: Callable[..., Report]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceDescriptor:
+    """A device, as everything but its driver knows it.
+
+    Attributes
+    ----------
+    name : for ``--device``, receipts and folders: small letters and hyphens
+    title : what people read
+    icon : of the theme
+    kind : whether its force is felt, the liquid is seen only, or no participant uses it
+    degrees_of_freedom : of the motion it measures
+    open : returns the device, open
+    probe : returns every way to it as found, without opening it
+    argument : what may follow its name and a colon, such as "SERIAL"; "" where nothing may
+    argument_required : its name alone does not open it
+    moves_by_itself : the program moves its handle; it has a hand that takes orders, and can be rehearsed on
+    pointer : the window's pointer moves it; it then has ``point_to`` and ``press``
+    motion_shows_force : its recorded position shows the force, so that motion is hidden while a study is blinded
+    options : what it can be given when it is opened
+    doctor : what examines it; None where nothing does
+    """
+
+    name: str
+    title: str
+    icon: Icon
+    kind: Kind
+    degrees_of_freedom: int
+    open: Callable[[OpenRequest], Device]
+    probe: Callable[[], Sequence[Backend]]
+    argument: str = ""
+    argument_required: bool = False
+    moves_by_itself: bool = False
+    pointer: bool = False
+    motion_shows_force: bool = True
+    options: tuple[DeviceOption, ...] = ()
+    doctor: Doctor | None = None
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(NAME_PATTERN, self.name):
+            raise DeviceError(f"the device name {self.name!r} is not permitted: use small letters and hyphens")
+        for called, value, permitted in (("icon", self.icon, get_args(Icon)), ("kind", self.kind, get_args(Kind))):
+            if value not in permitted:
+                raise DeviceError(f"{called} {value!r} of device '{self.name}': choose one of {', '.join(permitted)}")
+
+    @property
+    def simulated(self) -> bool:
+        """Whether no participant uses it."""
+        return self.kind == "simulated"
+
+    @property
+    def usage(self) -> str:
+        """The name as ``--device`` takes it."""
+        return f"{self.name}:{self.argument}" if self.argument_required else self.name
+
+    @property
+    def label(self) -> str:
+        """The title, and how it differs from a device that is felt."""
+        if self.moves_by_itself:
+            return f"{self.title} (simulated)"
+        return f"{self.title} (visual only)" if self.kind == "seen" else self.title
+
+    @property
+    def window_options(self) -> tuple[DeviceOption, ...]:
+        """The options that windows ask for."""
+        return tuple(option for option in self.options if option.in_windows)
+
+    def window_values(self, values: Mapping[str, str | Path]) -> dict[str, str | Path]:
+        """Return those of some values, by name, that are of its window options."""
+        return {option.name: values[option.name] for option in self.window_options if option.name in values}
+
+
+def opened(device: Opened) -> Opened:
+    """Open a device and return it."""
+    device.open()
+    return device

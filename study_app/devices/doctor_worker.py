@@ -1,0 +1,66 @@
+"""The worker process that examines a device.
+
+Ended early, the process leaves by way of the driver, which sends packets of zero force; if it does not leave, it is
+killed, and the driver's own guard sends them.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn, TypeAlias
+
+from study_app.devices.doctor_report import Report
+from study_app.devices.registry import doctor_of
+from study_app.workers.client import WorkerClient
+from study_app.workers.server import Stop, Tell
+
+
+@dataclass(frozen=True, slots=True)
+class Examination:
+    """Which device to examine.
+
+    Parameters
+    ----------
+    name : which device, as ``--device`` takes it
+    options : values of its options, by name
+    faults : of an emulated one
+    """
+
+    name: str
+    options: Mapping[str, str | Path]
+    faults: tuple[str, ...] = ()
+
+
+ExaminationClient: TypeAlias = WorkerClient[Examination, str | Report]
+"""Its answers are lines to show, then the report."""
+
+
+def start_examination(
+    name: str, *, options: Mapping[str, str | Path] | None = None, faults: Sequence[str] = ()
+) -> ExaminationClient:
+    """Start a worker process that examines one device (see `Examination`)."""
+    client: ExaminationClient = WorkerClient("study_app.devices.doctor_worker:carry_out", name="examination")
+    client.order(Examination(name, dict(options or {}), tuple(faults)))
+    return client
+
+
+def carry_out(examination: Examination, tell: Tell, _stop: Stop) -> Report:
+    """Examine a device, and return what was found.
+
+    Raises
+    ------
+    DeviceError
+        It cannot be examined.
+    """
+    signal.signal(signal.SIGTERM, _leave)
+    name, options, faults = examination.name, examination.options, examination.faults
+    return doctor_of(name).examine(name, options=options, faults=faults, progress=tell)
+
+
+def _leave(_number: int, _frame: object) -> NoReturn:
+    """Leave as an exception does, through every ``with``: the device is closed on the way."""
+    sys.exit(0)

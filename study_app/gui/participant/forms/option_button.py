@@ -1,0 +1,177 @@
+"""An answer that can be chosen: a radio button, or a check box where several can be."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+
+from PySide6.QtCore import QEvent, QPoint, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QEnterEvent, QFontMetricsF, QInputDevice, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QAbstractButton, QCheckBox, QRadioButton, QSizePolicy, QWidget
+
+from study_app.gui.participant.forms.question_field import target_px
+from study_app.gui.participant.pages.page_widget import page_painter
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
+
+CENTRE = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)
+MARK = 19.0
+ROOM = 14.0  # between edge and words
+NO_WORDS = "–"
+Look: TypeAlias = Literal["words", "point", "off scale"]
+"""Words that can be chosen, a point of a scale, or an answer off it, with an edge of dashes."""
+
+if TYPE_CHECKING:
+    Button = QAbstractButton
+else:
+    Button = object  # Qt permits one class of its own in a class
+
+
+class OptionLook(Button):
+    """How an answer looks: the whole rectangle is clickable; shape, fill and a check mark show that it is chosen.
+
+    ``entered(here)`` says whether the pointer came or went.
+    """
+
+    entered: ClassVar[Any]
+
+    def prepare(self, text: str, name: str, description: str, look: Look = "words") -> None:
+        """Show ``text``; a screen reader says ``name`` and ``description``."""
+        self._words = text
+        self._look = look
+        self._scale = 1.0
+        self.pointed = False
+        self.setAccessibleName(name)
+        self.setAccessibleDescription(description)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the question holds the keyboard
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        self._scale = scale
+        self.setFont(font("cell", scale=scale))
+        self.updateGeometry()
+        self.update()
+
+    def point(self, pointed: bool) -> None:
+        """Show that the pointer, or the keyboard's own pointer, is here."""
+        if pointed != self.pointed:
+            self.pointed = pointed
+            self.update()
+
+    def hitButton(self, position: QPoint) -> bool:  # noqa: N802
+        """Take clicks anywhere in the rectangle."""
+        return self.rect().contains(position)
+
+    def sizeHint(self) -> QSize:  # noqa: N802
+        """Return a size that can be hit, as wide as the longest word."""
+        metrics = QFontMetricsF(font("chosen", scale=self._scale))
+        widest = max((metrics.horizontalAdvance(word) for word in self._words.split()), default=0.0)
+        least = target_px(self._scale)
+        return QSize(round(max(least, widest + self._taken())), round(least))
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        """Return the same."""
+        return self.sizeHint()
+
+    def hasHeightForWidth(self) -> bool:  # noqa: N802
+        """Return that words wrap."""
+        return True
+
+    def heightForWidth(self, width: int) -> int:  # noqa: N802
+        """Return the height [px] that the words need where they wrap."""
+        room = QRectF(0, 0, max(1.0, width - self._taken()), 1e4)
+        needed = QFontMetricsF(font("chosen", scale=self._scale)).boundingRect(room, CENTRE, self._words).height()
+        return round(max(target_px(self._scale), needed + 12 * self._scale))
+
+    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
+        """Emit that the pointer is here."""
+        super().enterEvent(event)
+        self.entered.emit(True)
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Emit that it left."""
+        super().leaveEvent(event)
+        self.entered.emit(False)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        """Let a finger that is lifted point at nothing any more."""
+        super().mouseReleaseEvent(event)
+        if event.device().type() == QInputDevice.DeviceType.TouchScreen:
+            self.entered.emit(False)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+        """Draw the answer."""
+        painter = page_painter(self)
+        theme, scale = PARTICIPANT, self._scale
+        if self.isChecked():
+            self._paint_chosen(painter)
+            painter.end()
+            return
+        inset = 0.75 if self.pointed else 0.5
+        body = QRectF(self.rect()).adjusted(inset, inset, -inset, -inset)
+        edge = QPen(QColor(theme.text if self.pointed else theme.ctl), 1.5 if self.pointed else 1.0)
+        open_ = self._look == "off scale" and not self.pointed
+        if open_:
+            edge.setDashPattern([3, 3])
+        painter.setPen(edge)
+        painter.setBrush(Qt.BrushStyle.NoBrush if open_ else QColor(theme.hover if self.pointed else theme.surface))
+        painter.drawRoundedRect(body, RADIUS_CONTROL * scale, RADIUS_CONTROL * scale)
+        painter.setFont(font("cell", scale=scale))
+        strong = self._look == "words" or self.pointed or self._in_focus()
+        painter.setPen(QColor(theme.text if strong else theme.text2))
+        painter.drawText(body.adjusted(4, 0, -4, 0), CENTRE, self._words)
+        painter.end()
+
+    def _in_focus(self) -> bool:
+        focused = self.window().focusWidget()
+        return focused is not None and focused.isAncestorOf(self)
+
+    def _paint_chosen(self, painter: QPainter) -> None:
+        theme, scale = PARTICIPANT, self._scale
+        text = "" if self._words == NO_WORDS else self._words
+        body = QRectF(self.rect())
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(theme.accent))
+        radius = body.height() / 2 if self._look != "words" else min(body.height() / 2, target_px(scale) / 2)
+        painter.drawRoundedRect(body, radius, radius)
+        face = font("chosen", scale=scale)
+        mark = min(MARK * scale, body.width() * 0.34)
+        gap = min(6 * scale, body.width() * 0.06) if text else 0.0
+        room = QRectF(0, 0, max(1.0, body.width() - mark - gap - ROOM * scale), body.height())
+        words = QFontMetricsF(face).boundingRect(room, CENTRE, text).width()
+        left = body.center().x() - (mark + gap + words) / 2
+        flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+        x_mark, x_words = (left + words + gap, left) if flip else (left, left + mark + gap)
+        draw_icon(painter, "check", QRectF(x_mark, body.center().y() - mark / 2, mark, mark), theme.on_accent, 2.4)
+        painter.setFont(face)
+        painter.setPen(QColor(theme.on_accent))
+        painter.drawText(QRectF(x_words - 1, 0, words + 2, body.height()), CENTRE, text)
+
+    def _taken(self) -> float:
+        """Return the width [px] that mark and room take."""
+        return (MARK + 6 + ROOM) * self._scale
+
+
+class RadioOption(OptionLook, QRadioButton):
+    """One of several answers."""
+
+    entered = Signal(bool)
+
+    def __init__(
+        self, text: str, name: str, description: str, parent: QWidget | None = None, *, look: Look = "words"
+    ) -> None:
+        super().__init__(parent)
+        self.prepare(text, name, description, look)
+
+
+class CheckOption(OptionLook, QCheckBox):
+    """One of several answers that can be given together."""
+
+    entered = Signal(bool)
+
+    def __init__(
+        self, text: str, name: str, description: str, parent: QWidget | None = None, *, look: Look = "words"
+    ) -> None:
+        super().__init__(parent)
+        self.prepare(text, name, description, look)

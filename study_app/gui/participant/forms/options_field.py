@@ -1,0 +1,142 @@
+"""A question that is answered by choosing among options: what choices, ratings and statements have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent
+
+from study_app.gui.participant.forms.option_button import OptionLook
+from study_app.gui.participant.forms.question_field import QuestionField
+from study_app.gui.participant.pages.screen_reader import point_at, say
+from study_app.protocol.forms.show_if import Value
+
+MOST_DIGITS = 9
+
+
+class OptionsField(QuestionField):
+    """Digits choose, the arrows move a pointer of the keyboard's own, Space chooses there; mouse and touch choose.
+
+    ``pointed_at(place)`` comes with the option that mouse or keyboard point at, -1 for none.
+    """
+
+    several = False
+    options: Sequence[OptionLook] = ()
+    pointed = -1
+
+    pointed_at = Signal(int)
+
+    def hold(self, options: Sequence[OptionLook]) -> None:
+        """Take the options, in the order of their digits."""
+        self.options = options
+        for place, option in enumerate(options):
+            option.setAutoExclusive(not self.several)
+            option.clicked.connect(lambda _=False, place=place: self._click(place))
+            option.toggled.connect(lambda on, place=place: self._toggle(place, on=on))
+            option.entered.connect(lambda here, place=place: self.point(place if here else -1))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+
+    @property
+    def digits(self) -> int:
+        """How many options digits choose."""
+        return min(MOST_DIGITS, len(self.options))
+
+    @property
+    def forward(self) -> int:
+        """Which way the key → goes: 1 to the next option, -1 to the one before."""
+        return 1
+
+    @property
+    def chosen(self) -> tuple[int, ...]:
+        """The places of the options that are chosen."""
+        raise NotImplementedError
+
+    def value_at(self, place: int) -> Value:
+        """Return the answer that an option alone is."""
+        raise NotImplementedError
+
+    def show_answer(self, value: Value) -> None:
+        """Show options as chosen."""
+        self.kept(value)
+        self._check()
+
+    def clear(self) -> None:
+        """Show no option as chosen."""
+        for option in self.options:
+            option.setAutoExclusive(False)
+        self._check()
+        for option in self.options:
+            option.setAutoExclusive(not self.several)
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        super().set_scale(scale)
+        for option in self.options:
+            option.set_scale(scale)
+
+    def point(self, place: int) -> None:
+        """Point at an option, at none with -1."""
+        if place == self.pointed:
+            return
+        self.pointed = place
+        for number, option in enumerate(self.options):
+            option.point(number == place)
+        self.pointed_at.emit(place)
+
+    def choose(self, place: int, *, by_key: bool) -> None:
+        """Answer with an option; a key that answers leads to the next question."""
+        self.give(self.value_at(place))
+        self._check()
+        point_at(self.options[place])
+        if by_key:
+            self.left.emit()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Choose with digits and Space, point with left and right; the rest is the page's."""
+        number = event.key() - Qt.Key.Key_0
+        plain = not event.modifiers() & Qt.KeyboardModifier.ControlModifier
+        if 1 <= number <= self.digits and plain:
+            if not event.isAutoRepeat():
+                self.choose(number - 1, by_key=True)
+        elif event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
+            self._step(self.forward if event.key() == Qt.Key.Key_Right else -self.forward)
+        elif event.key() == Qt.Key.Key_Space:
+            if self.pointed >= 0 and not event.isAutoRepeat():
+                self.choose(self.pointed, by_key=True)
+        else:
+            super().keyPressEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802
+        """Hide the keyboard's pointer, too."""
+        super().focusOutEvent(event)
+        self.point(-1)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        """Take the keyboard where the mouse clicks outside the options."""
+        self.setFocus(Qt.FocusReason.MouseFocusReason)
+        event.accept()
+
+    def _check(self) -> None:
+        for place, option in enumerate(self.options):
+            option.blockSignals(True)
+            option.setChecked(place in self.chosen)
+            option.blockSignals(False)
+            option.update()
+
+    def _click(self, place: int) -> None:
+        self.setFocus(Qt.FocusReason.MouseFocusReason)
+        if not self.several:
+            self.choose(place, by_key=False)
+
+    def _toggle(self, place: int, *, on: bool) -> None:
+        """Hear what is checked, by a click or by a screen reader, which does it without one."""
+        if on != (place in self.chosen) and (on or self.several):
+            self.choose(place, by_key=False)
+
+    def _step(self, by: int) -> None:
+        start = self.pointed
+        if start < 0:
+            start = self.chosen[0] if self.chosen else (-1 if by > 0 else len(self.options))
+        self.point(min(max(start + by, 0), len(self.options) - 1))
+        say(self.options[self.pointed], self.options[self.pointed].accessibleName())

@@ -1,0 +1,1 @@
+"""Pages of trials of intervals: where in the trial one is, the one question, and feedback."""

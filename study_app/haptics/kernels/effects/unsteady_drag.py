@@ -1,0 +1,147 @@
+"""Unsteady drag: drag, added mass and history of a ball in one law that holds at finite Reynolds numbers, too.
+
+With w the velocity relative to the liquid, ν = µ/ρ, and vectors w, y, z, e, h, m_i::
+
+    F  = −3πµD (w + y + h) − ½ρV dw/dt
+    u  = √(|w|² + |z|²)                                 speed of convection: of the ball, or of its wake after a stop
+    z' = 4.5 u/D (w − z)                                velocity of the wake behind the ball
+    e  = w − 2.8 Re_u/(Re_u + 13) o z                   velocity that the ball meets, Re_u = uD/ν, with
+    o  = min(max(1 − w·z/|z|², 0), 1)                   how far the wake overtakes it or meets it; 0 where z = 0
+    y' = 1.2 u/D (φ(|e|) e − w − y)                     drag beyond Stokes', built up over a way; φ: `finite_reynolds`
+    h  = D/(2√(πν)) Σ b_i m_i,  m_i' = dw/dt − (k_i + 0.38 u/D) m_i   history, carried away with the flow
+
+The exponentials are 1/√t within 1.5 % from 1 ms to 30 s. As Re → 0, F is that of Stokes, the added mass and Basset.
+The constants are fitted to this project's fluid solver at Re 0.3 to 100; `docs/unsteady-drag.md` says how well. Each
+tick costs the same, and a step is stable however long it is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from study_app.haptics.kernels.compiled import part
+from study_app.haptics.kernels.effects.added_mass import accelerate, storing_square
+from study_app.haptics.kernels.vector import clear, copy, dot, norm, square
+from study_app.haptics.model import laws
+from study_app.haptics.model.effects.unsteady_drag import EXPONENTIALS
+from study_app.haptics.model.layout import Record
+
+MEMORY_LOSS = 0.38  # c_m
+EXCESS_GAIN = 1.2  # c_y
+WAKE_GAIN = 4.5  # c_z
+OVERTAKING = 2.8  # β
+OVERTAKING_REYNOLDS = 13.0  # R₀
+RATES_PER_S = (0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902)  # k_i
+WEIGHTS_RPS = (0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937)  # b_i [1/√s]
+SHORT = 4.0  # up to here `_mean` needs no exp
+NOTHING = 1e-30
+PERIOD_S = 1.0  # of the sway whose history counts as a storage
+
+_over_stokes = part(laws.finite_reynolds)
+
+
+@part
+def unsteady_drag_force(
+    parameters: Record, liquid: Record, local: Record, state: Record, delay_ticks: int, interval_s: float
+) -> None:
+    """Add F to the force, (3,) [N]; dw/dt is smoothed, as for the effects "added_mass" and "history".
+
+    The share φ of the frontal area counts for drag, that of the volume for added mass and history. A body that moves
+    when it meets the liquid begins as if it had always moved so. The slope limit B holds 3πµDw, and what is left of it
+    holds 3πµDy, at the speed u: at w it would remove the push of a wake on a body that rests. A loop is stable with a
+    part of added mass and history.
+    """
+    law, tracks, w = liquid.unsteady_drag, local.unsteady_drag, local.relative_mps
+    if local.ticks == 0:
+        _begin(law, tracks, w)
+    accelerate(tracks.acceleration_mps2, w, tracks.previous_mps, law.filter_per_s, interval_s)
+    accelerate(tracks.remembered_mps2, w, tracks.previous_mps, law.history_filter_per_s, interval_s)
+    copy(w, tracks.previous_mps)
+    wake2 = square(tracks.wake_mps)
+    u_mps = math.sqrt(square(w) + wake2)
+    _follow(law, tracks, w, u_mps, wake2, interval_s)
+    force_n = local.inertia_n[local.inertial]
+    local.inertial += 1
+    _remember(law, tracks, u_mps, interval_s, force_n)
+    for axis in range(3):
+        inertial = law.factor_kg_rs * force_n[axis] + law.mass_kg * tracks.acceleration_mps2[axis]
+        force_n[axis] = -local.share * inertial
+        stokes_n = -law.stokes_nspm * w[axis] * local.frontal
+        local.damping_n[axis] += stokes_n
+        local.late_n[axis] = -law.stokes_nspm * tracks.excess_mps[axis] * local.frontal
+        state.force_n[axis] += stokes_n + local.late_n[axis] + force_n[axis]
+    local.late_mps = u_mps
+    local.prompt_nspm = law.stokes_nspm * local.frontal
+    state.linear = 1
+    inertia_kg = (law.mass_kg + 0.5 * law.factor_kg_rs * math.sqrt(PERIOD_S)) * local.share
+    state.returnable_j += (
+        0.5 * liquid.inertia_share[delay_ticks] * inertia_kg * storing_square(parameters, law, local, tracks)
+    )
+
+
+@part
+def _begin(law: Any, tracks: Record, w: Any) -> None:
+    """Begin at the present velocity, as if it had always been so."""
+    excess = _over_stokes(law.reynolds_spm * norm(w)) - 1.0
+    copy(w, tracks.previous_mps)
+    clear(tracks.acceleration_mps2)
+    clear(tracks.remembered_mps2)
+    copy(w, tracks.wake_mps)
+    for axis in range(3):
+        tracks.excess_mps[axis] = excess * w[axis]
+        for i in range(EXPONENTIALS):
+            tracks.memory_mps[i, axis] = 0.0
+
+
+@part
+def _follow(law: Any, tracks: Record, w: Any, u_mps: float, wake2: float, interval_s: float) -> None:
+    """Move y, then z, toward what they follow."""
+    wake, excess = tracks.wake_mps, tracks.excess_mps
+    overtaking = min(max(1.0 - dot(w, wake) / wake2, 0.0), 1.0) if wake2 > 0.0 else 0.0
+    reynolds = law.reynolds_spm * u_mps
+    overtaking *= OVERTAKING * reynolds / (reynolds + OVERTAKING_REYNOLDS)
+    ex, ey, ez = w[0] - overtaking * wake[0], w[1] - overtaking * wake[1], w[2] - overtaking * wake[2]
+    ratio = _over_stokes(law.reynolds_spm * math.sqrt(ex * ex + ey * ey + ez * ez))
+    x = u_mps * law.per_m * interval_s
+    toward = EXCESS_GAIN * x * _mean(EXCESS_GAIN * x)
+    excess[0] += toward * (ratio * ex - w[0] - excess[0])
+    excess[1] += toward * (ratio * ey - w[1] - excess[1])
+    excess[2] += toward * (ratio * ez - w[2] - excess[2])
+    toward = WAKE_GAIN * x * _mean(WAKE_GAIN * x)
+    for axis in range(3):
+        wake[axis] += toward * (w[axis] - wake[axis])
+
+
+@part
+def _remember(law: Any, tracks: Record, u_mps: float, interval_s: float, history: Any) -> None:
+    """Add dw/dt to the exponentials and let them decay; set ``history`` to Σ b_i m_i and what that lacks [m/s/√s]."""
+    acceleration, memory = tracks.remembered_mps2, tracks.memory_mps
+    loss_per_s = MEMORY_LOSS * u_mps * law.per_m
+    hx = hy = hz = youngest = 0.0
+    for i in range(EXPONENTIALS):
+        x = (RATES_PER_S[i] + loss_per_s) * interval_s
+        mean = _mean(x)
+        keep, gained_s = 1.0 - x * mean, interval_s * mean
+        mx = _cleared(keep * memory[i, 0] + gained_s * acceleration[0])
+        my = _cleared(keep * memory[i, 1] + gained_s * acceleration[1])
+        mz = _cleared(keep * memory[i, 2] + gained_s * acceleration[2])
+        memory[i, 0], memory[i, 1], memory[i, 2] = mx, my, mz
+        hx, hy, hz = hx + WEIGHTS_RPS[i] * mx, hy + WEIGHTS_RPS[i] * my, hz + WEIGHTS_RPS[i] * mz
+        youngest += WEIGHTS_RPS[i] * gained_s
+    lacking = 2.0 * math.sqrt(interval_s) - youngest
+    history[0] = hx + lacking * acceleration[0]
+    history[1] = hy + lacking * acceleration[1]
+    history[2] = hz + lacking * acceleration[2]
+
+
+@part
+def _mean(x: float) -> float:
+    """Return (1 − e^(−x))/x, the mean of a decay over a step; up to x = 4 by 1/(1 + x/2 + x²/12)."""
+    return 1.0 / (1.0 + x * (0.5 + x / 12.0)) if x <= SHORT else -math.expm1(-x) / x
+
+
+@part
+def _cleared(value: float) -> float:
+    """Return the value, or 0 for what is left of one at rest."""
+    return value if abs(value) > NOTHING else 0.0

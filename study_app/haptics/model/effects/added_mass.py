@@ -1,0 +1,85 @@
+"""Added mass: to move the ball is to move the liquid around it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+from study_app.haptics.model.effect import FLOAT, Effect, Fields, Parameter, rate_per_s, smoothing_s
+from study_app.haptics.model.ranges import Frozen, Smoothing, within
+
+if TYPE_CHECKING:
+    from study_app.haptics.model.bounds import Extremes
+    from study_app.haptics.model.liquid import Liquid
+    from study_app.haptics.model.scene import Scene
+
+BIT = 1 << 6
+
+SMOOTHING_S: Final = 0.025
+
+
+class AddedMass(Frozen):
+    """The liquid that is accelerated with the body (``effects.added_mass``).
+
+    ``coefficient`` C_a is ½ for a sphere; the acceleration is smoothed over ``filter_s`` (None: as suits the velocity
+    estimator, `effect.smoothing_s`), but not where velocities are given.
+    """
+
+    coefficient: Annotated[float, within(0, 10, "a sphere has 0.5")] = 0.5
+    filter_s: Smoothing | None = None
+
+
+def _accelerated_n(extremes: Extremes, acceleration_mps2: float, change_mps: float) -> float:
+    """Return C_a ρ V a."""
+    liquid = extremes.liquid
+    mass_kg = float(liquid.added_mass.coefficient * liquid.density_kg_m3 * extremes.volume_m3)
+    return mass_kg * acceleration_mps2
+
+
+def _bound_n(extremes: Extremes) -> float:
+    """Return C_a ρ V (a + s v), s the shear of the current."""
+    return extremes.inertial_n(_accelerated_n)
+
+
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
+    mass = liquid.added_mass
+    record.mass_kg = mass.coefficient * liquid.density_kg_m3 * scene.body.volume_m3
+    record.filter_per_s = rate_per_s(smoothing_s(scene.velocity, mass.filter_s, SMOOTHING_S))
+
+
+def damping_nspm(mass_kg: float, filter_per_s: float) -> float:
+    """Return M/τ: the damper that fast motion meets in an added mass M smoothed over τ."""
+    return float(mass_kg * filter_per_s) if math.isfinite(filter_per_s) else 0.0
+
+
+PARAMETERS: Fields = (
+    ("mass_kg", FLOAT),  # C_a ρ V
+    ("filter_per_s", FLOAT),  # 1/τ
+)
+
+STATE: Fields = (
+    ("previous_mps", FLOAT, (3,)),  # w of the tick before
+    ("acceleration_mps2", FLOAT, (3,)),  # dw/dt, smoothed
+)
+
+EFFECT = Effect(
+    name="added_mass",
+    label="Added mass",
+    bit=BIT,
+    bound_n=_bound_n,
+    exerted_n=_bound_n,
+    extent="volume",
+    accelerated_n=_accelerated_n,
+    model=AddedMass,
+    default=AddedMass(),
+    parameters=PARAMETERS,
+    state=STATE,
+    fill=_fill,
+    damping_nspm=lambda record: damping_nspm(record.mass_kg, record.filter_per_s),
+    open_values={"filter_s": lambda scene: smoothing_s(scene.velocity, None, SMOOTHING_S)},
+    controls=(
+        Parameter("added_mass.coefficient", "Coefficient", "", most=2.0),
+        Parameter("added_mass.filter_s", "Smoothing", "s", most=0.2, factor=1e3, shown_unit="ms", decimals=1),
+    ),
+)

@@ -1,0 +1,185 @@
+"""Drag: the liquid resists motion relative to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Final, Self, TypeAlias
+
+from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from study_app.haptics.model.effect import FLOAT, INT, Effect, Fields, Parameter
+from study_app.haptics.model.laws import LAWS, Law, drag_n
+from study_app.haptics.model.ranges import Frozen, within
+
+if TYPE_CHECKING:
+    from study_app.haptics.model.bounds import Extremes
+    from study_app.haptics.model.liquid import Liquid
+    from study_app.haptics.model.scene import Scene
+
+BIT = 1 << 0
+
+LAW_CONSTANT = 0
+LAW_SCHILLER_NAUMANN = 1
+LAW_HAIDER_LEVENSPIEL = 2
+LAW_BROWN_LAWLER = 3
+LAW_LINEAR = 4
+_LAWS: Final[dict[Law, int]] = {
+    "constant": LAW_CONSTANT,
+    "schiller-naumann": LAW_SCHILLER_NAUMANN,
+    "haider-levenspiel": LAW_HAIDER_LEVENSPIEL,
+    "brown-lawler": LAW_BROWN_LAWLER,
+    "linear": LAW_LINEAR,
+}
+
+REFERENCE: Final[Law] = "haider-levenspiel"
+"""The law that others are measured by: its published constants are confirmed, and it is nearest to experiments."""
+_SPEEDS: Final = 60
+DAMPING_NSPM: Final = (0.01, 200.0)
+_DAMPING_NSPM: Final = 8.0
+"""The damper that the lab begins with: heavier than honey in a slow hand, far below any slope limit. [choice]"""
+
+DampingNspm: TypeAlias = Annotated[
+    float, within(*DAMPING_NSPM, "a hand feels no damper below 0.01 N·s/m, and no loop is stable with more than 200")
+]
+
+
+class Drag(Frozen):
+    """Which drag coefficient resists (``effects.drag``): the body's own, or that of a sphere at its Reynolds number.
+
+    The law "linear" is a damper, F = −b v with ``damping_nspm`` b [N·s/m] and the velocity v of the hand, whatever the
+    scale, the ball and the knee.
+    """
+
+    law: Law = "constant"
+    damping_nspm: DampingNspm | None = None
+
+    @model_validator(mode="after")
+    def _damping_of_the_linear_law(self) -> Self:
+        if (self.law == "linear") != (self.damping_nspm is not None):
+            needs = "belongs to" if self.damping_nspm is not None else "is missing: it is needed by"
+            raise ValueError(f'damping_nspm {needs} the drag law "linear"')
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_no_damping(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Omit a damping that is not there: files of format 1 keep their bytes."""
+        return {name: value for name, value in plain(self).items() if name != "damping_nspm" or value is not None}
+
+
+def resistance_n(scene: Scene, liquid: Liquid, relative_mps: float, law: Law | None = None) -> float:
+    """Return the size of the drag [N] on the scene's body at a relative speed; by default the truest law there is.
+
+    That of a damper is always its own.
+    """
+    if liquid.drag.damping_nspm is not None:
+        return float(liquid.drag.damping_nspm / scene.scale * relative_mps)
+    return drag_n(
+        law or ("constant" if liquid.viscosity_pa_s is None else REFERENCE),
+        relative_mps,
+        density_kg_m3=liquid.density_kg_m3,
+        viscosity_pa_s=liquid.viscosity_pa_s,
+        diameter_m=scene.body.diameter_m,
+        drag_coefficient=scene.body.drag_coefficient,
+    )
+
+
+def cheapest_law(extremes: Extremes) -> Law:
+    """Return the cheapest law of drag within the accuracy target of the reference law, at every speed of the motion."""
+    if extremes.liquid.viscosity_pa_s is None:
+        return "constant"
+    candidates: tuple[Law, ...] = ("constant", *LAWS)
+    return next((law for law in candidates if _is_true_enough(extremes, law)), REFERENCE)
+
+
+def _is_true_enough(extremes: Extremes, law: Law) -> bool:
+    """Return whether a law stays within the accuracy target of the reference law's force at each speed."""
+    scene, liquid = extremes.scene, extremes.liquid
+    for k in range(1, _SPEEDS + 1):
+        speed_mps = extremes.relative_mps * k / _SPEEDS
+        true_n = resistance_n(scene, liquid, speed_mps)
+        wrong_n = abs(resistance_n(scene, liquid, speed_mps, law) - true_n)
+        if wrong_n > max(scene.accuracy.relative * true_n, scene.accuracy.absolute_n):
+            return False
+    return True
+
+
+def _choose(extremes: Extremes) -> tuple[Drag, str]:
+    if extremes.liquid.drag.law == "linear":
+        return extremes.liquid.drag, "law linear, as the file says"
+    law, accuracy = cheapest_law(extremes), extremes.scene.accuracy
+    if extremes.liquid.viscosity_pa_s is None:
+        return Drag(law=law), "law constant, because the liquid has no viscosity"
+    if law == REFERENCE:
+        return Drag(law=law), f"law {law}"
+    return Drag(law=law), f"law {law}, within {100 * accuracy.relative:g} % or {accuracy.absolute_n:g} N of {REFERENCE}"
+
+
+def _problem(liquid: Liquid) -> str | None:
+    if liquid.drag.law not in {"constant", "linear"} and liquid.viscosity_pa_s is None:
+        return f'the drag law "{liquid.drag.law}" needs the liquid\'s viscosity_pa_s'
+    return None
+
+
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
+    body = scene.body
+    record.law = _LAWS[liquid.drag.law]
+    record.factor_kg_m = 0.5 * liquid.density_kg_m3 * body.drag_coefficient * math.pi / 4 * body.diameter_m**2
+    if liquid.drag.damping_nspm is not None:
+        record.damping_nspm = liquid.drag.damping_nspm / scene.scale
+    elif liquid.drag.law != "constant" and liquid.viscosity_pa_s is not None:
+        record.stokes_nspm = 3 * math.pi * liquid.viscosity_pa_s * body.diameter_m
+        record.reynolds_spm = liquid.density_kg_m3 * body.diameter_m / liquid.viscosity_pa_s
+
+
+def _bound_n(extremes: Extremes) -> float:
+    """Return F(v), by the reference law where the liquid has a viscosity."""
+    return resistance_n(extremes.scene, extremes.liquid, extremes.speed_mps)
+
+
+def _exerted_n(extremes: Extremes) -> float:
+    """Return the drag by the liquid's own law, of a body against the current that is called for."""
+    return resistance_n(extremes.scene, extremes.liquid, extremes.relative_mps, extremes.liquid.drag.law)
+
+
+PARAMETERS: Fields = (
+    ("law", INT),  # LAW_*
+    ("factor_kg_m", FLOAT),  # ½ ρ C_d A, of the constant law
+    ("stokes_nspm", FLOAT),  # 3π µ D, of the laws of the Reynolds number
+    ("reynolds_spm", FLOAT),  # ρ D / µ, likewise: Re a unit of speed
+    ("damping_nspm", FLOAT),  # b / scale, of the linear law
+)
+
+EFFECT = Effect(
+    name="drag",
+    label="Drag",
+    bit=BIT,
+    bound_n=_bound_n,
+    exerted_n=_exerted_n,
+    extent="area",
+    choose=_choose,
+    note=lambda liquid: f", law {liquid.drag.law}",
+    model=Drag,
+    default=Drag(),
+    problem=_problem,
+    parameters=PARAMETERS,
+    fill=_fill,
+    with_liquid=True,
+    start=lambda kind, _centre_m, _reach_m: (
+        {"law": kind, "damping_nspm": _DAMPING_NSPM} if kind == "linear" else {"law": kind}
+    ),
+    controls=(
+        Parameter(
+            "drag.law",
+            "Drag law",
+            choices=(
+                ("constant", "Constant (thesis)"),
+                ("schiller-naumann", "Schiller–Naumann"),
+                ("haider-levenspiel", "Haider–Levenspiel"),
+                ("brown-lawler", "Brown–Lawler"),
+                ("linear", "Linear damper"),
+            ),
+        ),
+        Parameter("drag.damping_nspm", "Damping at the hand", "N·s/m", *DAMPING_NSPM, logarithmic=True),
+    ),
+)

@@ -1,0 +1,36 @@
+"""Surface: how much of the ball is under the top face of a liquid, for the effects that depend on it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from study_app.haptics.model.effect import FLOAT, Effect, Fields
+
+if TYPE_CHECKING:
+    from study_app.haptics.model.bounds import Extremes
+    from study_app.haptics.model.liquid import Liquid
+
+BIT = 1 << 5
+
+
+def _bound_n(extremes: Extremes) -> float | None:
+    """Return all of the others where the centre can cross the surface, for without it the ball is in or out."""
+    if not extremes.has_top:
+        return None
+    area, volume = extremes.doubtful_shares()
+    return area * extremes.total_n("area") + volume * (extremes.total_n("volume") + extremes.lift_n)
+
+
+def _problem(liquid: Liquid) -> str | None:
+    if liquid.region.kind == "everywhere":
+        return 'the effect "surface" needs a region with a top: a box or a cylinder'
+    return None
+
+
+STATE: Fields = (
+    ("volume", FLOAT),  # share of the body's volume under the surface
+    ("upright", FLOAT),  # share of the frontal area of vertical motion
+    ("level", FLOAT),  # share of the frontal area of horizontal motion
+)
+
+EFFECT = Effect(name="surface", label="Surface", bit=BIT, bound_n=_bound_n, problem=_problem, state=STATE)

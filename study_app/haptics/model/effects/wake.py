@@ -1,0 +1,194 @@
+"""The position tail: the liquid velocity left by the body's recent path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, TypeVar
+
+from pydantic import model_validator
+
+from study_app.haptics.model.effect import FLOAT, INT, TAIL_RATE_HZ, Effect, Fields, Parameter, Rows
+from study_app.haptics.model.ranges import Decay, Exponent, Frozen, TailLength, TailScaling, within
+
+if TYPE_CHECKING:
+    from study_app.haptics.model.bounds import Extremes
+    from study_app.haptics.model.liquid import Liquid
+    from study_app.haptics.model.scene import Scene
+
+BIT = 1 << 1
+
+
+class Wake(Frozen):
+    """The position tail: the liquid velocity left by the body's recent path (Rek 2024, §4.3; ``effects.wake``).
+
+    ``length`` N and ``scaling`` S count elements at 1 kHz; N ≤ S, so that the liquid never outruns the body.
+    ``decay`` λ is the factor a millisecond, ``exponent`` y shapes the response to the fill. ``breaking_angle_deg`` β is
+    the turn that starts a new segment, taken between elements ``breaking_span_m`` of path apart (0: neighbours).
+    ``resolution_m`` is the least motion between two stored elements (0: every tick). ``axes`` says whether vertical
+    motion enters the tail.
+    """
+
+    length: TailLength
+    scaling: TailScaling
+    exponent: Exponent = 1.0
+    breaking_angle_deg: Annotated[float, within(0, 180, "180° is straight back")] = 45.0
+    breaking_span_m: Annotated[float, within(0, 100, "a hand turns within its reach")] = 0.068
+    decay: Decay = 0.999975
+    resolution_m: Annotated[float, within(0, 10, "a tail of coarser elements would never move")] = 0.0
+    axes: Literal["xz", "xyz"] = "xz"
+
+    @model_validator(mode="after")
+    def _liquid_never_outruns_the_body(self) -> Wake:
+        return within_scaling(self)
+
+
+class Tail(Protocol):
+    """What the parameters of both wakes have in common."""
+
+    @property
+    def length(self) -> int: ...  # noqa: D102 - elements
+    @property
+    def scaling(self) -> float: ...  # noqa: D102 - elements
+    @property
+    def exponent(self) -> float: ...  # noqa: D102
+    @property
+    def decay(self) -> float: ...  # noqa: D102 - a millisecond
+    @property
+    def axes(self) -> str: ...  # noqa: D102
+
+
+W = TypeVar("W", bound=Tail)
+
+
+def within_scaling(wake: W) -> W:
+    """Return a wake.
+
+    Raises
+    ------
+    ValueError
+        It is longer than its scaling.
+    """
+    if wake.length > wake.scaling:
+        raise ValueError(
+            f"length {wake.length} exceeds scaling {wake.scaling:g}: the wake would outrun the body; "
+            "lower length or raise scaling"
+        )
+    return wake
+
+
+def scaled_length(wake: Tail, rate_hz: float) -> int:
+    """Return N at the scene's rate: rounded down, at least 1."""
+    return max(1, math.floor(wake.length * rate_hz / TAIL_RATE_HZ))
+
+
+def fill_tail(record: Any, wake: Tail, rate_hz: float, row: int) -> None:
+    """Write what the two wakes have in common."""
+    record.row = row
+    record.length = scaled_length(wake, rate_hz)
+    record.scaling = max(wake.scaling * rate_hz / TAIL_RATE_HZ, record.length)
+    record.exponent = wake.exponent
+    record.log_decay_per_s = TAIL_RATE_HZ * math.log(wake.decay)
+    record.vertical = 1.0 if wake.axes == "xyz" else 0.0
+
+
+def tail_bound_n(extremes: Extremes, wake: Tail | None) -> float | None:
+    """Return F(v + u) − F(v), u = v (N/S)^y the most that the liquid can follow.
+
+    The laws are convex, so this is more than what a following liquid takes away.
+    """
+    if wake is None:
+        return None
+    return extremes.drag_by_flow_n(extremes.speed_mps * float((wake.length / wake.scaling) ** wake.exponent))
+
+
+def start_tail(kind: str, centre_m: tuple[float, float, float], reach_m: float) -> Mapping[str, Any]:
+    """Return the tail of the thesis' water."""
+    return {"length": 1700, "scaling": 1700.0}
+
+
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
+    wake = liquid.wake
+    fill_tail(record, wake, scene.rate_hz, first["elements"])
+    record.breaking_cosine = math.cos(math.radians(wake.breaking_angle_deg))
+    record.breaking_span_m = wake.breaking_span_m
+    record.resolution_m = wake.resolution_m
+
+
+PARAMETERS: Fields = (
+    ("row", INT),  # its first row in the model's elements and segments
+    ("length", INT),  # N, in elements at the scene's rate: the rows it owns
+    ("scaling", FLOAT),  # S, likewise
+    ("exponent", FLOAT),  # y
+    ("breaking_cosine", FLOAT),  # cos β
+    ("breaking_span_m", FLOAT),
+    ("log_decay_per_s", FLOAT),  # ln λ a second
+    ("resolution_m", FLOAT),
+    ("vertical", FLOAT),  # 1 where vertical motion enters the tail, else 0
+)
+
+STATE: Fields = (
+    ("stored", INT),  # elements stored since it was empty: the number of the next one
+    ("held", INT),  # how many of them are still in the list
+    ("first_segment", INT),  # number of the oldest segment
+    ("last_segment", INT),  # number of the newest, to which elements are added
+    ("reference", INT),  # number of the element the next one is compared with
+    ("scanned", INT),  # number of the first element not yet considered as reference
+    ("evicted", INT),  # moving elements that fell off since the last renewal
+    ("arc_m", FLOAT),  # a: path travelled in this liquid
+    ("stored_at_m", FLOAT, (3,)),  # where the body was when an element was last stored
+    ("scale", FLOAT),  # speeds and sums are stored divided by this common decay
+    ("interior_mps", FLOAT, (3,)),  # Σ direction · sum over segments between oldest and newest
+    ("interior_carry_mps", FLOAT, (3,)),  # its rounding error
+    ("speed_mps", FLOAT),  # Σ|e|
+    ("speed_carry_mps", FLOAT),
+    ("square_m2ps2", FLOAT),  # Σ|e|²
+    ("square_carry_m2ps2", FLOAT),
+)
+
+ELEMENT: Fields = (
+    ("velocity_mps", FLOAT, (3,)),  # e, divided by the wake's scale
+    ("speed_mps", FLOAT),  # |e|, likewise
+    ("arc_m", FLOAT),  # a when it was stored
+    ("moving", INT),  # 0 for a zero element
+)
+
+SEGMENT: Fields = (
+    ("direction", FLOAT, (3,)),  # unit vector of its newest element
+    ("speed_mps", FLOAT),  # Σ|e| of its elements, divided by the wake's scale
+    ("speed_carry_mps", FLOAT),  # the rounding error of that sum
+    ("count", INT),  # its elements still in the list
+)
+
+EFFECT = Effect(
+    name="wake",
+    label="Wake",
+    bit=BIT,
+    bound_n=lambda extremes: tail_bound_n(extremes, extremes.liquid.wake),
+    automatic=False,
+    model=Wake,
+    missing="length, scaling, ...",
+    through=("drag",),
+    parameters=PARAMETERS,
+    state=STATE,
+    fill=_fill,
+    rows=(
+        Rows(
+            "wake elements",
+            {"elements": ELEMENT, "segments": SEGMENT},
+            lambda liquid, rate_hz: scaled_length(liquid.wake, rate_hz),
+        ),
+    ),
+    start=start_tail,
+    thresholds=("breaking_angle_deg", "breaking_span_m", "resolution_m"),
+    controls=(
+        Parameter("wake.length", "Length", "ticks", logarithmic=True, whole=True, decimals=0),
+        Parameter("wake.scaling", "Scaling", "ticks", 1.0, 1e5, logarithmic=True, decimals=0),
+        Parameter("wake.exponent", "Exponent", "", 0.05, logarithmic=True),
+        Parameter("wake.breaking_angle_deg", "Breaking angle", "°", decimals=1),
+        Parameter("wake.breaking_span_m", "Breaking span", "m", most=0.5, factor=1e3, shown_unit="mm", decimals=1),
+        Parameter("wake.decay", "Decay", "per tick", 0.99, decimals=6),
+        Parameter("wake.resolution_m", "Resolution", "m", most=0.05, factor=1e3, shown_unit="mm", decimals=1),
+        Parameter("wake.axes", "Axes", choices=(("xz", "Horizontal (thesis)"), ("xyz", "All three"))),
+    ),
+)

@@ -1,0 +1,1 @@
+"""What is known of the velocity estimators without compiling them."""

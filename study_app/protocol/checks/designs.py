@@ -1,0 +1,174 @@
+"""What is wrong with blocks that have a design: names, methods that no answer can steer, levels beyond what is felt.
+
+These checks need a whole sound protocol, whose stimuli can be presented at the ends of their levels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from study_app.errors import StudyError
+from study_app.haptics.model.overrides import number_names, override
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import order_of
+from study_app.protocol.source.document import entries, names
+from study_app.protocol.source.problems import Fault, did_you_mean
+from study_app.protocol.table import Table
+from study_app.protocol.trials.kinds import DESIGN_KINDS, METHOD_KINDS
+from study_app.protocol.trials.stimuli import DELAY, MOST_DELAY_MS, Stimulus
+from study_app.protocol.trials.tracks import (
+    condition_of,
+    design_of,
+    has_correct_answer,
+    method_of,
+    present_value,
+    standards_of,
+    tracks_of,
+)
+
+
+def kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
+    """Check that every block's design and method names a table, or a kind that has a default for every key."""
+    sections: tuple[tuple[str, str, Mapping[str, type[Table]]], ...] = (
+        ("design", "designs", DESIGN_KINDS),
+        ("method", "methods", METHOD_KINDS),
+    )
+    for key, section, known in sections:
+        tables = names(document, section)
+        for path, name in entries(document, f"blocks.*.{key}"):
+            if not isinstance(name, str) or name in tables:
+                continue
+            if name not in known:
+                yield Fault(path, f'there is no {key} "{name}"', did_you_mean(name, {*tables, *known}))
+            elif needed := [of for of, field in known[name].model_fields.items() if field.is_required()]:
+                example = f'write [{section}.NAME] with kind = "{name}" and {", ".join(needed)}, and {key} = "NAME"'
+                yield Fault(path, f'the kind "{name}" has no default for {", ".join(needed)}', example)
+
+
+def designs(protocol: Protocol) -> Iterator[Fault]:
+    """Yield what is wrong with the blocks that have a design, and with what they vary."""
+    faults = [fault for name, stimulus in protocol.stimuli.items() for fault in _varied(protocol, name, stimulus)]
+    if faults:
+        yield from faults
+        return
+    for block in protocol.blocks.values():
+        if block.design is not None:
+            yield from _block(protocol, block)
+
+
+def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
+    design, place = design_of(protocol, block), ("blocks", block.id)
+    if block.questionnaire is not None:
+        yield Fault((*place, "questionnaire"), "a block with a design asks the design's question", "ask more in a form")
+    correct = has_correct_answer(design, None if block.stimulus is None else protocol.stimuli[block.stimulus])
+    if not correct and block.until is not None:
+        what = "a level that is a value" if design.has_correct_answer else f'a design "{block.design}"'
+        yield Fault((*place, "until"), f"{what} has no correct answer", "omit the key")
+    if not correct and design.feedback not in {None, "never"}:
+        yield Fault(
+            ("designs", str(block.design), "feedback"),
+            "no answer is correct, so there is nothing to report",
+            'omit the key (feedback = "never" is permitted)',
+        )
+    if block.break_every is not None and not (order := order_of(protocol, block)).breaks:
+        message = f"is {block.break_every}, and the block has {order.trials} trials: no break would come"
+        yield Fault((*place, "break_every"), message)
+    if block.stimulus is None:
+        if not design.has_standard:
+            yield Fault((*place, "design"), "has one interval and compares nothing", "vary a stimulus")
+        return
+    if not design.adaptive and method_of(protocol, block).adaptive:
+        yield Fault(
+            (*place, "method"),
+            f'"{block.design}" has no track: correct answers determine no level',
+            'method = "constant"',
+        )
+    if unknown := [one for one in block.standards if one not in protocol.stimuli[block.stimulus].standards]:
+        listed = ", ".join(f"{one:g}" for one in protocol.stimuli[block.stimulus].standards)
+        yield Fault((*place, "standards"), f"the stimulus has no standard {unknown[0]:g}", f"these: {listed or 'none'}")
+    if design.first is not None and len(tracks_of(protocol, block)) > 1:
+        yield Fault((*place, "design"), "a modulus needs a single standard", "omit it, or use one block per standard")
+    yield from _levels(protocol, block)
+
+
+def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault]:
+    """Check that a stimulus varies one number of one condition."""
+    place = ("stimuli", name)
+    if stimulus.condition is None and len(protocol.conditions) > 1:
+        listed = f"known: {', '.join(protocol.conditions)}"
+        yield Fault((*place, "condition"), "is missing, and there are several", listed)
+        return
+    condition = condition_of(protocol, stimulus)
+    liquids = protocol.conditions[condition].liquid_ids
+    if stimulus.vary == DELAY:
+        return
+    if len(liquids) > 1:
+        yield Fault(
+            (*place, "condition"),
+            f"has {len(liquids)} liquids: which one's number is varied?",
+            "a condition with one liquid",
+        )
+    elif protocol.liquids[liquids[0]].effects == "auto":
+        yield Fault(
+            (*place, "vary"),
+            f'the effects of "{liquids[0]}" would be selected again at every level',
+            'name them: effects = ["drag"]',
+        )
+    else:
+        try:
+            present_value(protocol, stimulus)
+        except StudyError:
+            known = {DELAY, *number_names(protocol.scene_for(condition))}
+            message = f'there is no number "{stimulus.vary}" in condition "{condition}"'
+            yield Fault((*place, "vary"), message, did_you_mean(stimulus.vary, known))
+
+
+def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
+    """Check that every level of a block can be presented with each of its standards."""
+    stimulus = protocol.stimuli[str(block.stimulus)]
+    method = method_of(protocol, block)
+    least, most = stimulus.levels
+    levels = sorted(method.asked(stimulus))
+    if levels[0] < least * (1 - 1e-9) or levels[-1] > most * (1 + 1e-9):
+        beyond = levels[0] if levels[0] < least * (1 - 1e-9) else levels[-1]
+        yield Fault(
+            ("methods", str(block.method), "levels"),
+            f"{beyond:g} is not within the stimulus' levels",
+            f"from {least:g} to {most:g}",
+        )
+        return
+    for standard in standards_of(protocol, block):
+        for level in (levels[-1], levels[0]):
+            value = stimulus.comparison(standard, level)
+            if stimulus.vary == DELAY and not 0 <= value <= MOST_DELAY_MS:
+                yield _delayed(block, stimulus, standard, level)
+                return
+            if (fault := _presented(protocol, stimulus, value)) is not None:
+                what = f"standard {standard:g} at level {level:g} gives" if standard is not None else "the level"
+                yield Fault(("stimuli", str(block.stimulus), "levels"), f"{what} {value:g}: {fault}")
+                return
+
+
+def _delayed(block: Block, stimulus: Stimulus, standard: float | None, level: float) -> Fault:
+    """Return that a visual delay is beyond what can be presented."""
+    place, value = ("stimuli", str(block.stimulus), "levels"), stimulus.comparison(standard, level)
+    permitted = f"at most {MOST_DELAY_MS:g}" if value > 0 else "no less than 0"
+    if standard is None or stimulus.level_kind != "difference":
+        return Fault(place, f"level {level:g} gives {value:g} ms; delay_ms may be {permitted}", f"{permitted} ms")
+    above = "above" if stimulus.direction == "up" else "below"
+    most = MOST_DELAY_MS - standard if stimulus.direction == "up" else standard
+    message = f"{level:g} ms {above} a standard of {standard:g} is {value:g}; delay_ms may be {permitted}"
+    return Fault(place, message, f"at most {most:g}")
+
+
+def _presented(protocol: Protocol, stimulus: Stimulus, value: float) -> str | None:
+    """Return why a value of the varied number cannot be presented; None if it can."""
+    if stimulus.vary == DELAY:
+        return None
+    try:
+        override(protocol.scene_for(condition_of(protocol, stimulus)), stimulus.vary, value)
+    except StudyError as error:
+        return str(error)
+    return None

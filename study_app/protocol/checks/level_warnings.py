@@ -1,0 +1,66 @@
+"""What is permitted in a block of levels and may still be a mistake: a sentence each, with its place in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from study_app.haptics.model.estimators.response import fastest_hz
+from study_app.haptics.model.steady_state import steady
+from study_app.protocol.blocks import Block
+from study_app.protocol.checks.pace import ends, highest_damping
+from study_app.protocol.model import Follow, Protocol
+from study_app.protocol.trials.tracks import design_of, tracks_of
+
+UNPACED_MPS: Final = 0.3
+"""A hand that is free moves as fast. [choice]"""
+
+
+def level_warnings(protocol: Protocol) -> Iterator[str]:
+    """Yield what to think over of the blocks with a design."""
+    yielded: set[str] = set()
+    for block in protocol.blocks_in_order:
+        if block.design is not None:
+            for sentence in (*_unbalanced(protocol, block), *_seen(protocol, block), *_unpaced(protocol, block)):
+                if sentence not in yielded:
+                    yielded.add(sentence)
+                    yield sentence
+
+
+def _unbalanced(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield that the trials of a track cannot present every arrangement equally often."""
+    count = len(design_of(protocol, block).arrangements)
+    track = tracks_of(protocol, block)[0]
+    if design_of(protocol, block).noise(track.slots) == 0 and track.slots % count:
+        place = f"blocks.{block.id}.repetitions" if block.stimulus is None else f"methods.{block.method}"
+        wanted = "an even number" if count == 2 else f"a multiple of {count}"
+        yield f"{place}: {track.slots} trials cannot balance {count} arrangements: choose {wanted}"
+
+
+def _seen(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield that a double-blind study shows its operator which answers were correct."""
+    if design_of(protocol, block).feedback == "always" and protocol.study.blinding == "double":
+        yield (
+            f'designs.{block.design}.feedback: "always" in a double-blind study: whoever sees the participant\'s '
+            'screen sees it: choose feedback = "practice"'
+        )
+
+
+def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield that fast motions of a task without a pace are not delivered as requested."""
+    task = protocol.tasks[block.task]
+    if isinstance(task, Follow) or block.stimulus is None:
+        return
+    advice = 'choose a task of kind "follow"'
+    if any(steady(scene, UNPACED_MPS).drag_n > scene.force_limit_n for _, _, scene in ends(protocol, block)):
+        yield (
+            f"tasks.{block.task}: at {UNPACED_MPS:g} m/s the force is clipped at {protocol.device.force_limit_n:g} N: "
+            f"such trials are repeated: {advice}"
+        )
+    error_percent = protocol.limits.level_error_percent
+    if highest_damping(protocol, block) > 0 and error_percent is not None:
+        fast_hz = fastest_hz(protocol.scene.velocity, protocol.device.rate_hz, 1 - error_percent / 100)
+        yield (
+            f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator takes more than "
+            f"{error_percent:g} % of a damper: such trials are repeated: {advice}"
+        )

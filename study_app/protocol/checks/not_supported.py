@@ -1,0 +1,34 @@
+"""What format 2 describes and this version does not support yet: each key or value is a fault of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from study_app.protocol.source.document import entries
+from study_app.protocol.source.problems import Fault
+
+KEYS: Final = (
+    *(f"conditions.*.force_{name}" for name in ("delay_ms", "jitter_ms", "loss")),
+    "blocks.*.catch",
+    *(f"analysis.{name}" for name in ("participants", "precision", "published")),
+)
+METHODS: Final = ("questplus", "updown", "adjustment")
+DESIGNS: Final = ("adjustment",)
+CONSTANT: Final = 'method = "constant"'
+
+
+def not_supported(document: Mapping[str, Any]) -> Iterator[Fault]:
+    """Yield a fault for every key and kind of a later version."""
+    for pattern in KEYS:
+        for path, _ in entries(document, pattern):
+            yield Fault(path, "is not supported yet", "omit it")
+    for section, key, kinds in (("methods", "method", METHODS), ("designs", "design", DESIGNS)):
+        hint = CONSTANT if section == "methods" else "another design"
+        tables = document.get(section, {})
+        for path, kind in entries(document, f"{section}.*.kind"):
+            if kind in kinds:
+                yield Fault(path, f'"{kind}" is not supported yet', hint.replace("method", "kind"))
+        for path, name in entries(document, f"blocks.*.{key}"):
+            if name in kinds and name not in tables:
+                yield Fault(path, f'"{name}" is not supported yet', hint)

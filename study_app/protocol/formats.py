@@ -1,0 +1,204 @@
+"""The formats of a study's file: what belongs to format 2, and what a file of format 2 may leave out.
+
+Format 1 is frozen: a file of format 1 that uses anything newer has a fault, and nothing is filled in.
+"""
+
+from __future__ import annotations
+
+import string
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from study_app.haptics.model.scene import FADE_S, Scene
+from study_app.protocol.blocks import LATER
+from study_app.protocol.forms.scale import POINTS
+from study_app.protocol.source.document import entries, names
+from study_app.protocol.source.problems import Fault
+from study_app.protocol.wording.languages import LANGUAGES, words
+
+LATEST: Final = 2
+TABLES: Final = ("stimuli", "designs", "methods", "groups", "sequences")
+LEVEL_LIMITS: Final = {"level_error_percent": 2, "level_error_ms": 2, "pace_error_percent": 40, "attempts": 3}
+"""Limits of what an interval delivers, with their defaults."""
+NEW_KEYS: Final = (
+    "questionnaires.*.instrument",
+    "questionnaires.*.scores",
+    "questionnaires.*.items.*.kind",
+    "questionnaires.*.items.*.show_if",
+    "liquids.*.drag.damping_nspm",
+    "scene.fade_s",
+    "conditions.*.ball",
+    *TABLES,
+    *(f"limits.{key}" for key in LEVEL_LIMITS),
+    *(f"blocks.*.{key}" for key in sorted(LATER)),
+)
+"""Keys that belong to format 2, as patterns of places in the file."""
+NEW_VALUES: Final = {
+    "liquids.*.drag.law": "linear",
+    "liquids.*.effects.*": "unsteady_drag",
+    "tasks.*.kind": "follow",
+}
+"""Values of earlier keys that belong to format 2."""
+
+HINT: Final = 'write format = 2; nothing else in the file changes its meaning but effects = "auto"'
+WORKSPACE_MM: Final = (100.0, 60.0, 60.0)
+DENSITY_KG_M3: Final = 1000.0
+
+
+def is_later(document: Mapping[str, Any]) -> bool:
+    """Return whether a file is of a format that this program does not know: then nothing else in it can be judged."""
+    stated = document.get("format")
+    return isinstance(stated, int) and stated > LATEST
+
+
+def is_second(document: Mapping[str, Any]) -> bool:
+    """Return whether a file is of format 2."""
+    return bool(document.get("format") == 2 and not isinstance(document["format"], bool))
+
+
+def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
+    """Yield a fault for everything in a file of format 1 that belongs to format 2."""
+    for pattern in NEW_KEYS:
+        for path, _ in entries(document, pattern):
+            yield Fault(path, "belongs to format 2", HINT)
+    for pattern, value in NEW_VALUES.items():
+        for path, stated in entries(document, pattern):
+            if stated == value:
+                yield Fault(path, f'"{value}" belongs to format 2', HINT)
+    for path, labels in entries(document, "scales.*.labels.*"):
+        if isinstance(labels, tuple) and len(labels) != POINTS:
+            bound = "needs at least" if len(labels) < POINTS else "more than"
+            message = f"has {len(labels)} entries, {bound} {POINTS}"
+            yield Fault(path, message, f"other scales belong to format 2: {HINT}")
+    known = {*names(document, "pages"), *names(document, "blocks")}
+    for path, name in entries(document, "sequence.*"):
+        if name in names(document, "questionnaires") and name not in known:
+            yield Fault(path, "a questionnaire on its own belongs to format 2", HINT)
+    for path, table in entries(document, "questionnaires.*"):
+        if isinstance(table, Mapping) and "scale" not in table:
+            yield Fault((*path, "scale"), "is missing")
+
+
+def completed(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a file of format 2 with what it leaves out; what is broken stays as it is."""
+    found = dict(document)
+    head = _table(found, "study")
+    if isinstance(head, dict):
+        found["study"] = {"version": "1", "languages": ("en",), **head}
+        if isinstance(head.get("name"), str):
+            found["study"].setdefault("title", dict.fromkeys(_languages(found), head["name"]))
+    found["device"] = _with(_table(found, "device"), workspace_mm=WORKSPACE_MM)
+    if any(
+        "stimulus" in block or "design" in block
+        for _, block in entries(found, "blocks.*")
+        if isinstance(block, Mapping)
+    ):
+        found["limits"] = _with(_table(found, "limits"), **LEVEL_LIMITS)
+    found = with_densities(found)
+    if isinstance(liquids := _table(found, "liquids"), dict):
+        found.setdefault("conditions", {name: {"liquid": name} for name in liquids})
+    if isinstance(blocks := _table(found, "blocks"), dict) and blocks:
+        found["blocks"] = _with_numbers(blocks, names(found, "tasks"), _languages(found))
+        if "sequences" not in found and not _own_sequences(found):
+            found.setdefault("sequence", tuple(blocks))
+    return found
+
+
+def with_densities(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a file of format 2 with the densities that its dampers leave out."""
+    found = dict(document)
+    if isinstance(liquids := _table(found, "liquids"), dict):
+        found["liquids"] = {name: _with_density(table) for name, table in liquids.items()}
+    return found
+
+
+def needed_by(scene: Scene) -> int:
+    """Return the format that a scene file needs."""
+    newer = any(liquid.drag.law == "linear" or "unsteady_drag" in liquid.effects for liquid in scene.liquids)
+    return 2 if newer or scene.fade_s != FADE_S else scene.format
+
+
+def _own_sequences(document: Mapping[str, Any]) -> bool:
+    """Return whether there are groups, each with a sequence of its own, so that the study needs none."""
+    groups = [group for _, group in entries(document, "groups.*")]
+    return bool(groups) and all(isinstance(one, Mapping) and one.keys() & {"sequence", "sequences"} for one in groups)
+
+
+OMITTED: Final = {
+    "": ("device", "conditions", "sequence"),
+    "study": ("title", "version", "languages"),
+    "device": ("workspace_mm",),
+    "blocks": ("title", "setting_label", "task"),
+}
+"""Keys of the file and of its tables that a file of format 2 may leave out."""
+
+
+def relax(schema: dict[str, Any]) -> None:
+    """Let a protocol's JSON Schema ask for the keys of `OMITTED` in format 1 alone."""
+    tables = {"study": "StudyHead", "device": "DeviceNeeds", "blocks": "Block"}
+    asked: dict[str, Any] = {}
+    for section, keys in OMITTED.items():
+        node = schema["$defs"][tables[section]] if section else schema
+        node["required"] = [key for key in node["required"] if key not in keys]
+        if section:
+            inner = {"required": list(keys)}
+            asked[section] = {"patternProperties": {"": inner}} if section == "blocks" else inner
+    schema["if"] = {"properties": {"format": {"const": 1}}}
+    schema["then"] = {"required": list(OMITTED[""]), "properties": asked}
+    questions = schema["$defs"]["Questionnaire"]
+    questions["if"] = {"not": {"required": ["instrument"]}}
+    questions["then"] = {"required": questions.pop("required")}
+
+
+def _table(document: Mapping[str, Any], key: str) -> Any:
+    return document.get(key, {})
+
+
+def _with(table: Any, **defaults: Any) -> Any:
+    return {**defaults, **table} if isinstance(table, dict) else table
+
+
+def _languages(document: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(name for _, name in entries(document, "study.languages.*") if name in LANGUAGES) or ("en",)
+
+
+def _with_density(liquid: Any) -> Any:
+    """Give a liquid that is a linear damper and nothing else a density, which does not matter."""
+    if not isinstance(liquid, dict):
+        return liquid
+    drag = liquid.get("drag")
+    damper = isinstance(drag, Mapping) and drag.get("law") == "linear"
+    return _with(liquid, density_kg_m3=DENSITY_KG_M3) if damper and _only_drag(liquid) else liquid
+
+
+def _only_drag(liquid: Mapping[str, Any]) -> bool:
+    return bool(liquid.get("effects", ("drag",)) == ("drag",))
+
+
+def _with_numbers(blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: tuple[str, ...]) -> dict[str, Any]:
+    """Return the blocks, the main ones numbered and with the next free letters, each and its trials named."""
+    taken = [table.get("code_prefix") for table in blocks.values() if isinstance(table, Mapping)]
+    letters = (letter for letter in string.ascii_uppercase if letter not in taken)
+    found: dict[str, Any] = {}
+    part = 0
+    for name, table in blocks.items():
+        if not isinstance(table, dict):
+            found[name] = table
+            continue
+        defaults: dict[str, Any] = {
+            "title": name.replace("_", " ").capitalize(),
+            "setting_label": {language: words(language).trial for language in languages},
+        }
+        if len(tasks) == 1:
+            defaults["task"] = tasks[0]
+        if "stimulus" in table:
+            defaults |= {"design": "2ifc", "method": "questplus"}
+        if table.get("phase", "main") == "main":
+            part = table["part"] if isinstance(table.get("part"), int) else part + 1
+            defaults["part"] = part
+            if "code_prefix" not in table:
+                defaults["code_prefix"] = next(letters, "Z")
+        if len(languages) > 1:
+            defaults["title"] = dict.fromkeys(languages, defaults["title"])
+        found[name] = {**defaults, **table}
+    return found

@@ -1,0 +1,59 @@
+"""Questionnaires: what is answered after a trial, or as a form on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final, Literal
+
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+
+from study_app.protocol.forms.kinds import AnyQuestion
+from study_app.protocol.forms.scale import Scale
+from study_app.protocol.instruments.scores import Score
+from study_app.protocol.questions.question import Context, Question
+from study_app.protocol.questions.statement import Statement
+from study_app.protocol.table import Table
+from study_app.protocol.texts import Id, Localised
+
+_OF_FORMAT_2: Final[Mapping[str, Any]] = {"instrument": None, "scores": {}}
+
+
+class Questionnaire(Table):
+    """Questions that are answered after a trial, or on their own where ``sequence`` names the questionnaire."""
+
+    title: Localised | None = Field(default=None, description="Heading; left out: the name of the setting.")
+    intro: Localised = Field(description="The question above the statements.")
+    scale: Id | None = Field(default=None, description="The scale of all statements; left out where there are none.")
+    item_order: Literal["fixed", "shuffled"] = Field(default="fixed", description="As written, or anew in every trial.")
+    items: tuple[AnyQuestion, ...] = Field(
+        min_length=1, description="The questions; one without kind is a statement on the questionnaire's scale."
+    )
+    instrument: str | None = Field(
+        default=None, description="The standard questionnaire whose items and scoring are used."
+    )
+    scores: dict[Id, Score] = Field(default_factory=dict, description="Numbers computed from the answers.")
+
+    @model_serializer(mode="wrap")
+    def _without_keys_of_format_2(self, serialized: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what format 1 does not know."""
+        return {
+            name: value
+            for name, value in serialized(self).items()
+            if name not in _OF_FORMAT_2 or value != _OF_FORMAT_2[name]
+        }
+
+    @property
+    def statements(self) -> tuple[Question, ...]:
+        """The items that are rated on the questionnaire's scale."""
+        return tuple(item for item in self.items if isinstance(item, Statement))
+
+    def item(self, item_id: str) -> Question:
+        """Return the item of that id (KeyError if there is none)."""
+        for item in self.items:
+            if item.id == item_id:
+                return item
+        raise KeyError(item_id)
+
+    def context(self, scales: Mapping[str, Scale], language: str) -> Context:
+        """Return what its items are asked with."""
+        return Context(scales, self.scale, language)

@@ -1,0 +1,116 @@
+"""The steps of one session: those of its group and number, where a study's sessions differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Protocol
+
+from study_app.errors import StudyError
+from study_app.protocol.groups.group import Group, Sequences, Steps
+
+
+class HasSteps(Protocol):
+    """A protocol, from its file or from a receipt."""
+
+    @property
+    def sequence(self) -> Steps:
+        """The steps of every session."""
+
+    @property
+    def sequences(self) -> Sequences:
+        """The steps of the first session, the second, and so on."""
+
+    @property
+    def groups(self) -> Mapping[str, Group]:
+        """The groups by name."""
+
+
+def sessions_differ(protocol: HasSteps) -> bool:
+    """Return whether sessions of this study can have different steps."""
+    return bool(protocol.groups or protocol.sequences)
+
+
+def session_count(protocol: HasSteps, group: str | None) -> int | None:
+    """Return how many sessions a participant of a group has; None: as many as wanted, all with the same steps."""
+    return len(_sequences(protocol, group)) or None
+
+
+def steps_of(protocol: HasSteps, group: str | None, session: int) -> Steps:
+    """Return the steps of a session.
+
+    Parameters
+    ----------
+    protocol : HasSteps
+        The study.
+    group : str or None
+        The participant's group; None in a study without groups.
+    session : int
+        The session's number, from 1.
+
+    Raises
+    ------
+    StudyError
+        The participant has fewer sessions.
+    """
+    sequences = _sequences(protocol, group)
+    if not sequences:
+        own = () if group is None else protocol.groups[group].sequence
+        return own or protocol.sequence
+    if session > len(sequences):
+        raise beyond_last(session, len(sequences))
+    return sequences[session - 1]
+
+
+def _sequences(protocol: HasSteps, group: str | None) -> Sequences:
+    own = None if group is None else protocol.groups[group]
+    return protocol.sequences if own is None or not (own.sequence or own.sequences) else own.sequences
+
+
+def beyond_last(session: int, last: int) -> StudyError:
+    """Return the error of a session number beyond the last session."""
+    permitted = "1, the only session" if last == 1 else f"1 to {last}"
+    return StudyError(f"session {session}: a participant of this study has {last} (sequences); permitted: {permitted}")
+
+
+def refuse_beyond_last(protocol: HasSteps, session: int) -> None:
+    """Refuse a session that no group has.
+
+    Raises
+    ------
+    StudyError
+        Every group has fewer sessions.
+    """
+    counts = [session_count(protocol, group) for group in protocol.groups or (None,)]
+    known = [count for count in counts if count is not None]
+    if len(known) == len(counts) and session > max(known):
+        raise beyond_last(session, max(known))
+
+
+def every_step(protocol: HasSteps) -> Steps:
+    """Return the steps of all groups and sessions, each once, in order of first use; of one sequence as they are."""
+    if not sessions_differ(protocol):
+        return protocol.sequence
+    used: list[Steps] = []
+    for group in protocol.groups or (None,):
+        used += _sequences(protocol, group) or (steps_of(protocol, group, 1),)
+    return tuple(dict.fromkeys(step for steps in used for step in steps))
+
+
+def groups_with(protocol: HasSteps, step: str) -> tuple[str, ...]:
+    """Return the groups in which a step comes; none in a study without groups."""
+    return tuple(
+        group
+        for group in protocol.groups
+        if any(step in steps for steps in _sequences(protocol, group) or (steps_of(protocol, group, 1),))
+    )
+
+
+def numbered_parts(steps: Iterable[str], parts: Mapping[str, int | None]) -> dict[str, int]:
+    """Return the number of each block's part in a session with these steps: 1, 2 … in order of first appearance."""
+    numbers: dict[int, int] = {}
+    found: dict[str, int] = {}
+    for step in steps:
+        part = parts.get(step)
+        if part is not None:
+            found[step] = numbers.setdefault(part, len(numbers) + 1)
+    return found

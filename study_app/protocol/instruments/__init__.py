@@ -1,0 +1,1 @@
+"""Standard questionnaires: their items and scoring, one TOML file each."""

@@ -1,0 +1,22 @@
+"""A statement that is rated on its questionnaire's scale of seven points: the only kind of format 1."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Final
+
+from study_app.protocol.forms.scale import Scale
+from study_app.protocol.questions.question import Context
+from study_app.protocol.questions.rating import Rated
+
+
+class Statement(Rated):
+    """A statement; in a questionnaire of nothing else a row of the page's grid."""
+
+    widget: ClassVar[str] = "rating"
+
+    def scale_of(self, context: Context) -> Scale:
+        """Return the questionnaire's scale."""
+        return context.scales[context.scale or ""]
+
+
+KIND: Final = Statement

@@ -1,0 +1,33 @@
+"""The JSON Schema of a protocol file."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from pydantic import BaseModel
+
+from study_app.protocol.formats import relax
+from study_app.protocol.model import Protocol
+
+LIQUID_FILE = "A liquid file with one liquid, in place of the keys of this table: its path, relative to this file."
+
+
+@cache
+def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
+    """Return the JSON Schema of a protocol file, for editors that complete and check while one writes."""
+    described = of.model_json_schema()
+    for node in described["properties"].values():
+        if "patternProperties" in node:
+            node["additionalProperties"] = False
+    for table in ("Liquid", "Block"):  # their id is the name of their table
+        for part in described["$defs"].values():
+            if part.get("title") == table:
+                part["properties"].pop("id")
+                part["required"].remove("id")
+                if "body" in part["properties"]:  # a liquid of a study may be that of a file instead
+                    part["properties"]["file"] = {"type": "string", "description": LIQUID_FILE}
+                    part["if"], part["then"] = {"not": {"required": ["file"]}}, {"required": part.pop("required")}
+    if of is Protocol:
+        relax(described)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}

@@ -1,0 +1,155 @@
+"""What every design of a trial has: its intervals, its arrangements, its answers, and which answer is correct."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Protocol, TypeAlias
+
+from pydantic import Field
+
+from study_app.haptics.model.ranges import within
+from study_app.protocol.table import Table
+from study_app.protocol.texts import Id, Localised
+
+Feedback: TypeAlias = Literal["never", "practice", "always"]
+Reply: TypeAlias = Literal["choice", "rating", "number"]
+Arrangement: TypeAlias = tuple[bool, ...]
+"""Per interval whether it presents the comparison, in the order of presentation."""
+
+
+class Modulus(Table):
+    """The level of a block's first trial and the number that the participant is given for it; it is not analysed."""
+
+    level: float = Field(description="The level that is presented.")
+    number: Annotated[float, within(1e-6, 1e9, "a number that a person can name")] = Field(
+        description="The number that stands for it."
+    )
+
+
+class Attention(Protocol):
+    """What a simulated observer attends to in the intervals of a trial."""
+
+    @property
+    def smallest(self) -> bool:
+        """Whether the weaker one is asked for."""
+
+    def distinct(self, difference: float, about: float) -> bool:
+        """Return whether a difference between two around ``about`` is noticed."""
+
+
+class Design(Table):
+    """How a trial is built and answered: the keys that all kinds share, and what each kind must say.
+
+    A kind is a module of ``designs`` with a subclass whose ``kind`` is a ``Literal`` with a default.
+    """
+
+    if TYPE_CHECKING:
+        kind: str
+
+    item: Id | None = Field(
+        default=None, description="The answer's name in tables; default: the kind, such as choice_2ifc or yesno."
+    )
+    question: Localised | None = Field(default=None, description="The question; default: the program's own words.")
+    pause_s: Annotated[float, within(0.3, 10, "hands need 0.3 s to settle; memory fades within seconds")] = Field(
+        default=0.6, description="Interstimulus interval: zero force between two intervals [s]."
+    )
+    between_s: Annotated[float, within(0.0, 60, "a minute is a break, which has a page")] = Field(
+        default=0.8, description="Zero force between an answer and the next trial [s]."
+    )
+    feedback: Feedback | None = Field(
+        default=None,
+        description='When the participant sees whether an answer was correct; default: "practice", and "never" '
+        "where no answer is correct.",
+    )
+    feedback_s: Annotated[float, within(0.2, 10, "a sign needs 0.2 s to be seen")] = Field(
+        default=0.6, description="How long the feedback is shown [s]."
+    )
+
+    reply: ClassVar[Reply] = "choice"
+    has_standard: ClassVar[bool] = True
+    """Whether intervals are compared with a standard; otherwise there is one interval, the level itself."""
+    has_correct_answer: ClassVar[bool] = True
+    success_name: ClassVar[str] = "correct"
+    """What `success` counts."""
+    adaptive: ClassVar[bool] = True
+    """Whether answers can choose the next level; otherwise the method must be "constant"."""
+
+    @property
+    def name(self) -> str:
+        """The answer's name in tables."""
+        return self.item or (self.kind if self.kind[:1].isalpha() else f"choice_{self.kind}")
+
+    @property
+    def wording(self) -> str:
+        """The name of its question among the program's own words."""
+        return self.kind
+
+    @property
+    @abstractmethod
+    def answers(self) -> tuple[str, ...]:
+        """The answers that may be chosen, in temporal order; empty where the reply is not a choice."""
+
+    @property
+    @abstractmethod
+    def arrangements(self) -> tuple[Arrangement, ...]:
+        """All arrangements of standard and comparison; each comes equally often."""
+
+    @property
+    @abstractmethod
+    def guess_rate(self) -> float | None:
+        """The probability of a correct answer at chance; None where it is free or no answer is correct."""
+
+    @property
+    def intervals(self) -> int:
+        """How many intervals a trial has."""
+        return len(self.arrangements[0])
+
+    @property
+    def first(self) -> Modulus | None:
+        """What a block's first trial presents and names, before those that are analysed; None: nothing."""
+        return None
+
+    def noise(self, comparisons: int) -> int:
+        """Return how many slots present the standard alone, in addition to so many comparisons."""
+        return 0
+
+    def correct(self, arrangement: int) -> str | None:
+        """Return the correct answer to an arrangement; None where no answer is correct."""
+        return None
+
+    def is_correct(self, arrangement: int, answer: str) -> bool | None:
+        """Return whether an answer to an arrangement is correct; None where no answer is."""
+        correct = self.correct(arrangement)
+        return None if correct is None else answer == correct
+
+    def success(self, arrangement: int, answer: str) -> bool | None:
+        """Return what an answer counts as for a psychometric function; None where it does not enter one."""
+        return self.is_correct(arrangement, answer)
+
+    def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
+        """Return the answer of a simulated observer, where the reply is a choice.
+
+        Parameters
+        ----------
+        taken : sequence of float
+            What each interval was taken for.
+        mean : float
+            The mean of all intervals of the block so far.
+        attention : Attention
+            What the observer attends to.
+        """
+        raise NotImplementedError
+
+    def shows_feedback(self, practice: bool) -> bool:
+        """Return whether the participant sees if an answer was correct."""
+        when = self.feedback or ("practice" if self.has_correct_answer else "never")
+        return when == "always" or (when == "practice" and practice)
+
+
+ORDINALS = ("first", "second", "third", "fourth")
+
+
+def one_differs(count: int, among: bool) -> tuple[Arrangement, ...]:
+    """Return the arrangements of ``count`` intervals of which one alone is ``among``."""
+    return tuple(tuple((at == odd) is among for at in range(count)) for odd in range(count))

@@ -1,0 +1,40 @@
+"""Magnitude estimation: one interval, answered with any number above 0."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from study_app.protocol.trials.design import Arrangement, Design, Modulus, Reply
+
+
+class Estimation(Design):
+    """How strong was it, as a number? (Stevens 1957, Psychological Review 64, 153)."""
+
+    kind: Literal["estimation"] = "estimation"
+    modulus: Modulus | None = Field(default=None, description="The first trial's level and number; default: free.")
+    reply: ClassVar[Reply] = "number"
+    has_standard: ClassVar[bool] = False
+    has_correct_answer: ClassVar[bool] = False
+    adaptive: ClassVar[bool] = False
+
+    @property
+    def first(self) -> Modulus | None:
+        """The modulus."""
+        return self.modulus
+
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """None: the reply is a number."""
+        return ()
+
+    @property
+    def arrangements(self) -> tuple[Arrangement, ...]:
+        """The comparison alone."""
+        return ((True,),)
+
+    @property
+    def guess_rate(self) -> None:
+        """No answer is correct."""
+        return

@@ -1,0 +1,45 @@
+"""Forced choice of two to four intervals (2IFC, 3IFC, 4IFC): one holds the comparison, the others the standard."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from study_app.protocol.trials.design import ORDINALS, Arrangement, Attention, Design, one_differs
+
+
+class ForcedChoice(Design):
+    """The answer is the interval that held the comparison.
+
+    Green & Swets 1966, Signal Detection Theory and Psychophysics: an observer at chance is correct in 1/m.
+    """
+
+    kind: Literal["2ifc", "3ifc", "4ifc"] = "2ifc"
+
+    @property
+    def wording(self) -> str:
+        """The same question whatever the number of intervals."""
+        return "forced_choice"
+
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """The intervals, by their place in time."""
+        return ORDINALS[: int(self.kind[0])]
+
+    @property
+    def arrangements(self) -> tuple[Arrangement, ...]:
+        """The comparison in each interval once."""
+        return one_differs(int(self.kind[0]), among=True)
+
+    @property
+    def guess_rate(self) -> float:
+        """1/m for m intervals."""
+        return 1 / self.intervals
+
+    def correct(self, arrangement: int) -> str:
+        """Return the interval of the comparison."""
+        return self.answers[self.arrangements[arrangement].index(True)]
+
+    def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
+        """Return the strongest interval, or the weakest."""
+        return self.answers[taken.index(min(taken) if attention.smallest else max(taken))]

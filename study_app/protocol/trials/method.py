@@ -1,0 +1,98 @@
+"""What every method has: how many slots a track has, and the level of each."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
+
+from pydantic import Field
+
+from study_app.protocol.streams import Draw
+from study_app.protocol.table import Table
+from study_app.protocol.trials.stimuli import Stimulus
+
+TrackOrder: TypeAlias = Literal["interleaved", "blocked"]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Heard:
+    """One answered trial: its last attempt, confirmed; never printed, since it reveals a level.
+
+    Attributes
+    ----------
+    trial : int
+        The trial's number in the session.
+    code : str
+        The code of its track.
+    level : float
+        The level that was presented.
+    success : bool or None
+        Whether the answer was correct; for yes–no whether it was yes; "comparison chosen" where no answer is correct;
+        None where the answer enters no psychometric function.
+    correct : bool or None
+        Whether the answer was correct; None where no answer is.
+    """
+
+    trial: int
+    code: str
+    level: float
+    success: bool | None
+    correct: bool | None
+
+
+class Method(Table):
+    """How the levels of a track are chosen: the keys that all kinds share, and what each kind must say.
+
+    A kind is a module of ``methods`` with a subclass whose ``kind`` is a ``Literal`` with a default.
+    """
+
+    if TYPE_CHECKING:
+        kind: str
+
+    order: TrackOrder = Field(
+        default="interleaved",
+        description="Whether the tracks alternate in random order, or one follows another.",
+    )
+
+    adaptive: ClassVar[bool] = True
+    """Whether answers choose the next level."""
+
+    @property
+    def name(self) -> str:
+        """Its kind."""
+        return self.kind
+
+    @abstractmethod
+    def presentations(self, stimulus: Stimulus) -> int:
+        """Return how many comparisons one track presents."""
+
+    @abstractmethod
+    def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
+        """Return the levels among which it chooses."""
+
+    @abstractmethod
+    def level(self, stimulus: Stimulus, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float | None:
+        """Return the level of a track's comparison ``number`` (from 0).
+
+        Parameters
+        ----------
+        stimulus : Stimulus
+            What is varied.
+        number : int
+            Which comparison of the track.
+        heard : sequence of Heard
+            The track's earlier answers, in any order.
+        draws : sequence of callable
+            Secret uniform numbers in [0, 1), one source per round of levels.
+
+        Returns
+        -------
+        float or None
+            The level; None where the track has ended.
+        """
+
+    def rounds(self, stimulus: Stimulus) -> int:
+        """Return how many rounds of drawn levels a track has."""
+        return 0

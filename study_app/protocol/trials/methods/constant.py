@@ -1,0 +1,45 @@
+"""The method of constant stimuli: fixed levels, each presented equally often."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from study_app.protocol.streams import Draw, shuffle
+from study_app.protocol.trials.method import Heard, Method
+from study_app.protocol.trials.stimuli import CONSTANT_LEVELS, LEVELS_MOST, Stimulus
+
+Count = Annotated[int, Field(ge=1, le=LEVELS_MOST)]
+Listed = Annotated[tuple[float, ...], Field(min_length=1, max_length=LEVELS_MOST)]
+
+
+class Constant(Method):
+    """Every round presents every level once, in a random order of its own."""
+
+    kind: Literal["constant"] = "constant"
+    adaptive: ClassVar[bool] = False
+    levels: Count | Listed = Field(
+        default=CONSTANT_LEVELS, description="The levels, or how many, evenly spaced over the stimulus' range."
+    )
+    repetitions: Annotated[int, Field(ge=1, le=1000)] = Field(
+        default=20, description="How often each level is presented."
+    )
+
+    def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
+        """Return the levels that are presented, in the order written."""
+        return stimulus.spaced(self.levels) if isinstance(self.levels, int) else self.levels
+
+    def presentations(self, stimulus: Stimulus) -> int:
+        """Return levels × repetitions."""
+        return len(self.asked(stimulus)) * self.repetitions
+
+    def rounds(self, stimulus: Stimulus) -> int:
+        """Return the repetitions."""
+        return self.repetitions
+
+    def level(self, stimulus: Stimulus, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
+        """Return the level of comparison ``number``: answers change nothing."""
+        levels = self.asked(stimulus)
+        return shuffle(levels, draws[number // len(levels)])[number % len(levels)]

@@ -1,0 +1,43 @@
+"""What an interval presents to hand and eye, and how the journal writes an arrangement."""
+
+from __future__ import annotations
+
+from study_app.haptics.model.overrides import override
+from study_app.haptics.model.scene import Scene
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
+from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.stimuli import DELAY, Stimulated
+from study_app.protocol.trials.tracks import standards_of, stimulus_of
+
+
+def scene_of(protocol: Protocol, presented: Stimulated) -> Scene:
+    """Return what is felt."""
+    scene = protocol.scene_for(presented.condition)
+    if presented.vary in {None, DELAY}:
+        return scene
+    return override(scene, str(presented.vary), presented.value)
+
+
+def delay_s_of(protocol: Protocol, presented: Stimulated) -> float:
+    """Return by how much the tank is drawn late [s]."""
+    return presented.value / 1000 if presented.vary == DELAY else protocol.delay_s(presented.condition)
+
+
+def longest_delay_s(protocol: Protocol, block: Block) -> float:
+    """Return the longest delay that a block can present [s]: the same for all its trials, so that it reveals none."""
+    if block.stimulus is not None and (stimulus := stimulus_of(protocol, block)).vary == DELAY:
+        standards = standards_of(protocol, block)
+        compared = [stimulus.comparison(one, level) for one in standards for level in stimulus.levels]
+        return max(*compared, *(one for one in standards if one is not None)) / 1000
+    return max(protocol.delay_s(name) for name in protocol.conditions_in(block.id))
+
+
+def arrangement_text(design: Design, arrangement: int) -> str:
+    """Return an arrangement as the journal writes it: S for the standard, C for the comparison, such as "SC"."""
+    return "".join("C" if holds else "S" for holds in design.arrangements[arrangement])
+
+
+def arrangement_of(design: Design, text: str) -> int:
+    """Return the arrangement that the journal writes so (ValueError if the design has none)."""
+    return design.arrangements.index(tuple(letter == "C" for letter in text))

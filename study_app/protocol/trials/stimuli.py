@@ -1,0 +1,141 @@
+"""Stimuli: the one number of a condition that is varied, and the comparisons that a level stands for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal, Self, TypeAlias
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from study_app.protocol.table import Table
+from study_app.protocol.texts import Id
+
+LevelKind: TypeAlias = Literal["weber", "difference", "value"]
+
+DELAY: Final = "delay_ms"
+"""The one varied number that belongs to the condition, not to its liquid."""
+UNITS: Final = {"_nspm": "N·s/m", "_pa_s": "Pa·s", "_kg_m3": "kg/m³", "_mps": "m/s", "_ms": "ms", "_m": "m", "_s": "s"}
+"""Units by the ends of names, longer ends first."""
+MOST_DELAY_MS: Final = 1000
+CONSTANT_LEVELS: Final = 7
+LEVELS_MOST: Final = 201
+
+
+class Stimulus(Table):
+    """A number that is varied, its standards, and the range of levels L.
+
+    A comparison with the standard s is s(1 ± L) where the level is ``weber``, s ± L where it is a ``difference``, and L
+    itself where it is a ``value``. Levels are evenly spaced in u = log10 L or in u = L.
+    """
+
+    condition: Id | None = Field(default=None, description="The condition whose number is varied; default: the only.")
+    vary: str = Field(max_length=60, description="The number that is varied, as in simulate --set, or delay_ms.")
+    level: LevelKind | None = Field(
+        default=None, description="What a level is; default: a difference for a time (…_ms), else a Weber fraction."
+    )
+    standards: tuple[float, ...] = Field(
+        default=(), max_length=8, description="What comparisons are compared with; default: the present value."
+    )
+    levels: tuple[float, float] = Field(description="The smallest and the largest level.")
+    spacing: Literal["log", "linear"] = Field(default="log", description="How levels between them are spaced.")
+    steps: Annotated[int, Field(ge=2, le=LEVELS_MOST)] = Field(default=31, description="How many levels there are.")
+    direction: Literal["up", "down"] = Field(
+        default="up", description="Whether the comparison is above or below the standard."
+    )
+
+    @property
+    def unit(self) -> str:
+        """The unit of the varied number, such as "N·s/m"; empty where its name ends in none."""
+        return next((unit for ending, unit in UNITS.items() if self.vary.endswith(ending)), "")
+
+    @property
+    def level_kind(self) -> LevelKind:
+        """What a level is."""
+        return self.level or ("difference" if self.vary.endswith("_ms") else "weber")
+
+    def comparison(self, standard: float | None, level: float) -> float:
+        """Return the comparison at a level, in the unit of the varied number.
+
+        Parameters
+        ----------
+        standard : float or None
+            The standard; None where the level is the value itself.
+        level : float
+            The level; 0 is the standard itself.
+        """
+        if standard is None or self.level_kind == "value":
+            return level
+        distance = standard * level if self.level_kind == "weber" else level
+        return standard + distance if self.direction == "up" else standard - distance
+
+    def spaced(self, count: int) -> tuple[float, ...]:
+        """Return ``count`` levels, evenly spaced over the range, smallest first."""
+        low, high = self.levels
+        if count == 1:
+            return (high,)
+        shares = [number / (count - 1) for number in range(count)]
+        if self.spacing == "linear":
+            return tuple(low + (high - low) * share for share in shares)
+        inner = (math.exp(math.log(low) + math.log(high / low) * share) for share in shares[1:-1])
+        return (low, *inner, high)
+
+    @property
+    def grid(self) -> tuple[float, ...]:
+        """The levels between which an adaptive method chooses."""
+        return self.spaced(self.steps)
+
+    @model_validator(mode="after")
+    def _levels_ascend(self) -> Self:
+        low, high = self.levels
+        if not low < high:
+            raise PydanticCustomError(
+                "levels",
+                "{low} and {high}: the first level must be the smaller",
+                {"low": f"{low:g}", "high": f"{high:g}", "place": "levels"},
+            )
+        if self.spacing == "log" and low <= 0:
+            raise PydanticCustomError(
+                "levels",
+                "{low} has no logarithm",
+                {"low": f"{low:g}", "place": "levels", "hint": 'spacing = "linear", or a level above 0'},
+            )
+        if low < 0 and self.level_kind != "value":
+            raise PydanticCustomError(
+                "levels",
+                "{low} is below 0",
+                {"low": f"{low:g}", "place": "levels", "hint": 'direction = "down" for comparisons below the standard'},
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _standards_make_sense(self) -> Self:
+        if self.level_kind == "weber" and any(standard == 0 for standard in self.standards):
+            raise PydanticCustomError(
+                "weber",
+                "a Weber fraction of a standard of 0 does not exist",
+                {"place": "level", "hint": 'level = "difference"'},
+            )
+        if len(set(self.standards)) < len(self.standards):
+            raise PydanticCustomError("standards", "a standard is listed twice", {"place": "standards"})
+        return self
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Stimulated:
+    """What one interval presents: a condition with its varied number; never printed, since it reveals the level.
+
+    Attributes
+    ----------
+    condition : str
+        The condition.
+    vary : str or None
+        The varied number; None where the condition is presented as it is.
+    value : float
+        Its value, in the unit that ends its name; 0 where nothing is varied.
+    """
+
+    condition: str
+    vary: str | None = None
+    value: float = 0.0

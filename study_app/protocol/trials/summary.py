@@ -1,0 +1,51 @@
+"""A block with a design in words, for who checks a protocol: its design, its levels and its comparisons."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+from study_app.haptics.model.overrides import override
+from study_app.haptics.model.steady_state import steady
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
+from study_app.protocol.trials.stimuli import DELAY
+from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tracks import (
+    condition_of,
+    design_of,
+    method_of,
+    standards_of,
+    stimulus_of,
+    tracks_of,
+)
+
+LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
+
+
+def design_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
+    """Yield the rows that describe the design of a block."""
+    design = design_of(protocol, block)
+    kind = design.kind.upper()
+    intervals = "1 interval" if design.intervals == 1 else f"{design.intervals} intervals, {design.pause_s:g} s apart"
+    if block.stimulus is None:
+        yield "Design", f"{kind} against {block.standard}: {intervals}"
+        return
+    stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
+    standards = [one for one in standards_of(protocol, block) if one is not None]
+    levels = sorted(method.asked(stimulus))
+    against = f", standard {', '.join(f'{one:g}' for one in standards)}" if standards else ""
+    yield "Design", f"{kind} of {stimulus.vary}{against}: {intervals}"
+    name = LEVELS[stimulus.level_kind]
+    of_each = " per standard" if standards else ""
+    slots = [track.slots for track in tracks_of(protocol, block)]
+    yield "Levels", f"{name} {levels[0]:.3g} to {levels[-1]:.3g} ({method.name}), {slots[0]} trials{of_each}"
+    pairs = product(standards_of(protocol, block), levels)
+    compared = [stimulus.comparison(standard, level) for standard, level in pairs]
+    yield "Comparisons", f"{stimulus.vary} from {min(compared):.4g} to {max(compared):.4g} {stimulus.unit}".rstrip()
+    task = protocol.tasks[block.task]
+    if isinstance(task, Follow) and stimulus.vary != DELAY:
+        pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
+        scene = protocol.scene_for(condition_of(protocol, stimulus))
+        felt_n = [steady(override(scene, stimulus.vary, one), pace_mps).drag_n for one in (*standards, *compared)]
+        yield "Force at the pace", f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s"

@@ -1,0 +1,106 @@
+"""The tracks of a block with a design: what its codes stand for, and how many slots each has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from study_app.haptics.model.overrides import value_of
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
+from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.kinds import default_design, default_method
+from study_app.protocol.trials.method import Method
+from study_app.protocol.trials.stimuli import DELAY, Stimulus
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """Trials whose levels are chosen together.
+
+    Attributes
+    ----------
+    name : str
+        What its code stands for: the standard and a number ("8/1", "/1" without a standard), or a condition.
+    standard : float or None
+        The standard, in the unit of the varied number.
+    comparison : str or None
+        The condition that is compared with the block's standard; None where a number is varied.
+    slots : int
+        How many trials it has at most.
+    """
+
+    name: str
+    standard: float | None
+    comparison: str | None
+    slots: int
+
+
+def tracks_of(protocol: Protocol, block: Block) -> tuple[Track, ...]:
+    """Return the tracks of a block with a design, in the order in which they are written."""
+    design = design_of(protocol, block)
+    if block.stimulus is None:
+        others = (name for name in block.conditions if name != block.standard)
+        return tuple(Track(name, None, name, block.repetitions) for name in others)
+    stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
+    comparisons = method.presentations(stimulus)
+    slots = comparisons + design.noise(comparisons) + (design.first is not None)
+    return tuple(
+        Track(f"{'' if standard is None else f'{standard:.17g}'}/1", standard, None, slots)
+        for standard in standards_of(protocol, block)
+    )
+
+
+def track_of(protocol: Protocol, block: Block, name: str) -> Track:
+    """Return the track of that name (StopIteration if there is none)."""
+    return next(track for track in tracks_of(protocol, block) if track.name == name)
+
+
+def standards_of(protocol: Protocol, block: Block) -> tuple[float | None, ...]:
+    """Return the standards that a block presents; a single None where a level is the value of the only interval."""
+    stimulus = stimulus_of(protocol, block)
+    if stimulus.level_kind == "value" and design_of(protocol, block).intervals == 1:
+        return (None,)
+    return block.standards or stimulus.standards or (present_value(protocol, stimulus),)
+
+
+def present_value(protocol: Protocol, stimulus: Stimulus) -> float:
+    """Return the value that the varied number has in the protocol.
+
+    Raises
+    ------
+    StudyError
+        The condition has no such number.
+    """
+    name = condition_of(protocol, stimulus)
+    condition = protocol.conditions[name]
+    if stimulus.vary == DELAY:
+        return condition.delay_ms
+    return value_of(protocol.scene_for(name), stimulus.vary)
+
+
+def design_of(protocol: Protocol, block: Block) -> Design:
+    """Return how a block's trials are built: a table of the file, or a kind with its defaults."""
+    name = str(block.design)
+    return protocol.designs[name] if name in protocol.designs else default_design(name)
+
+
+def method_of(protocol: Protocol, block: Block) -> Method:
+    """Return how a block's levels are chosen: a table of the file, or a kind with its defaults."""
+    name = str(block.method)
+    return protocol.methods[name] if name in protocol.methods else default_method(name)
+
+
+def has_correct_answer(design: Design, stimulus: Stimulus | None) -> bool:
+    """Return whether an answer can be correct: where a level is the value itself, no interval is."""
+    by_value = design.has_standard and stimulus is not None and stimulus.level_kind == "value"
+    return design.has_correct_answer and not by_value
+
+
+def stimulus_of(protocol: Protocol, block: Block) -> Stimulus:
+    """Return what a block varies."""
+    return protocol.stimuli[str(block.stimulus)]
+
+
+def condition_of(protocol: Protocol, stimulus: Stimulus) -> str:
+    """Return the condition whose number is varied."""
+    return stimulus.condition or next(iter(protocol.conditions))

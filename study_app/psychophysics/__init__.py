@@ -1,0 +1,1 @@
+"""Psychophysics without a study: what was delivered to a hand. Numpy only."""

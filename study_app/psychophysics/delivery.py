@@ -1,0 +1,152 @@
+"""What an interval delivered to the hand, computed from its samples: the one formula of session and analysis.
+
+Velocity and acceleration of the hand come from its positions by a cubic Savitzky-Golay filter (Savitzky & Golay 1964,
+Analytical Chemistry 36, 1627) over ±20 ms, independent of the servo's own velocity estimator. Samples are first
+interpolated to even times, so that late ticks do not bend the curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vectors = NDArray[np.float64]
+
+HALF_S: Final = 0.02
+"""The filter looks so far back and ahead [s]."""
+LEAST_SPEED_MPS: Final = 1e-4
+"""A hand that moves less is at rest: no damping can be computed. [choice]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A motion at even times.
+
+    Attributes
+    ----------
+    times_s : array (n,)
+        Time of each row [s].
+    velocity_mps, acceleration_mps2 : array (n, 3)
+        Of the hand [m/s, m/s²].
+    """
+
+    times_s: NDArray[np.float64]
+    velocity_mps: Vectors
+    acceleration_mps2: Vectors
+
+    @property
+    def rms_speed_mps(self) -> float:
+        """Root mean square of the speed [m/s]; 0 without rows."""
+        rows = max(len(self.times_s), 1)
+        return float(np.sqrt(np.einsum("ij,ij->", self.velocity_mps, self.velocity_mps) / rows))
+
+    def after(self, from_s: float) -> Motion:
+        """Return the motion from a time on [s]."""
+        later = self.times_s >= from_s
+        return Motion(self.times_s[later], self.velocity_mps[later], self.acceleration_mps2[later])
+
+
+def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float) -> Motion:
+    """Return velocity and acceleration of a hand.
+
+    Parameters
+    ----------
+    times_s : array (n,)
+        When the positions were taken, ascending [s].
+    position_m : array (n, 3)
+        Positions [m].
+    period_s : float
+        Nominal time between two of them [s].
+
+    Returns
+    -------
+    Motion
+        Without the first and the last 20 ms; empty where the motion lasts no longer than the filter.
+    """
+    half = max(2, round(HALF_S / period_s))
+    count = 0 if len(times_s) == 0 else int((times_s[-1] - times_s[0]) / period_s * (1 + 1e-12)) + 1
+    if count <= 2 * half:
+        return Motion(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+    even_s = times_s[0] + period_s * np.arange(count)
+    rates = [[np.convolve(axis, taps, "valid") for axis in at(even_s, times_s, position_m).T] for taps in _taps(half)]
+    return Motion(even_s[half:-half], np.array(rates[0]).T / period_s, np.array(rates[1]).T / period_s**2)
+
+
+def at(wanted_s: NDArray[np.float64], times_s: NDArray[np.float64], vectors: Vectors) -> Vectors:
+    """Return vectors (n, 3) of some times interpolated linearly at other times: (m, 3)."""
+    return np.array([np.interp(wanted_s, times_s, axis) for axis in vectors.T]).T
+
+
+def damping(force_n: Vectors, moved: Motion) -> tuple[float, float] | None:
+    """Return damping b [N·s/m] and apparent mass m [kg] of F = −b v − m a, by least squares over the three axes.
+
+    Parameters
+    ----------
+    force_n : array (n, 3)
+        The force sent to the hand [N], at the times of the motion.
+    moved : Motion
+        How the hand moved.
+
+    Returns
+    -------
+    tuple of float, or None
+        None where the hand was at rest, or moved without changing its velocity.
+    """
+    v, a = moved.velocity_mps, moved.acceleration_mps2
+    vv, va, aa = (float(np.einsum("ij,ij->", one, other)) for one, other in ((v, v), (v, a), (a, a)))
+    fv, fa = (-float(np.einsum("ij,ij->", force_n, one)) for one in (v, a))
+    determinant = vv * aa - va * va
+    if moved.rms_speed_mps < LEAST_SPEED_MPS or determinant <= 1e-9 * vv * aa:
+        return None
+    return (fv * aa - fa * va) / determinant, (fa * vv - fv * va) / determinant
+
+
+def share(sent_n: Vectors, model_n: Vectors) -> float | None:
+    """Return the share of the force model's force that was sent, Σ F_sent·F_model / Σ |F_model|²; None without force.
+
+    Parameters
+    ----------
+    sent_n, model_n : array (n, 3)
+        The force sent to the hand, and the sum of the effects before any limit [N].
+    """
+    asked = float(np.einsum("ij,ij->", model_n, model_n))
+    return float(np.einsum("ij,ij->", sent_n, model_n)) / asked if asked > 0 else None
+
+
+def difference(errors: Sequence[float | None], comparisons: Sequence[bool]) -> float | None:
+    """Return the mean error of the comparisons less that of the standards, in which their common errors cancel.
+
+    Parameters
+    ----------
+    errors : sequence of float or None
+        The error of each interval, of delivered minus requested; None where it was not measured.
+    comparisons : sequence of bool
+        Whether the interval presented the comparison.
+
+    Returns
+    -------
+    float or None
+        None unless both were presented and measured.
+    """
+    pairs = list(zip(errors, comparisons, strict=True))
+    of_comparisons = _mean(error for error, compared in pairs if compared)
+    of_standards = _mean(error for error, compared in pairs if not compared)
+    return None if of_comparisons is None or of_standards is None else of_comparisons - of_standards
+
+
+def _mean(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None
+
+
+@cache
+def _taps(half: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what to convolve 2 half + 1 positions with for the slope and the curvature of their cubic, per sample."""
+    places = np.arange(-half, half + 1) / half
+    powers = np.linalg.pinv(np.vander(places, 4, increasing=True))
+    return powers[1][::-1] / half, 2 * powers[2][::-1] / half**2

@@ -1,0 +1,109 @@
+"""SIMULATED answers to trials of intervals: an observer who compares what was felt or seen, never a level.
+
+What reaches the observer is a resistance (mean force over speed) or a delay, with Gaussian noise: in proportion to the
+resistance (Weber's law), of constant spread for a delay. Estimates follow a power law with exponent 1/2 (Stevens 1957,
+Psychological Review 64, 153). The observer's numbers are plausible, not measured **[choice]**. Only sums, products,
+quotients and square roots are used, so that answers are the same on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from study_app.protocol.blocks import Block
+from study_app.protocol.forms.show_if import Value
+from study_app.protocol.forms.simulated_observer import Felt
+from study_app.protocol.model import Protocol
+from study_app.protocol.questions.choice import ChoiceView
+from study_app.protocol.questions.question import ItemView, plain_number
+from study_app.protocol.questions.rating import RatingView
+from study_app.protocol.trials.stimuli import DELAY
+from study_app.protocol.trials.tracks import design_of, stimulus_of
+
+Draw = Callable[[], float]
+
+WEBER_FRACTION: Final = 0.24
+"""Of resistance, at 75 % correct in two intervals."""
+DELAY_JND_S: Final = 0.025
+"""Of a delay, at 75 % correct in two intervals [s]."""
+_Z_75: Final = 0.6745
+LAPSES: Final = 0.02
+"""So often an answer is given at random."""
+LEAST_SPEED_MPS: Final = 0.01
+MODULUS: Final = 10.0
+"""The number that the first stimulus is given."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What an observer attends to in a block: delays or resistances, and whether the smaller one is asked for."""
+
+    delays: bool
+    smallest: bool
+
+    @classmethod
+    def of(cls, protocol: Protocol, block: Block) -> Comparison:
+        """Return what the question of a block is about."""
+        if block.stimulus is not None:
+            stimulus = stimulus_of(protocol, block)
+            return cls(stimulus.vary == DELAY, stimulus.direction == "down")
+        delays = {protocol.conditions[name].delay_ms for name in block.conditions}
+        return cls(len(delays) > 1, smallest=False)
+
+    def sensed(self, felt: Felt) -> float:
+        """Return what is attended to: a delay [s], or a resistance [N·s/m]."""
+        return felt.delay_s if self.delays else felt.force_mean_n / max(felt.speed_rms_mps, LEAST_SPEED_MPS)
+
+    def noisy(self, sensed: float, draw: Draw) -> float:
+        """Return what the observer takes it for."""
+        noise = (sum(draw() for _ in range(12)) - 6) / (math.sqrt(2) * _Z_75)  # nearly normal
+        return sensed + DELAY_JND_S * noise if self.delays else sensed * (1 + WEBER_FRACTION * noise)
+
+    def distinct(self, difference: float, about: float) -> bool:
+        """Return whether a difference is taken for one."""
+        return abs(difference) > (DELAY_JND_S if self.delays else WEBER_FRACTION * abs(about))
+
+
+def answer(
+    protocol: Protocol,
+    block: Block,
+    item: ItemView,
+    sensed: Sequence[float],
+    before: Sequence[float],
+    draw: Draw,
+) -> Value:
+    """Return the answer to a trial of intervals.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study.
+    block : Block
+        The block of the trial.
+    item : ItemView
+        The question as shown.
+    sensed : sequence of float
+        What was sensed in each interval, see `Comparison.sensed`.
+    before : sequence of float
+        What was sensed in the block's earlier intervals, in order.
+    draw : callable
+        Uniform numbers in [0, 1).
+    """
+    attended = Comparison.of(protocol, block)
+    taken = [attended.noisy(one, draw) for one in sensed]
+    known = [*before, *sensed]
+    mean, first = sum(known) / len(known), known[0]
+    if isinstance(item, ChoiceView):
+        options = [option for option, _ in item.options]
+        if draw() < LAPSES:
+            return options[int(len(options) * draw())]
+        return design_of(protocol, block).simulated(taken, mean, attended)
+    ratio = taken[-1] / (first if not isinstance(item, RatingView) else mean) if mean > 0 and first > 0 else 1.0
+    if isinstance(item, RatingView):
+        points = len(item.labels)
+        middle = (points + 1) / 2
+        return min(points, max(1, math.floor(middle + (ratio - 1) * (points - 1) + 0.5)))
+    return plain_number(max(0.01, round(MODULUS * math.sqrt(max(ratio, 0.0)), 2)))

@@ -1,0 +1,96 @@
+"""What every simulated participant does with a page of questions: notice, answer by what was felt, and confirm."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Mapping, Sequence
+
+from study_app.protocol.blocks import Block
+from study_app.protocol.forms.show_if import Value
+from study_app.protocol.forms.simulated_observer import Felt, rater
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import Schedule, stream
+from study_app.session.pages import ChoicePage, DesignPage, Page, QuestionnairePage
+from study_app.session.simulated.design_observer import answer
+from study_app.session.simulated.observers import Choice, Draw, choices, filled_in, newly_shown
+from study_app.session.transitions.events import Chosen, Event, ItemShown, Submitted
+
+
+class SimulatedParticipant(ABC):
+    """Answers the pages of a session; how time passes and where events go is the subclass's affair.
+
+    Parameters
+    ----------
+    study : Protocol
+        What is run.
+    schedule : Schedule
+        In what order.
+    """
+
+    def __init__(self, study: Protocol, schedule: Schedule) -> None:
+        self.answers = 0
+        self.page: Page | None = None
+        self._study = study
+        self._seed, self._who = schedule.seed, schedule.participant
+        self._trials = {trial.number: trial for trial in schedule.trials}
+        self._person = rater(self._stream("person"))
+
+    @abstractmethod
+    def _seconds(self) -> float:
+        """Return the time on the session's clock."""
+
+    @abstractmethod
+    def _pass(self, seconds: float) -> None:
+        """Let time pass while nothing is done."""
+
+    @abstractmethod
+    def _post(self, event: Event) -> None:
+        """Give the session an event."""
+
+    @abstractmethod
+    def _felt(self, trial: int | None) -> Felt:
+        """Return what was felt last in a trial; on a page of no trial nothing."""
+
+    @abstractmethod
+    def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
+        """Return what was sensed in the trials of a block with a design so far, by trial, interval by interval."""
+
+    def _stream(self, name: str) -> Draw:
+        return stream(self._seed, f"rehearsal/{self._who}/{name}").random
+
+    def _fill_in(self, page: QuestionnairePage | DesignPage) -> None:
+        """Answer every question by what was felt, and confirm."""
+        answers: dict[str, Value] = {}
+        seen = self._notice_questions(page, answers, ())
+        for choice in self._answers_to(page):
+            self._pass(choice.after_s)
+            if page is not self.page:
+                return
+            self._post(Chosen(self._seconds(), choice.item, choice.value))
+            answers[choice.item] = choice.value
+            seen += self._notice_questions(page, answers, seen)
+        if not isinstance(page, ChoicePage):  # there the press that answers goes on
+            self._pass(1.0)
+        self._post(Submitted(self._seconds()))
+        self.answers += len(answers)
+
+    def _answers_to(self, page: QuestionnairePage | DesignPage) -> list[Choice]:
+        """Return how a page is answered by what was felt."""
+        draw, trial = self._stream(page.stream), page.trial
+        block = None if trial is None else self._study.blocks[self._trials[trial].block]
+        if trial is not None and block is not None and block.design is not None:
+            sensed = self._sensed(block)
+            before = [one for number in sorted(sensed) if number < trial for one in sensed[number]]
+            given = answer(self._study, block, page.items[0], sensed[trial], before, draw)
+            return choices(page.items, {page.items[0].id: given}, draw, changes_mind=not isinstance(page, ChoicePage))
+        assert isinstance(page, QuestionnairePage)  # noqa: S101 - only designs have other pages
+        return filled_in(page, self._felt(trial), self._person, draw)
+
+    def _notice_questions(
+        self, page: QuestionnairePage | DesignPage, answers: Mapping[str, Value], seen: Collection[str]
+    ) -> tuple[str, ...]:
+        """Notice the questions that appeared; return them."""
+        appeared = newly_shown(page, answers, seen)
+        for item in appeared:
+            self._post(ItemShown(self._seconds(), item))
+        return appeared

@@ -1,0 +1,35 @@
+"""The worker process that rehearses a protocol for a window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, TypeAlias
+
+from study_app.workers.client import WorkerClient
+from study_app.workers.server import Stop, Tell
+
+TASK: Final = "study_app.session.simulated.worker:carry_out"
+
+
+@dataclass(frozen=True, slots=True)
+class RehearsalOrder:
+    """A protocol by its file or name, the number of participants, the seed and the study folder of a rehearsal."""
+
+    protocol: str
+    participants: int
+    seed: int
+    results: Path
+
+
+RehearsalClient: TypeAlias = WorkerClient[RehearsalOrder, str | Path]
+"""Its answers are a line for each participant, then the study folder."""
+
+
+def carry_out(order: RehearsalOrder, tell: Tell, _stop: Stop) -> Path:
+    """Rehearse, and return the study folder (see `study_app.session.simulated.rehearsal.rehearse`)."""
+    from study_app.session.simulated.rehearsal import rehearse  # noqa: PLC0415 - the compiler: only in that process
+
+    return rehearse(
+        order.protocol, participants=order.participants, seed=order.seed, results=order.results, progress=tell
+    )

@@ -1,0 +1,186 @@
+"""Which group a participant is in: allocated once per participant, and sealed until the study is unblinded.
+
+The participants of a folder have entries 1, 2 … in the order in which their first sessions began. An entry is claimed
+by creating ``blinding/allocated/NNN.json`` exclusively, so that of two programs each gets its own; it is never assigned
+again. The file has the entry, the participant, and, sealed, the group, which follows from entry and secret
+(`protocol.groups.allocation`).
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from study_app.errors import StoreError
+from study_app.protocol.groups.allocation import group_of
+from study_app.protocol.groups.own_protocol import own_protocol
+from study_app.protocol.groups.steps import refuse_beyond_last
+from study_app.protocol.model import Protocol
+from study_app.store.atomic import cannot_write, is_there, open_regular, read_own, sync_folder, write_through
+from study_app.store.blinded.blinding import Key, read_key
+from study_app.store.blinded.sealing import open_text, seal
+from study_app.store.folders import StudyFolder
+from study_app.store.journals.parsing import parse_json
+
+
+@dataclass(frozen=True, slots=True)
+class Allocation:
+    """A participant's entry and group; ``sealed`` is the group as journal and file have it."""
+
+    entry: int
+    group: str = field(repr=False)
+    sealed: str
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """What the file of an entry holds; ``participant`` is empty where it was left before it was written."""
+
+    path: Path
+    entry: int
+    participant: str
+    sealed: str
+
+
+def allocate(study: StudyFolder, key: Key, participant: str, *, waits: bool = True) -> Allocation | None:
+    """Return the allocation of a participant; claim the next entry for a new one. None in a study without groups.
+
+    Parameters
+    ----------
+    study : StudyFolder
+        The folder of the study.
+    key : Key
+        Its key.
+    participant : str
+        The participant's ID.
+    waits : bool
+        Whether the entry is on the disk when this returns.
+
+    Raises
+    ------
+    StoreError
+        The participant's entry was removed or changed, or none can be written.
+    """
+    if not key.groups:
+        return None
+    if (known := allocated(study, key, participant)) is not None:
+        return known
+    folder = study.allocated
+    entry = max([*(claim.entry for claim in claims(study)), *entries_begun(study).values()], default=0)
+    try:
+        folder.mkdir(exist_ok=True)
+        while True:
+            entry += 1
+            allocation = _allocation(key, entry, participant)
+            held = {"entry": entry, "participant": participant, "sealed": allocation.sealed}
+            try:
+                write_through(study.allocation(entry), json.dumps(held).encode() + b"\n", waits=waits)
+            except FileExistsError:  # another program was first
+                continue
+            if waits:
+                sync_folder(folder)
+            return allocation
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+
+
+def allocated(study: StudyFolder, key: Key, participant: str) -> Allocation | None:
+    """Return the allocation of a participant, None where there is none yet.
+
+    Raises
+    ------
+    StoreError
+        The participant's entry was removed or changed.
+    """
+    for claim in claims(study):
+        if claim.participant != participant:
+            continue
+        found = _allocation(key, claim.entry, participant)
+        if group_in(claim, key) != found.group:
+            raise StoreError(f"{claim.path} was changed: restore it from a copy")
+        return found
+    if (entry := entries_begun(study).get(participant)) is not None:
+        raise StoreError(
+            f"{study.allocation(entry)} is missing, though participant {participant} has entry {entry}: restore it "
+            "from a copy"
+        )
+    return None
+
+
+def check_session(study: StudyFolder, protocol: Protocol, participant: str, session: int) -> None:
+    """Refuse a session that the participant does not have, as far as that is known; nothing is claimed.
+
+    Raises
+    ------
+    StudyError
+        No participant has it, or this one's group has fewer sessions; or the study's key cannot be read.
+    """
+    refuse_beyond_last(protocol, session)
+    if protocol.groups and is_there(study.key):
+        known = allocated(study, read_key(study.path), participant)
+        if known is not None:
+            own_protocol(protocol, known.group, session)
+
+
+def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, session: int) -> Protocol:
+    """Return the protocol of a participant's session, whose group was allocated; nothing is claimed.
+
+    Raises
+    ------
+    StudyError
+        The participant has no entry, or fewer sessions; or the study's key cannot be read.
+    """
+    if not protocol.groups:
+        return own_protocol(protocol, None, session)
+    allocation = allocated(study, read_key(study.path), participant)
+    if allocation is None:
+        raise StoreError(f"participant {participant} has no entry in {study.allocated}: restore it from a copy")
+    return own_protocol(protocol, allocation.group, session)
+
+
+def claims(study: StudyFolder) -> list[Claim]:
+    """Return what the files of all entries hold, in order."""
+    paths = [path for path in study.allocated.glob("*.json") if path.stem.isdigit()]
+    return [_claim(study, path) for path in sorted(paths, key=lambda path: int(path.stem))]
+
+
+def group_in(claim: Claim, key: Key) -> str | None:
+    """Return the group that the file of an entry has sealed; None where the file was changed."""
+    opened = open_text(_whose(claim.entry, claim.participant), claim.sealed, key, frozenset({"group"}))
+    return None if opened is None else opened.get("group")
+
+
+def entries_begun(study: StudyFolder) -> dict[str, int]:
+    """Return the entry of each participant with a session, as the first lines of the journals have it."""
+    found: dict[str, int] = {}
+    for session in study.sessions():
+        try:
+            with open_regular(session.journal) as file:
+                start = parse_json(file.readline())
+        except (OSError, ValueError):  # not begun, or damaged: `verify` reports it
+            continue
+        if isinstance(start, dict) and isinstance(start.get("entry"), int):
+            found[session.participant] = start["entry"]
+    return found
+
+
+def _claim(study: StudyFolder, path: Path) -> Claim:
+    """Return what the file of an entry holds; nothing where it is damaged."""
+    entry = int(path.stem)
+    try:
+        held = parse_json(read_own(path, study.path))
+        if held["entry"] == entry and isinstance(held["participant"], str) and isinstance(held["sealed"], str):
+            return Claim(path, entry, held["participant"], held["sealed"])
+    except (StoreError, ValueError, KeyError, TypeError):
+        pass
+    return Claim(path, entry, "", "")
+
+
+def _allocation(key: Key, entry: int, participant: str) -> Allocation:
+    group = group_of(key.groups, key.nonce, entry)
+    return Allocation(entry, group, seal(_whose(entry, participant), {"group": group}, key))
+
+
+def _whose(entry: int, participant: str) -> list[object]:
+    return ["allocated", entry, participant]

@@ -1,0 +1,44 @@
+"""The solved flows as truths that models of a liquid are measured against."""
+
+from __future__ import annotations
+
+import math
+from importlib.resources.abc import Traversable
+
+import numpy as np
+
+from study_app.evaluation.hand_motions import along_x, vectors_x
+from study_app.evaluation.reference_solutions import Case, Truth
+from study_app.haptics.model.scene import Scene
+from study_app.validation.cfd import stored_flows
+
+
+def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Truth, ...]:
+    """Return what the fluid solver found for the scene's liquid and body, at the scene's rate; often nothing.
+
+    Raises
+    ------
+    StudyError
+        There are no tables, or one cannot be understood.
+    """
+    liquid = scene.liquids[0]
+    ours = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
+    found = []
+    for table in stored_flows.stored(folder):
+        notes = table.notes
+        *of, computing_s = (float(notes[name]) for name in stored_flows.OF_THE_MODEL)
+        if not np.allclose(of, ours, rtol=0.01, atol=0):
+            continue
+        t_s, velocity_mps, force_n = table.columns.values()
+        even_s = np.arange(t_s[0], t_s[-1], 1 / scene.rate_hz)
+        even_mps = np.interp(even_s, t_s, velocity_mps)
+        way_m = np.concatenate([[0.0], np.cumsum((even_mps[1:] + even_mps[:-1]) / 2 * np.diff(even_s))])
+        case = Case(
+            along_x(even_s - even_s[0], way_m, even_mps),
+            vectors_x(np.interp(even_s, t_s, force_n)),
+            np.ones(len(even_s), bool),
+        )
+        source = f"fluid solver: {notes.get('command', 'unknown command')}"
+        title = notes.get("title", "a solved flow")
+        found.append(Truth(title, source, (case,), computing_s, notes.get("machine", "")))
+    return tuple(found)

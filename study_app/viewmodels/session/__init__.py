@@ -1,0 +1,1 @@
+"""What windows show of one session."""

@@ -1,0 +1,39 @@
+"""What a worker process may answer to any order, besides the values of its task."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from study_app.errors import StudyError
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """An order could not be carried out, and why; nothing was half-done. ``stopped`` where that was asked for."""
+
+    sentence: str
+    stopped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Crashed:
+    """The process ended before it had carried out the order.
+
+    Parameters
+    ----------
+    exit_code : int or None
+        Of the process: negative where a signal ended it, 1 where the terminal shows an exception.
+    """
+
+    exit_code: int | None
+
+    @property
+    def sentence(self) -> str:
+        """What happened, for a person."""
+        if self.exit_code is not None and self.exit_code < 0:
+            return f"the process was ended by signal {-self.exit_code}"
+        return f"the process ended with exit code {self.exit_code}; the terminal may show why"
+
+
+class Stopped(StudyError):
+    """An order was given up because that was asked for, or another order came."""

@@ -1,0 +1,73 @@
+"""The worker process: it carries out one order after the other, by one function, until its client is gone."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from multiprocessing.connection import Connection
+from pkgutil import resolve_name
+from queue import SimpleQueue
+from typing import Any, Final, TypeAlias
+
+import psutil
+
+from study_app.errors import StudyError
+from study_app.workers.messages import Refused, Stopped
+from study_app.workers.spawning import ignore_interrupts
+
+Tell: TypeAlias = Callable[[Any], object]
+"""Sends an answer before the last one."""
+
+Stop: TypeAlias = Callable[[], bool]
+"""Whether to give up: that was asked for, another order waits, or the client is gone."""
+
+Task: TypeAlias = Callable[[Any, Tell, Stop], object]
+"""Carries out an order; what it returns is its last answer. A `StudyError` is answered by `Refused`."""
+
+_STOP: Final = None
+_END: Final = object()
+
+
+def serve(orders: Connection, answers: Connection, task: str, *, background: bool) -> None:
+    """Carry out orders (number, order) until there is no client any more; answers are (number, answer, last).
+
+    Parameters
+    ----------
+    orders, answers : Connection
+    task : str
+        The function that carries out an order (see `Task`), as "package.module:function". It is imported here.
+    background : bool
+        Whether this process gets the lowest priority, before it imports the task.
+    """
+    ignore_interrupts()
+    if background:
+        psutil.Process().nice(getattr(psutil, "IDLE_PRIORITY_CLASS", 19))
+    waiting: SimpleQueue[Any] = SimpleQueue()
+    # Orders are read at once: a full pipe would make the client's window wait.
+    threading.Thread(target=_read, args=(orders, waiting), name="orders", daemon=True).start()
+    carry_out: Task = resolve_name(task)
+    with suppress(BrokenPipeError, ConnectionResetError):
+        while (received := waiting.get()) is not _END:
+            if received is _STOP:
+                continue  # the order that it was about has come to its end
+            number, order = received
+            try:
+                last = carry_out(order, partial(_tell, answers, number), lambda: not waiting.empty())
+            except StudyError as error:
+                last = Refused(str(error), stopped=isinstance(error, Stopped))
+            answers.send((number, last, True))
+
+
+def _tell(answers: Connection, number: int, answer: object) -> None:
+    answers.send((number, answer, False))
+
+
+def _read(orders: Connection, waiting: SimpleQueue[Any]) -> None:
+    try:
+        with suppress(EOFError, OSError):
+            while True:
+                waiting.put(orders.recv())
+    finally:
+        waiting.put(_END)

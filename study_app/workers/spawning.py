@@ -1,0 +1,36 @@
+"""How worker processes begin: by spawn, and without Ctrl+C, which the terminal sends to all processes of a program."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from multiprocessing.context import SpawnContext, SpawnProcess
+from typing import Final
+
+
+class _WorkerProcess(SpawnProcess):
+    """A process that begins with SIGINT blocked, so that it prints no traceback before it can ignore it."""
+
+    def start(self) -> None:
+        if sys.platform == "win32":
+            super().start()
+        else:
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                super().start()
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _WorkerContext(SpawnContext):
+    """Spawns `_WorkerProcess`."""
+
+    Process = _WorkerProcess
+
+
+CONTEXT: Final = _WorkerContext()
+
+
+def ignore_interrupts() -> None:
+    """Leave Ctrl+C to the program that started this process; it ends its workers itself."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

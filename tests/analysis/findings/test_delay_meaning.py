@@ -1,0 +1,170 @@
+"""What is said of a delay: never more than every delay up to it allows, and equivalent only where all checks agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pytest
+
+from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
+from study_app.analysis.findings.contrast_with_control import ContrastWithControl
+from study_app.analysis.findings.delay_meaning import by_delay, meaning, tempting_ms
+from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
+from study_app.analysis.findings.lowest_delay import Lowest
+from study_app.analysis.report.summary import findings, limits
+from study_app.analysis.results.block_results import BlockFound
+from study_app.analysis.results.block_results import Results as Found
+from study_app.analysis.statistics.equivalence.tost import tost
+from study_app.analysis.statistics.multiple_comparisons import holm
+from study_app.analysis.statistics.trend import step_down
+from study_app.analysis.tables.compared_blocks import Item, Setting
+from study_app.analysis.tables.planned_analysis import NOTHING, Direction
+from study_app.analysis.tables.study import load_study
+from tests.analysis.conftest import Results
+
+CALM = [1, 1, 0, 0, -1] * 6
+AWAY = [3, 4, 3, 4, 3] * 6
+SCATTERED = [3, -3, 2, -2, 0]
+DOUBTED = [5] + [0] * 14
+"""By t equivalent (p = .033) within a point; by the bootstrap-t not."""
+
+
+def against(differences: Mapping[float, list[int]], expected: Direction | None) -> tuple[ContrastWithControl, ...]:
+    each = [tost(values, 1.0) for values in differences.values()]
+    adjusted = holm([one.p_difference for one in each])
+    return tuple(
+        ContrastWithControl("different", ms, 0.0, one.judged(p, len(each)), p, len(each), expected)
+        for ms, one, p in zip(differences, each, adjusted, strict=True)
+    )
+
+
+def delays(
+    differences: Mapping[float, list[int]],
+    lowest: tuple[Lowest, ...] = (),
+    expected: Direction | None = "increasing",
+) -> BlockFound:
+    """Return a block of delays in which answers to one statement differ so from those at 0 ms."""
+    at = (0.0, *differences)
+    return BlockFound(
+        id="delays",
+        title="Delays",
+        kind="delays",
+        revealed=True,
+        n=len(next(iter(differences.values()))),
+        settings=tuple(Setting(f"D{place}", f"delay_{ms:g}", "water", ms) for place, ms in enumerate(at)),
+        names=tuple(f"{ms:g} ms" for ms in at),
+        items=(Item("different", "It was different.", "Different"),),
+        labels=tuple("1234567"),
+        measures=(),
+        findings={CONTRASTS.key: against(differences, expected), LOWEST.key: lowest},
+    )
+
+
+def found(block: BlockFound) -> Found:
+    return Found(NOTHING, (), (block,), (), {}, None, 1)
+
+
+def claim(block: BlockFound) -> str:
+    return meaning(block, found(block))[-1]
+
+
+def test_a_difference_at_a_shorter_delay_speaks_against_the_longer_one() -> None:
+    assert "do not support" in claim(delays({50: SCATTERED, 100: SCATTERED}))
+    block = delays({50: AWAY, 100: SCATTERED * 2})
+    assert tempting_ms(block) == 50
+    (*verdicts, told) = by_delay(block)[1]
+    assert verdicts == ["100 ms", "–", "–", "Different", "–"]
+    assert "speak against the sentence “delays up to 100 ms do not matter”: “Different” differs at 50 ms (+3.40" in told
+
+
+def test_a_trend_up_to_a_shorter_delay_speaks_against_the_longer_one() -> None:
+    steps = step_down([[1, 3, 5]] * 9, [0, 50, 100])
+    assert steps.lowest_ms == 50
+    told = claim(delays({50: SCATTERED, 100: SCATTERED}, (Lowest("different", steps),)))
+    assert "speak against the sentence" in told
+    assert "“Different” follows the delay already up to 50 ms" in told
+
+
+def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -> None:
+    steps = step_down([[1, 3, 5], [1, 3, 5], [1, 3, 5], [3, 1, 5], [1, 3, 5]], [0, 50, 100], alpha=0.2)
+    alone, of_five = Lowest("different", steps), Lowest("different", steps, members=5)
+    assert alone.over_all_ms == steps.lowest_ms == 50
+    assert of_five.over_all_ms == 100  # the second step has p = .19, the first .0003
+    assert "speak against" in claim(delays({50: SCATTERED}, (alone,)))
+    assert "speak against" not in claim(delays({50: SCATTERED}, (of_five,)))
+    block = delays({50: SCATTERED, 100: SCATTERED}, (of_five,))
+    assert "“Different” 100 ms. Each is an upper bound" in " ".join(findings(found(block)))
+    assert "“Different” 50 ms. Each is an upper bound" in " ".join(findings(found(delays({50: CALM}, (alone,)))))
+    limit = meaning(block, found(block))[1]
+    assert "already below" not in limit
+
+
+def test_a_difference_against_the_stated_direction_is_told_and_speaks_against_nothing() -> None:
+    away = [-one for one in AWAY]
+    told = claim(delays({50: away}))
+    assert "do not support the sentence “delays up to 50 ms do not matter”" in told
+    assert "Against the direction stated before the study: “Different” differs at 50 ms (−3.40" in told
+    assert "speak against the sentence" in claim(delays({50: away}, expected=None))
+    assert "speak against the sentence" in claim(delays({50: away}, expected="decreasing"))
+
+
+def test_one_of_many_comparisons_that_differs_by_chance_speaks_against_nothing() -> None:
+    chance = [2, 1, 1, 1, 1, 2, 1, -1, 1, 0]
+    alone = delays({50: chance})
+    assert CONTRASTS.of(alone)[0].verdict == "different"
+    many = delays({50: chance, **{float(ms): SCATTERED * 2 for ms in range(75, 201, 25)}})
+    assert CONTRASTS.of(many)[0].verdict == "inconclusive"
+    last = delays({**{float(ms): SCATTERED * 2 for ms in range(75, 201, 25)}, 225: chance})
+    assert "different only before Holm's correction for 7 comparisons" in claim(last)
+    assert "normality" not in claim(last)
+    assert "speak against" not in claim(many)
+
+
+def test_five_people_cannot_make_a_single_comparison_different_by_taking_them_as_normal() -> None:
+    certain = delays({50: [3, 4, 3, 4, 4]})
+    assert CONTRASTS.of(certain)[0].found.p_different is not None
+    assert CONTRASTS.of(certain)[0].found.p_different < 0.001
+    assert CONTRASTS.of(certain)[0].p_adjusted == 0.0625
+    assert CONTRASTS.of(certain)[0].verdict == "out of reach"
+
+
+def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> None:
+    block = delays({50: DOUBTED})
+    assert CONTRASTS.of(block)[0].found.p is not None
+    assert CONTRASTS.of(block)[0].found.p < 0.05
+    assert CONTRASTS.of(block)[0].found.checks_agree is False
+    assert "within the bound by t alone" in claim(block)
+    ((*told, said),) = by_delay(block)
+    assert told == ["50 ms", "–", "–", "Different", "–"]
+    assert said.startswith("So these data do not support the sentence “delays up to 50 ms do not matter”")
+    assert "inconclusive for “Different”" in claim(block)
+    assert "stay within the bound" not in claim(block)
+    rek.add("P001", lambda *_: 4)
+    assert any(
+        "inconclusive or out of reach: 1 of 1 comparisons" in line
+        for line in limits(load_study(rek.folder), found(block))
+    )
+
+
+def test_what_every_check_calls_equivalent_is_told_as_such() -> None:
+    told = claim(delays({50: CALM}))
+    assert "equivalent for “Different”" in told
+    assert "at 50 ms the mean answers to these statements stay within the bound" in told
+
+
+@pytest.mark.parametrize("level", [0, 2])
+def test_differences_without_spread_have_no_interval_and_say_why(level: int) -> None:
+    assert "no interval: all 5 differences are equal" in claim(delays({50: [level] * 5}))
+
+
+def test_every_delay_has_its_own_sentence() -> None:
+    rows = by_delay(delays({50: CALM, 125: SCATTERED, 300: AWAY}))
+    assert rows[0][-1].startswith("What can be said: at 50 ms the mean answers")
+    assert "do not support the sentence “delays up to 125 ms do not matter”, and do not refute it" in rows[1][-1]
+    assert rows[2][-1].startswith("These data speak against the sentence “delays up to 300 ms do not matter”: ")
+
+
+def test_what_too_few_people_show_by_every_test_is_not_called_equivalent() -> None:
+    told = claim(delays({50: [0, 1, 0, -1] * 3}))
+    assert "within the bound by every test, but 14 participants are needed to call it so" in told
+    assert "by t alone" not in told

@@ -1,0 +1,101 @@
+"""A rehearsed study with a block of every reply: choices, a rating, numbers, and conditions that are compared."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.blinded.unblinding import unblind
+from tests.protocol.trials.studies import BLOCK, HEAD
+
+MORE = """
+[scales.thickness]
+labels.en = ["very thin", "thin", "medium", "thick", "very thick"]
+
+[stimuli.value]
+condition = "oil"
+vary = "viscosity_pa_s"
+level = "value"
+levels = [0.5, 8]
+
+[stimuli.around]
+condition = "oil"
+vary = "viscosity_pa_s"
+level = "value"
+standards = [2]
+levels = [0.5, 8]
+
+[designs.rated]
+kind = "rating"
+scale = "thickness"
+
+[designs.numbered]
+kind = "estimation"
+modulus = { level = 2, number = 10 }
+
+[methods.five]
+kind = "constant"
+levels = [0.5, 2, 8]
+repetitions = 2
+
+[blocks.detect]
+task = "stir"
+stimulus = "viscosity"
+standards = [1]
+design = "yesno"
+method = "few"
+
+[blocks.rate]
+task = "stir"
+stimulus = "value"
+design = "rated"
+method = "five"
+
+[blocks.number]
+task = "stir"
+stimulus = "value"
+design = "numbered"
+method = "five"
+
+[blocks.equal]
+task = "stir"
+stimulus = "around"
+design = "2ifc"
+method = "five"
+
+[blocks.pairs]
+task = "stir"
+design = "2ifc"
+conditions = ["oil", "other", "late"]
+standard = "oil"
+repetitions = 4
+"""
+EDITS = (
+    ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "equal", "pairs"]'),
+    ("repetitions = 8", "repetitions = 2"),
+    ("min_s = 1", "min_s = 0.3"),
+    ("part = 1\n", ""),
+    ('code_prefix = "V"\n', ""),
+)
+
+
+@pytest.fixture(scope="session")
+def sealed_levels(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("levels")
+    text = HEAD + BLOCK + MORE
+    for old, new in EDITS:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "levels.toml").write_text(text)
+    return rehearse(folder / "levels.toml", participants=3, seed=2, results=folder / "study", recordings=False)
+
+
+@pytest.fixture(scope="session")
+def opened_levels(sealed_levels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("opened") / "study"
+    shutil.copytree(sealed_levels, folder)
+    assert unblind(folder, "AB", "to analyse").left == ()
+    return folder

@@ -1,0 +1,188 @@
+"""A study with every kind of question, from its rehearsal to tables, verification, export, SPSS and report."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.export.export import export
+from study_app.analysis.report.write_report import report
+from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.worker import carry_out
+from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
+from study_app.protocol.forms.simulated_observer import Felt
+from study_app.protocol.load import load
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store.blinded import blinding
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import exclude
+from study_app.store.folders import StudyFolder
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+from tests.protocol.forms.mixed import mixed_file
+
+pytestmark = pytest.mark.slow
+
+PEOPLE = 6
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("mixed")
+    protocol = mixed_file(place)
+    study = load(protocol)
+    felt = {("stir", name): (Felt(0.5 + n, 4.0, 0.1, 0.02, 0.03, 0.0),) for n, name in enumerate(study.conditions)}
+    return rehearse_answers(protocol, participants=PEOPLE, seed=1, results=place / "results", felt=felt)
+
+
+@pytest.fixture(scope="module")
+def study(folder: Path) -> Study:
+    return load_study(folder)
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_rehearsed_study_is_sound(folder: Path) -> None:
+    found = verify(folder)
+    assert [str(one) for one in found.errors] == []
+
+
+def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None:
+    condition = 'id = "pleasant"\nshow_if = { item = "thickness", at_least = 3 }'
+    protocol = mixed_file(tmp_path, ('id = "pleasant"', condition))
+    felt = {("stir", name): (Felt(0.5 + n, 4.0, 0.1, 0.02, 0.03, 0.0),) for n, name in enumerate(("thin", "thick"))}
+    folder = rehearse_answers(protocol, participants=8, seed=1, results=tmp_path / "results", felt=felt)
+    sessions = StudyFolder(folder).sessions()
+    asked = len(load_study(folder).answered.query("item == 'pleasant'"))
+    assert 0 < asked < 2 * len(sessions)  # hidden from some
+    assert [reproduced(session.path).differences for session in sessions] == [[]] * 8
+    assert verify(folder).errors == ()
+
+
+def test_tables_say_form_kind_answer_and_value(folder: Path) -> None:
+    (path,) = (folder / "data" / "sub-P001" / "ses-01").glob("*responses_data.csv")
+    rows = {(row["form"], row["item"], row["trial"]): row for row in table(path)}
+    age = rows["start", "age", "n/a"]
+    assert (age["kind"], age["block"], age["phase"]) == ("number", "n/a", "n/a")
+    assert 16 <= float(age["value"]) == float(age["response"]) <= 99
+    assert rows["start", "hand", "n/a"]["response"] in ("left", "right", "both")
+    assert rows["start", "hand", "n/a"]["value"] == "n/a"
+    assert rows["n/a", "thickness", "1"]["kind"] == "rating"
+    assert int(rows["n/a", "pleasant", "2"]["value"]) % 5 == 0
+    assert rows["end", "comment", "n/a"]["response"] == "Simulated answer."
+
+
+def test_statements_alone_are_compared_as_in_format_1(study: Study) -> None:
+    (block,) = study.blocks
+    assert [item.id for item in block.items] == ["feels_liquid"]
+    assert set(study.responses["item"]) == {"feels_liquid"}
+    assert study.responses["response"].between(1, 7).all()
+    assert len(study.answers(block)) == 2 * PEOPLE
+
+
+def test_measures_count_every_answer(study: Study) -> None:
+    results = evaluate(study, planning=False)
+    assert results.failures == ()
+    found = {(one.where, one.item): one for one in results.questions}
+    assert [group.code for group in found["stir", "thickness"].groups] == ["A1", "A2"]
+    for group in found["stir", "thickness"].groups:
+        assert sum(group.numbers["counts"].values()) == group.numbers["n"] == PEOPLE
+    (hands,) = found["start", "hand"].groups
+    assert sum(hands.numbers["counts"].values()) == PEOPLE
+    (age,) = found["start", "age"].groups
+    assert len(age.numbers["values"]) == PEOPLE
+    assert age.numbers["smallest"] <= age.numbers["median"] <= age.numbers["largest"]
+    (comments,) = found["end", "comment"].groups
+    assert comments.numbers["texts"] == [f"P{n:03d}: Simulated answer." for n in range(1, PEOPLE + 1)]
+
+
+def test_scores_are_those_of_the_answers(study: Study) -> None:
+    results = evaluate(study, planning=False)
+    (raw,) = (one.groups[0].numbers for one in results.scores if one.name == "raw")
+    rows = study.answered[study.answered["form"] == "load"]
+    by_hand = rows.groupby("participant")["value"].mean()
+    assert raw["n"] == PEOPLE
+    assert raw["mean"] == pytest.approx(float(by_hand.mean()))
+    (sus,) = (one for one in results.scores if one.name == "sus")
+    assert sus.source is not None
+    assert "Brooke" in sus.source
+
+
+def test_excluded_session_counts_in_no_form(folder: Path, tmp_path: Path) -> None:
+    copied = tmp_path / "copied"
+    shutil.copytree(folder, copied)
+    exclude(copied, "P002", 1, by="AB", reason="asleep")
+    left = load_study(copied)
+    asked = next(one for one in left.others.questions if one.id == "age")
+    assert len(left.answers_to(asked)) == PEOPLE - 1
+
+
+@pytest.mark.parametrize("opened", [False, True])
+def test_report_has_a_table_a_figure_and_the_texts_of_every_question(
+    folder: Path, tmp_path: Path, opened: bool
+) -> None:
+    copied = tmp_path / "copied"
+    shutil.copytree(folder, copied)
+    if opened:
+        unblind(copied, by="AB", reason="done")
+        assert blinding.revealed_key(copied) is not None
+    failed: list[str] = []
+    files = report(copied, tmp_path / "report", failed=failed.append)
+    assert failed == []
+    names = {path.name for path in files}
+    for item in ("start-age", "start-hand", "start-used", "stir-thickness", "stir-pleasant", "load-effort"):
+        assert {f"question-{item}.{form}" for form in ("png", "svg", "pdf", "txt")} <= names
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    for words in ("Which hand do you write with?", "P003: Simulated answer.", "Hart, S. G.", "Left"):
+        assert words in page
+    assert ("Thin" in page) == opened
+    told = json.loads((tmp_path / "report" / "report.json").read_text(encoding="utf-8"))
+    assert len(told["results"]["questions"]) == 4 + 2 + 6 + 10 + 1
+    assert len(told["results"]["scores"]) == 2
+
+
+def test_results_window_is_told_of_every_figure(folder: Path) -> None:
+    told: list[Any] = []
+    carry_out(ReadStudy(folder), told.append, lambda: False)
+    drawn = {one.name: one.title for one in told if isinstance(one, FigureDrawn)}
+    assert drawn["question-start-hand"] == "Start: Hand"
+    assert "liquids" in drawn
+    assert not any("comment" in name for name in drawn)  # texts are not drawn
+
+
+def test_export_holds_all_answers_wide_and_described(folder: Path, tmp_path: Path) -> None:
+    export(folder, tmp_path, extras={"wide", "sav", "psych-ds"})
+    rows = table(next(tmp_path.glob("*wide_data.csv")))
+    assert len(rows) == PEOPLE
+    first = rows[0]
+    assert first["start__hand"] in ("left", "right", "both")
+    assert {"stir__thickness__A1", "stir__pleasant__A2", "load__raw", "usability__sus", "end__comment"} <= set(first)
+    assert float(first["usability__sus"]) % 2.5 == 0
+    book = json.loads((tmp_path / "codebook.json").read_text(encoding="utf-8"))
+    hand = next(one for one in book["questions"] if one["id"] == "hand")
+    assert hand["levels"] == {"left": "Left", "right": "Right", "both": "Both"}
+    since = next(one for one in book["questions"] if one["id"] == "since")
+    assert since["show_if"]["is"] == "both"
+    assert {one["name"] for one in book["scores"]} == {"raw", "sus"}
+
+
+def test_spss_file_has_levels_of_ratings_and_choices(folder: Path, tmp_path: Path) -> None:
+    pyreadstat: Any = pytest.importorskip("pyreadstat")
+    export(folder, tmp_path, extras={"sav"})
+    (path,) = tmp_path.glob("*wide_data.sav")
+    frame, meta = pyreadstat.read_sav(str(path))
+    labels = meta.variable_value_labels
+    assert labels["start__hand"] == {1: "Left", 2: "Right", 3: "Both", 98: "Cannot judge", 99: "No answer"}
+    assert labels["stir__thickness__A1"][5] == "Very"
+    assert "start__used" not in labels
+    assert frame["start__hand"].between(1, 3).all()
+    assert frame["load__raw"].notna().all()

@@ -1,0 +1,21 @@
+"""A report of twelve participants, opened."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.report.write_report import report
+from study_app.protocol.load import load
+from tests.analysis.conftest import make_results, twelve
+
+
+@pytest.fixture(scope="module")
+def of_twelve(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report of twelve, opened."""
+    folder = tmp_path_factory.mktemp("twelve")
+    results = twelve(make_results(folder / "rek2024", load("rek2024")))
+    results.open()
+    assert report(results.folder, folder / "report")[0].name == "report.html"
+    return folder / "report"

@@ -1,0 +1,84 @@
+"""A report as its reader sees it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.analysis.conftest import Results
+
+FORBIDDEN = re.compile(
+    r"(?i:no (significant |measurable |visible )?(effect|difference was|influence|impact)|\bhad no\b)"
+    r"|\bnan\b|\bNaN\b|\binf\b|\bNone\b|[{}]"
+)
+"""What no report may say: that there is nothing, a number that is none, or a template that was not filled."""
+
+
+class Text(HTMLParser):
+    """Collects what a reader sees, and checks that every element ends where it should."""
+
+    VOID = frozenset({"meta", "img", "br"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.told: list[str] = []
+        self.tags: set[str] = set()
+        self.fetched: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        self.fetched += [value or "" for name, value in attrs if name in ("src", "href")]
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if "style" not in self.open:
+            self.told.append(data)
+
+
+def read(folder: Path) -> str:
+    """Return what the page tells, having checked that it is one file without scripts."""
+    page = Text()
+    page.feed((folder / "report.html").read_text(encoding="utf-8"))
+    assert page.open == []
+    assert not page.tags & {"script", "link", "iframe", "object", "form"}
+    assert all(place.startswith(("data:image/png;base64,", "#part-")) for place in page.fetched)
+    told = re.sub(r"\s+", " ", " ".join(page.told))
+    assert (found := FORBIDDEN.search(told)) is None, told[max(0, found.start() - 80) : found.end() + 40]
+    return told
+
+
+def numbers(folder: Path) -> dict[str, Any]:
+    def refuse(constant: str) -> None:
+        raise AssertionError(constant)
+
+    told: dict[str, Any] = json.loads((folder / "report.json").read_bytes(), parse_constant=refuse)
+    return told
+
+
+def rows(folder: Path, name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO((folder / name).read_text(encoding="utf-8"))))
+
+
+def answered_by_two(small: Results) -> None:
+    for number_ in (1, 2):
+        small.add(f"P{number_:03d}", lambda condition, _item: 6 if condition == "heavyzembla" else 3)
+
+
+def run_in_r(folder: Path) -> subprocess.CompletedProcess[str]:
+    if shutil.which("Rscript") is None:
+        pytest.skip("no Rscript here: the script of the report is not run")
+    return subprocess.run(["Rscript", "report.R"], cwd=folder, capture_output=True, text=True, check=False)

@@ -1,0 +1,162 @@
+"""The report of few participants, missing answers and odd input: honest, or one clear error."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.report.write_report import report
+from study_app.errors import AnalysisError
+from study_app.protocol.load import parse, source_bytes
+from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, make_results, twelve
+from tests.analysis.report.pages import numbers, read, rows, run_in_r
+
+pytestmark = pytest.mark.slow
+
+
+def test_of_five_it_says_what_cannot_be_shown_and_what_a_delay_can_mean(rek: Results, tmp_path: Path) -> None:
+    twelve(rek, people=5).open()
+    report(rek.folder, tmp_path / "report")
+    told = read(tmp_path / "report")
+    assert "5 participants cannot show it: the smallest p that 5 pairs can give is 0.0625" in told
+    assert "no bootstrap interval and no mixed model" in told
+    assert re.search(r"What “\d+ ms” can and cannot mean", told)
+    assert "is no evidence that" in told
+    assert "80 % power would take about" in told
+    assert "inconclusive" in told
+    assert "nothing was asked about delays between them" in told
+
+
+def test_one_participant_all_equal_and_missing_answers_give_a_report_that_says_so(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda _condition, _item: 4)
+    rek.open()
+    report(rek.folder, tmp_path / "one")
+    alone = read(tmp_path / "one")
+    assert "about this person alone" in alone
+    assert not re.search(r"\b1 participants", alone)
+    assert run_in_r(tmp_path / "one").returncode == 0
+    assert "1 pairs" not in alone
+
+    def gaps(condition: str, item: str) -> Answer:
+        return None if (condition, item) in (("honey", "immersive"), ("delay_50", "harder")) else 4
+
+    for number_ in range(2, 7):
+        rek.add(f"P{number_:03d}", gaps)
+    report(rek.folder, tmp_path / "equal")
+    told = read(tmp_path / "equal")
+    assert "not tested (no variation: every participant answered alike under all settings)" in told
+    assert "no statement could be tested (no variation: every participant answered alike under all settings)" in told
+    assert "“Feels like a liquid”, “Immersive”, “Adequate force”" in told
+    assert "could not be tested: no variation" in told
+    assert "equivalence needs at least 14 participants (11 where all differences are equal)" in told
+    assert "Skillings-Mack" in told
+    assert "Effects of the mixed model" not in told
+    numbers(tmp_path / "equal")
+
+
+def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) -> None:
+    text = (
+        source_bytes("rek2024").decode().replace("\n[analysis]\n", '\n[analysis]\nprimary = ["immersive", "harder"]\n')
+    )
+    results = twelve(make_results(tmp_path / "some", parse(text.encode(), "rek2024.toml")), people=5)
+    results.open()
+    report(results.folder, tmp_path / "report")
+    told = (tmp_path / "report" / "methods.txt").read_text(encoding="utf-8")
+    both = "p adjusted over 1 statement by Holm (primary) and over {} statements by Benjamini-Hochberg (exploratory)"
+    assert both.format("eight") in told
+    assert both.format("four") in told
+
+
+@pytest.mark.parametrize(
+    ("valid", "within", "told"),
+    [
+        (None, "not measured", "Whether trials kept to the protocol's limits of timing was not measured."),
+        (True, "1 of 1", "No trial that counts exceeded the protocol's limits of timing."),
+        (False, "0 of 1", "Ten trials exceeded the protocol's limits of timing and are in these numbers."),
+    ],
+)
+def test_what_was_not_measured_is_neither_within_limits_nor_beyond(
+    rek: Results, tmp_path: Path, valid: bool | None, within: str, told: str
+) -> None:
+    rek.add("P001", lambda *_: 4, changes={"valid": valid})
+    rek.open()
+    report(rek.folder, tmp_path / "report")
+    page = read(tmp_path / "report")
+    assert told in page
+    assert f" {within} " in page
+
+
+def test_answers_off_the_scale_are_missing_and_never_neutral(small: Results, tmp_path: Path) -> None:
+    for number_ in range(1, 9):
+        small.add(
+            f"P{number_:03d}",
+            lambda condition, item: CANNOT_JUDGE if item == "warm" else 6 if condition == "heavyzembla" else 3,
+        )
+    small.open()
+    report(small.folder, tmp_path / "report")
+    assert "no participant answered under both settings" in read(tmp_path / "report")
+
+
+def test_sessions_without_a_completed_one_give_a_report_without_findings(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda _condition, _item: 4, status="withdrawn", trials=2)
+    report(rek.folder, tmp_path / "report")
+    told = read(tmp_path / "report")
+    assert "there are no findings" in told
+    assert "no answers count yet" in told
+    assert not (tmp_path / "report" / "liquids.png").exists()
+
+
+def test_a_hand_edited_answer_of_nine_is_one_clear_error(rek: Results, tmp_path: Path) -> None:
+    twelve(rek, people=2)
+    path = rek.responses("P001")
+    lines = path.read_text(encoding="utf-8").splitlines()
+    place = lines[0].split(",").index("response")
+    cells = lines[3].split(",")
+    cells[place] = "9"
+    path.write_text("\n".join([*lines[:3], ",".join(cells), *lines[4:]]) + "\n", encoding="utf-8")
+    with pytest.raises(AnalysisError, match="row 3, column response: '9' is not a whole number from 1 to 7"):
+        report(rek.folder, tmp_path / "report")
+    assert not (tmp_path / "report").exists()
+
+
+def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(
+    rek: Results, small: Results, tmp_path: Path
+) -> None:
+    twelve(rek, people=2)
+    foreign = small.add("P077", lambda _condition, _item: 4)
+    shutil.copytree(foreign.path.parent, rek.folder / "data" / "sub-P077")
+    for _ in ("sealed", "opened"):
+        with pytest.raises(AnalysisError, match=r"is of the study 'small', .* keep each study in a folder of its own"):
+            report(rek.folder, tmp_path / "report")
+        shutil.move(rek.folder / "data" / "sub-P077", tmp_path / "sub-P077")
+        rek.open()
+        shutil.move(tmp_path / "sub-P077", rek.folder / "data" / "sub-P077")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(AnalysisError, match="holds no sessions"):
+        report(tmp_path / "empty", tmp_path / "report")
+    assert not (tmp_path / "report").exists()
+
+
+def test_missing_answers_are_counted_where_they_are_and_what_is_one_way_is_said_so(
+    rek: Results, tmp_path: Path
+) -> None:
+    def gaps(condition: str, item: str) -> Answer:
+        if (condition, item) in (("honey", "immersive"), ("honey", "like_tar"), ("delay_50", "harder")):
+            return None
+        return {"water": 1, "honey": 6}.get(condition, 1 + (len(condition) * len(item)) % 7)
+
+    for number_ in range(1, 9):
+        rek.add(f"P{number_:03d}", gaps)
+    rek.open()
+    report(rek.folder, tmp_path / "report")
+    told = read(tmp_path / "report")
+    assert "n = 8 participants, every liquid presented to all, 16 of 216 ratings missing" in told
+    assert "n = 8 participants, every delay presented to all, 8 of 280 ratings missing" in told
+    assert "−1.00 – (all 8 one way)" in told
+    pairs = [row for row in rows(tmp_path / "report", "tests.csv") if row["question"] == "two settings differ"]
+    assert {row["note"] for row in pairs if row["effect"] != "n/a"} == {"all 8 pairs that differ went one way"}
+    done = run_in_r(tmp_path / "report")
+    assert (done.returncode, done.stderr) == (0, "")

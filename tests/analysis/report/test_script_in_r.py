@@ -1,0 +1,60 @@
+"""The report's script in R: it has the report's numbers and computes them again."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.analysis.report.pages import numbers, run_in_r
+
+pytestmark = pytest.mark.slow
+
+
+def test_the_script_in_r_has_every_number_of_the_report(of_twelve: Path) -> None:
+    script = (of_twelve / "report.R").read_text(encoding="utf-8")
+    assert 'read.csv("study-rek2024_description-responses_data.csv"' in script
+    for left, right in ("()", "{}"):
+        assert script.count(left) == script.count(right)
+    found = numbers(of_twelve)["results"]["blocks"]
+    for one in (*found[0]["omnibus"], *found[1]["trends"]):
+        assert repr(one["outcome"]["statistic"]) in script
+    for one in found[1]["against"]:
+        assert repr(one["found"]["p"]) in script
+
+
+def test_r_computes_the_same_numbers(of_twelve: Path) -> None:
+    done = run_in_r(of_twelve)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[-1] == "every number that R computes is the report's"
+    told = re.compile(r"(.+?) +report +(\S+) +R +(\S+)")
+    computed = {found[1]: float(found[3]) for line in lines if (found := told.match(line))}
+    liquids, delays = numbers(of_twelve)["results"]["blocks"]
+    for one in liquids["omnibus"]:
+        assert computed[f"{one['item']} Friedman chi2"] == pytest.approx(one["outcome"]["statistic"], rel=1e-5)
+    for pair in liquids["pairs"]:
+        outcome, codes = pair["tested"]["outcome"], f"{pair['first']} and {pair['second']}"
+        assert computed[f"{pair['tested']['item']}, {codes} exact p"] == pytest.approx(outcome["p"], rel=1e-5)
+    for one in delays["trends"]:
+        assert computed[f"{one['item']} Page's L"] == pytest.approx(one["outcome"]["statistic"], rel=1e-5)
+        assert computed[f"{one['item']} exact p"] == pytest.approx(one["outcome"]["p"], rel=1e-5)
+    for one in delays["against"]:
+        what = f"{one['item']}, {one['delay_ms']:g} ms"
+        assert computed[f"{what} equivalence p"] == pytest.approx(one["found"]["p"], rel=1e-5)
+        assert computed[f"{what} difference p by t"] == pytest.approx(one["found"]["p_different"], rel=1e-5)
+    assert computed["liquids right names"] == liquids["named"]["found"]["statistic"]
+
+
+def test_r_finds_a_number_that_was_changed(of_twelve: Path, tmp_path: Path) -> None:
+    for name in ("report.R", "study-rek2024_description-responses_data.csv"):
+        shutil.copy(of_twelve / name, tmp_path)
+    one = numbers(of_twelve)["results"]["blocks"][1]["trends"][0]["outcome"]
+    script = (tmp_path / "report.R").read_text(encoding="utf-8")
+    (tmp_path / "report.R").write_text(script.replace(repr(one["statistic"]), repr(one["statistic"] + 1)))
+    done = run_in_r(tmp_path)
+    assert done.returncode == 1
+    assert done.stdout.count("DIFFERS") == 1
+    assert done.stdout.rstrip().endswith("numbers that differ: 1")

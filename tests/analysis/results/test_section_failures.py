@@ -1,0 +1,106 @@
+"""A part of the report that fails is said in its place, in the JSON and in the exit code; the rest is written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.findings.over_all_statements import FINDING as OVERALL
+from study_app.analysis.report.json_values import plain
+from study_app.analysis.tables.study import load_study
+from study_app.cli import commands
+from study_app.protocol.load import load
+from tests.analysis.conftest import Results, make_results, twelve
+
+pytestmark = pytest.mark.slow
+
+TESTS = {
+    "tables.study.Study.aggregate": ("liquids", "measures of settings"),
+    "designs.block_tests.presented": ("delays", "counts of answers"),
+    "designs.block_tests.session_numbers": ("delays", "numbers of sessions"),
+    "findings.settings_differ.friedman": ("liquids", "test of settings"),
+    "findings.over_all_statements.global_permutation": ("liquids", "test over all statements"),
+    "findings.liquid_recognition.recognition": ("liquids", "test of recognition"),
+    "findings.other_assumptions.ordinal": ("liquids", "the same asked with other assumptions"),
+    "findings.delay_trend.page": ("delays", "test of a trend (Page)"),
+    "findings.lowest_delay.step_down": ("delays", "lowest delay that shows"),
+    "findings.contrast_with_control.tost": ("delays", "test of equivalence"),
+    "findings.detection_threshold.noticed": ("delays", "detection threshold"),
+}
+WRITING = {
+    "figures.answer_figures.render": "figure liquids",
+    "report.write_report.methods": "texts: methods",
+    "report.write_report.summary.findings": "texts: findings",
+    "report.write_report.r_script": "report.R",
+    "report.number_files.motion_csv": "motion.csv",
+    "findings.lowest_delay.table": "lowest delay",
+    "report.write_report.conduct_section.conduct": "section “How it was run”",
+}
+
+
+def fail(*_args: object, **_named: object) -> None:
+    raise ValueError("f(a) and f(b) must have different signs")
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    results = twelve(make_results(tmp_path_factory.mktemp("failures") / "rek2024", load("rek2024")), people=10)
+    results.open()
+    return results
+
+
+def test_a_test_that_fails_takes_no_other_with_it(opened: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = load_study(opened.folder)
+    whole = evaluate(study)
+    assert whole.failures == ()
+    for broken, (block, what) in TESTS.items():
+        with monkeypatch.context() as patch:
+            patch.setattr(f"study_app.analysis.{broken}", fail)
+            results = evaluate(study)
+        failures = [one for one in results.failures if one.block == block]
+        assert [one.what for one in failures] == [what], broken
+        found = next(one for one in results.blocks if one.id == block)
+        (absent,) = (one for one in found.absent if one.what == what)
+        assert "ValueError: f(a) and f(b) must have different signs" in absent.why
+        json.dumps(plain(results), allow_nan=False)
+        assert OVERALL.of(found) is not None or "over all" in what
+        assert results.performance is not None
+
+
+def test_what_progress_raises_is_no_failure(opened: Results) -> None:
+    def stop(_what: str, _share: float) -> None:
+        raise ValueError("stopped")
+
+    with pytest.raises(ValueError, match="stopped"):
+        evaluate(load_study(opened.folder), progress=stop)
+
+
+def test_a_report_with_failures_is_written_and_ends_with_three(
+    opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for broken in (*WRITING, "findings.detection_threshold.noticed"):
+        monkeypatch.setattr(f"study_app.analysis.{broken}", fail)
+    to = tmp_path / "report"
+    done = CliRunner().invoke(commands, ["report", str(opened.folder), "--to", str(to)])
+    assert done.exit_code == 3, done.output
+    told = json.loads((to / "report.json").read_bytes())
+    failed = {one["what"] for one in told["failures"]}
+    assert {*WRITING.values(), "detection threshold"} <= failed
+    assert told["results"]["blocks"][1]["trends"]
+    page = (to / "report.html").read_text(encoding="utf-8")
+    for one in told["failures"]:
+        assert one["what"] in done.output
+    for title in (
+        "Do answers follow the delay?",
+        "Lowest delay",
+        "How it was run",
+        "Not there: its computation failed",
+    ):
+        assert title in page
+    names = {path.name for path in to.iterdir()}
+    assert {"tests.csv", "recognition.png", "codebook.json", "methods.txt"} <= names
+    assert not {"report.R", "motion.csv", "liquids.png"} & names

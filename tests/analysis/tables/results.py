@@ -1,0 +1,19 @@
+"""Answers that differ by condition, and the sentence with which results are refused."""
+
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.tables.study import load_study
+from study_app.errors import AnalysisError
+from tests.analysis.conftest import Answer
+
+
+def by_condition(condition: str, item: str) -> Answer:
+    return {"water": 2, "honey": 5, "light_oil": 7}.get(condition, 4)
+
+
+def refusal(folder: Path) -> str:
+    with pytest.raises(AnalysisError) as caught:
+        load_study(folder)
+    return str(caught.value)

@@ -1,0 +1,214 @@
+"""What a window asks of a study is told piece by piece, by a process that stops when it is asked to."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from study_app import figure_style as style
+from study_app.analysis.export.export import export
+from study_app.analysis.figures import captions
+from study_app.analysis.tables.study import load_study
+from study_app.analysis.worker import carry_out
+from study_app.analysis.worker_client import AnalysisClient, start_analysis_worker
+from study_app.analysis.worker_messages import (
+    Answer,
+    Done,
+    FigureDrawn,
+    FindStudies,
+    LeaveOut,
+    OpenKey,
+    Order,
+    Progress,
+    ReadStudy,
+    SessionsFound,
+    StudiesFound,
+    StudyFound,
+    WriteReport,
+    WriteTables,
+)
+from study_app.errors import AnalysisError, StoreError, StudyError
+from study_app.protocol.load import load
+from study_app.store.exclusions import exclusions
+from study_app.store.folders import StudyFolder
+from study_app.workers.messages import Refused, Stopped
+from tests.studies import rehearsed
+
+pytestmark = pytest.mark.slow
+
+SOON_S = 120.0
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rehearsed(tmp_path_factory.mktemp("results"))
+
+
+@pytest.fixture
+def study(whole: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / "results" / "demo"))
+
+
+def told(order: Order, stop: Callable[[], bool] = lambda: False) -> list[Answer]:
+    answers: list[Answer] = []
+    answers.append(carry_out(order, answers.append, stop))
+    return answers
+
+
+def of_kind(kind: type, answers: list[Answer]) -> list:
+    return [answer for answer in answers if isinstance(answer, kind)]
+
+
+def test_studies_are_found_whatever_else_lies_there(study: Path) -> None:
+    results = study.parent
+    (results / "notes").mkdir()
+    (results / "readme.txt").write_text("x")
+    (results / "empty" / "data").mkdir(parents=True)
+    (found,) = of_kind(StudiesFound, told(FindStudies(results)))
+    assert [(one.folder.name, one.simulated, one.pilot) for one in found.studies] == [
+        ("demo", True, False),
+        ("empty", False, False),
+    ]
+    assert found.studies[0].newest_s > found.studies[1].newest_s == 0.0
+
+
+def test_no_results_folder_is_no_study_and_an_unreadable_one_says_so(tmp_path: Path) -> None:
+    assert of_kind(StudiesFound, told(FindStudies(tmp_path / "none")))[0].studies == ()
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(StoreError, match="file"):
+        told(FindStudies(tmp_path / "file"))
+
+
+def test_while_sealed_nothing_is_told_but_codes_and_nothing_is_tested(study: Path) -> None:
+    answers = told(ReadStudy(study))
+    (sessions,), (found,) = of_kind(SessionsFound, answers), of_kind(StudyFound, answers)
+    assert [row["participant"] for row in sessions.rows] == ["P001", "P002", "P003"]
+    assert (sessions.reveal, found.revealed, found.n) == (None, False, 3)
+    figures = of_kind(FigureDrawn, answers)
+    assert [figure.name for figure in figures] == ["liquids", "delays"]
+    assert not [one for one in of_kind(Progress, answers) if one.what.startswith("testing")]
+    said = b" ".join([*(figure.svg for figure in figures), repr((sessions, found)).encode()]).lower()
+    assert b">l1<" in said
+    assert b">d1<" in said
+    for name in (*load("demo").conditions, *load("demo").liquids):
+        assert not re.search(rf"[>', ]{name}[<', ]".encode(), said), name
+
+
+def test_once_open_names_are_told_and_what_tests_add_is_drawn_again(study: Path) -> None:
+    told(OpenKey(study, "AK", "done"))
+    answers = told(ReadStudy(study))
+    (sessions,), (found,) = of_kind(SessionsFound, answers), of_kind(StudyFound, answers)
+    assert sessions.reveal is not None
+    assert (sessions.reveal["by"], found.revealed) == ("AK", True)
+    names = [figure.name for figure in of_kind(FigureDrawn, answers)]
+    assert names[:2] == ["liquids", "delays"]
+    assert sorted(set(names[2:])) == sorted({"liquids", "delays", *names[2:]})
+    shares = [one.share for one in of_kind(Progress, answers) if one.what.startswith("testing")]
+    assert shares == sorted(shares)
+    assert shares
+    block = load_study(study).blocks[0]
+    assert next(one.title for one in of_kind(FigureDrawn, answers)) == captions.title(block)
+
+
+def test_every_print_colour_that_is_told_is_in_the_figures_or_the_style(study: Path) -> None:
+    answers = told(ReadStudy(study))
+    (found,) = of_kind(StudyFound, answers)
+    drawn = b"".join(figure.svg for figure in of_kind(FigureDrawn, answers)).decode().lower()
+    for role in ("text", "text2", "grid", "accent", "band"):
+        assert found.colours[role].lower() in drawn, role
+    assert found.colours["band"] == style.BAND
+
+
+def test_trials_can_be_named_for_leaving_out_and_then_do_not_count(study: Path) -> None:
+    (found,) = of_kind(StudyFound, told(ReadStudy(study)))
+    number, words = found.trials["P001", 1][0]
+    assert words.split(", ")[-1][:1] in "LD"
+    told(LeaveOut(study, "P001", 1, number, "AK", "phone rang"))
+    told(LeaveOut(study, "P002", 1, None, "AK", "asleep"))
+    answers = told(ReadStudy(study))
+    assert [one.what for one in of_kind(SessionsFound, answers)[0].exclusions] == [
+        ("P001", 1, number),
+        ("P002", 1, None),
+    ]
+    assert of_kind(StudyFound, answers)[0].n == 2
+
+
+def test_what_the_store_refuses_changes_nothing(study: Path) -> None:
+    with pytest.raises(StoreError, match="no session 1 of participant P009"):
+        told(LeaveOut(study, "P009", 1, None, "AK", "x"))
+    with pytest.raises(StoreError, match="reason"):
+        told(OpenKey(study, "AK", " "))
+    assert exclusions(study) == ()
+    assert not StudyFolder(study).reveals.exists()
+
+
+def test_a_study_without_a_whole_session_says_so_in_place_of_figures(study: Path) -> None:
+    for one in ("P001", "P002", "P003"):
+        told(LeaveOut(study, one, 1, None, "AK", "asleep"))
+    drawn = of_kind(FigureDrawn, told(ReadStudy(study)))
+    assert [(one.svg, one.caption) for one in drawn] == [(b"", "No completed session has answers here yet.")] * 2
+
+
+def test_sessions_are_told_even_where_the_study_cannot_be_read(study: Path) -> None:
+    table = StudyFolder(study).session("P002", 1).table("demo", "responses")
+    table.write_bytes(table.read_bytes()[:-120])
+    answers: list[Answer] = []
+    with pytest.raises(AnalysisError, match="P002"):
+        carry_out(ReadStudy(study), answers.append, lambda: False)
+    assert len(of_kind(SessionsFound, answers)[0].rows) == 3
+
+
+def test_tables_are_those_of_the_command(study: Path, tmp_path: Path) -> None:
+    (done,) = of_kind(Done, told(WriteTables(study, tmp_path / "window", ("wide",))))
+    by_command = export(study, tmp_path / "command", extras=["wide"])
+    assert [path.name for path in done.files] == [path.name for path in by_command]
+    assert [path.read_bytes() for path in done.files] == [path.read_bytes() for path in by_command]
+
+
+@pytest.mark.parametrize(("kind", "after"), [(WriteTables, 1), (WriteTables, 2), (WriteReport, 1), (WriteReport, 3)])
+def test_what_is_stopped_writes_nothing(study: Path, tmp_path: Path, kind: type, after: int) -> None:
+    asked = iter(range(100))
+    with pytest.raises(Stopped):
+        told(kind(study, tmp_path / "to"), lambda: next(asked) >= after - 1)
+    assert not (tmp_path / "to").exists()
+
+
+def last_of(worker: AnalysisClient, number: int) -> Done | Refused:
+    end_s = time.monotonic() + SOON_S
+    while time.monotonic() < end_s:
+        for of_number, answer in worker.answers():
+            if of_number == number and isinstance(answer, (Done, Refused)):
+                return answer
+        assert worker.works
+    raise AssertionError("no answer")
+
+
+def test_the_process_answers_stops_and_is_gone_when_closed(study: Path, tmp_path: Path) -> None:
+    worker = start_analysis_worker()
+    try:
+        assert last_of(worker, worker.order(FindStudies(study.parent))) == Done()
+        refused = last_of(worker, worker.order(ReadStudy(tmp_path / "none")))
+        assert isinstance(refused, Refused)
+        assert not refused.stopped
+        given_up = worker.order(WriteReport(study, tmp_path / "to"))
+        worker.stop()
+        stopped = last_of(worker, given_up)
+        assert isinstance(stopped, Refused)
+        assert stopped.stopped
+        assert not (tmp_path / "to").exists()
+        assert last_of(worker, worker.order(LeaveOut(study, "P001", 1, None, "AK", "asleep"))) == Done()
+    finally:
+        worker.close()
+    end_s = time.monotonic() + SOON_S
+    while any(child.name == "analysis" for child in multiprocessing.active_children()):
+        assert time.monotonic() < end_s
+
+
+def test_stopped_is_a_failure_the_user_understands() -> None:
+    assert issubclass(Stopped, StudyError)

@@ -1,0 +1,56 @@
+"""A lab with its real page, servo and scripted device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication
+
+from study_app.app.lab.controller import LabController
+from study_app.app.session.termination import Patience
+from study_app.gui.lab.view import LabPlace
+from study_app.protocol.load import load_scene
+from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices, force_n
+
+
+@pytest.fixture
+def prices() -> Prices:
+    return Prices()
+
+
+@pytest.fixture
+def make_lab(qtbot: Any, prices: Prices) -> Iterator[Callable[..., LabController]]:
+    """Make a lab that was not entered yet, with a hand that moves by itself."""
+    made: list[LabController] = []
+
+    def make(**given: Any) -> LabController:
+        place = LabPlace()
+        place.resize(1300, 800)
+        made.append(LabController(place, **({"device": "scripted", "make_appraiser": lambda: prices} | given)))
+        return made[-1]
+
+    yield make
+    for lab in made:
+        lab.end(Patience(20.0))
+        lab.place.close()
+        lab.place.deleteLater()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+@pytest.fixture
+def visit(make_lab: Callable[..., LabController]) -> LabController:
+    return make_lab()
+
+
+@pytest.fixture
+def felt(visit: LabController, qtbot: Any) -> LabController:
+    """The lab entered, honey in the hand, going in circles: a force for as long as nobody stops it."""
+    visit.bench = visit.bench.choose("A", "Honey", load_scene("rek2024", "honey"))
+    visit.place.show()
+    qtbot.waitUntil(lambda: visit.live is not None, timeout=OPENS_MS)
+    visit.place.path_chosen.emit("circle")
+    qtbot.waitUntil(lambda: force_n(visit) > 0.3, timeout=SOON_MS)
+    return visit

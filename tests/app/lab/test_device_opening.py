@@ -1,0 +1,144 @@
+"""Devices opened behind the lab's page: one at a time, cancelled, refused, let go of."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from study_app.app.lab import controller
+from study_app.app.lab.controller import LabController
+from study_app.app.lab.device_opening import LabOpening
+from study_app.app.session.termination import Patience
+from study_app.errors import DeviceNotFound, ServoFault
+from tests.app.lab.worlds import SOON_MS, SlowDevices
+from tests.compiled import needs_servo
+
+MakeLab = Callable[..., LabController]
+
+pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
+
+
+def test_what_is_being_opened_can_be_cancelled_and_is_let_go_of(qtbot: Any) -> None:
+    devices = SlowDevices()
+    opening = LabOpening(devices)
+    said: list[str] = []
+    opening.said.connect(said.append)
+    opening.want("falcon")
+    qtbot.waitUntil(lambda: said == ["switch falcon on"], timeout=SOON_MS)
+    assert opening.busy_with == "falcon"
+    opening.cancel()
+    assert opening.busy_with is None
+    devices.gate.set()
+    opening.wait()
+    assert (devices.open, devices.closed) == (0, 1)
+
+
+def test_two_devices_are_never_opened_at_a_time(qtbot: Any) -> None:
+    devices = SlowDevices()
+    opening = LabOpening(devices)
+    opened: list[Any] = []
+    opening.opened.connect(opened.append)
+    opening.want("falcon")
+    qtbot.waitUntil(lambda: devices.asked == ["falcon"], timeout=SOON_MS)
+    opening.want("spacemouse")
+    opening.want("mouse")
+    devices.gate.set()
+    qtbot.waitUntil(lambda: bool(opened), timeout=SOON_MS)
+    assert devices.asked == ["falcon", "mouse"]
+    assert (devices.most, devices.open, devices.closed) == (1, 1, 1)
+
+
+def test_leaving_while_a_device_is_being_opened_lets_go_of_it(make_lab: MakeLab, qtbot: Any) -> None:
+    devices = SlowDevices()
+    visit = make_lab(open_live=devices)
+    visit.place.show()
+    qtbot.waitUntil(lambda: devices.asked == ["scripted"], timeout=SOON_MS)
+    qtbot.waitUntil(lambda: visit.view().busy == "switch scripted on", timeout=SOON_MS)
+    visit.place.hide()
+    devices.gate.set()
+    visit.end(Patience(20.0))
+    assert (devices.open, devices.closed) == (0, 1)
+    assert visit.live is None
+
+
+def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_opened(
+    make_lab: MakeLab, qtbot: Any
+) -> None:
+    devices = SlowDevices()
+    visit = make_lab(open_live=devices)
+    visit.place.show()
+    qtbot.waitUntil(lambda: devices.asked == ["scripted"], timeout=SOON_MS)
+    visit.place.stop_asked.emit()
+    devices.gate.set()
+    qtbot.waitUntil(lambda: devices.closed == 1, timeout=SOON_MS)
+    assert visit.live is None
+    view = visit.view()
+    assert (view.busy, view.trouble, view.may_fade_in) == ("", "No device is open", True)
+    visit.place.changed.emit("liquid.density_kg_m3", 900.0, False)
+    assert visit.view().trouble == "No device is open"  # an edit opens none
+
+
+def test_a_failure_gives_up_the_device_that_is_being_opened(make_lab: MakeLab, qtbot: Any, caplog: Any) -> None:
+    devices = SlowDevices()
+    visit = make_lab(open_live=devices)
+    visit.place.show()
+    qtbot.waitUntil(lambda: devices.asked == ["scripted"], timeout=SOON_MS)
+    visit.fail(RuntimeError("out of ideas"))
+    caplog.clear()
+    devices.gate.set()
+    qtbot.waitUntil(lambda: devices.closed == 1, timeout=SOON_MS)
+    assert visit.live is None
+    assert "the force is off" in visit.view().trouble
+
+
+def test_a_device_that_cannot_be_closed_is_told_of_and_holds_nobody_up(qtbot: Any) -> None:
+    class Stuck(SlowDevices):
+        def close(self) -> None:
+            super().close()
+            raise ServoFault("the servo is stuck: switch it off")
+
+    devices = Stuck()
+    opening = LabOpening(devices)
+    failed: list[Exception] = []
+    opened: list[Any] = []
+    opening.failed.connect(failed.append)
+    opening.opened.connect(opened.append)
+    opening.want("falcon")
+    qtbot.waitUntil(lambda: devices.asked == ["falcon"], timeout=SOON_MS)
+    opening.want("mouse")
+    devices.gate.set()
+    qtbot.waitUntil(lambda: bool(opened), timeout=SOON_MS)
+    assert [str(error) for error in failed] == ["the servo is stuck: switch it off"]
+
+
+def test_a_device_that_is_not_there_is_told(make_lab: MakeLab, qtbot: Any) -> None:
+    def nothing(name: str, **_: Any) -> Any:
+        raise DeviceNotFound(f"no {name} is plugged in")
+
+    visit = make_lab(open_live=nothing)
+    visit.place.show()
+    qtbot.waitUntil(lambda: visit.view().trouble == "no scripted is plugged in", timeout=SOON_MS)
+    view = visit.view()
+    assert not view.force_on
+    assert not view.device.ready
+
+
+def test_a_long_opening_without_a_word_is_explained_by_the_compilation(
+    make_lab: MakeLab, qtbot: Any, monkeypatch: Any
+) -> None:
+    gate = threading.Event()
+
+    def compile_slowly(_name: str, **_: Any) -> Any:
+        gate.wait(30.0)
+        raise DeviceNotFound("none")
+
+    monkeypatch.setattr(controller, "LONG_AFTER_S", 0.1)
+    visit = make_lab(open_live=compile_slowly)
+    visit.place.show()
+    assert visit.view().busy == "Opening Scripted hand"
+    qtbot.waitUntil(lambda: visit.view().busy == controller.COMPILING, timeout=SOON_MS)
+    gate.set()
+    qtbot.waitUntil(lambda: visit.view().trouble == "none", timeout=SOON_MS)

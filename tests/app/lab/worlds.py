@@ -1,0 +1,88 @@
+"""What the lab is given in tests: an appraiser and devices that answer when told to, and the force it sends."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+
+from study_app.app.lab.controller import LabController
+from study_app.evaluation.appraisal import Costs, EffectCost, Errors
+from study_app.evaluation.appraisal_worker import Question
+from study_app.haptics.model.scene import Scene
+
+OPENS_MS = 120_000  # the first time it compiles
+
+
+SOON_MS = 20_000
+
+
+COSTS = Costs(160.0, 60.0, (EffectCost("drag", 10.0), EffectCost("history", None, "not used")))
+
+
+ERRORS = Errors(2e-15, 1e-12, 0.0095, ())
+
+
+class Prices:
+    """Answers when told to."""
+
+    def __init__(self) -> None:
+        self.asked: list[Scene] = []
+        self.told: list[tuple[int, Any]] = []
+        self.works, self.closed = True, False
+
+    def order(self, question: Question) -> int:
+        self.asked.append(question.scene)
+        return len(self.asked)
+
+    def answers(self) -> list[tuple[int, Any]]:
+        told, self.told = self.told, []
+        return told
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class Stays:
+    """Draws that exchange nothing."""
+
+    def random(self) -> float:
+        return 0.9
+
+
+def force_n(visit: LabController) -> float:
+    """Return the size of the force that was sent last [N]."""
+    assert visit.live is not None
+    latest = visit.live.servo.telemetry.latest()
+    return 0.0 if latest is None else float(np.linalg.norm(latest.device_force_n))
+
+
+def held_n(live: Any) -> float:
+    """Return the size of the force that the device holds [N]."""
+    return float(np.linalg.norm(live.device.state.handle.force_n))
+
+
+def is_let_go(live: Any) -> bool:
+    return held_n(live) == 0.0 and not live.servo.loop.live
+
+
+class SlowDevices:
+    """Opens nothing before it is let."""
+
+    def __init__(self) -> None:
+        self.open, self.closed, self.asked = 0, 0, []
+        self.most = 0
+        self.gate = threading.Event()
+
+    def __call__(self, name: str, *, progress: Any, cancelled: Any) -> Any:
+        self.asked.append(name)
+        self.open += 1
+        self.most = max(self.most, self.open)
+        progress(f"switch {name} on")
+        self.gate.wait(30.0)
+        return self
+
+    def close(self) -> None:
+        self.open -= 1
+        self.closed += 1

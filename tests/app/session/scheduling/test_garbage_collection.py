@@ -1,0 +1,103 @@
+"""Where cyclic garbage is collected."""
+
+import gc
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QObject
+
+from study_app.app.session.garbage_collection import collect_if_due, collecting_here, freeze_garbage, unfreeze_garbage
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def automatic_collection() -> Iterator[None]:
+    """Collect as the interpreter does; the other tests collect between tests alone."""
+    gc.enable()
+    yield
+    gc.disable()
+
+
+class Cycle:
+    """An object that only the collector can free, and that remembers which thread freed it."""
+
+    def __init__(self, freed_in: list[int]) -> None:
+        self.itself, self.freed_in = self, freed_in
+
+    def __del__(self) -> None:
+        self.freed_in.append(threading.get_ident())
+
+
+def allocate_elsewhere() -> list[list[int]]:
+    """Let another thread make objects enough for a collection to be due; return them."""
+    kept: list[list[int]] = []
+    worker = threading.Thread(target=lambda: kept.extend([] for _ in range(20_000)))
+    worker.start()
+    worker.join()
+    return kept
+
+
+def test_a_thread_that_allocates_frees_nothing_of_the_windows(qtbot: Any) -> None:
+    freed_in: list[int] = []
+    with collecting_here():
+        Cycle(freed_in)
+        kept = allocate_elsewhere()
+        assert freed_in == []
+        qtbot.waitUntil(lambda: bool(freed_in))
+    assert freed_in == [threading.get_ident()]
+    assert len(kept) == 20_000
+
+
+def test_without_it_another_thread_would(qapp: QObject) -> None:
+    freed_in: list[int] = []
+    gc.collect()
+    Cycle(freed_in)
+    allocate_elsewhere()
+    assert freed_in
+    assert freed_in != [threading.get_ident()]
+
+
+def test_garbage_of_closed_windows_is_freed_before_another_thread_may(qapp: QObject) -> None:
+    freed_in: list[int] = []
+    with collecting_here():
+        Cycle(freed_in)
+    allocate_elsewhere()
+    assert freed_in == [threading.get_ident()]
+
+
+def test_collection_is_as_it_was_afterwards(qapp: QObject) -> None:
+    with collecting_here():
+        assert not gc.isenabled()
+    assert gc.isenabled()
+
+
+def test_nothing_is_collected_before_it_is_due() -> None:
+    gc.disable()
+    gc.collect()
+    assert collect_if_due() is None
+    kept = [[] for _ in range(5_000)]
+    assert collect_if_due() == 0
+    assert len(kept) == 5_000
+
+
+def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
+    freed_in: list[int] = []
+    Cycle(freed_in)
+    freeze_garbage()
+    try:
+        assert freed_in, "what nobody holds goes first"
+        held = Cycle(freed_in)
+        freeze_garbage()
+        del held
+        gc.collect()
+        assert len(freed_in) == 1
+        Cycle(freed_in)
+        gc.collect()
+        assert len(freed_in) == 2, "what came since is looked at"
+    finally:
+        unfreeze_garbage()
+    gc.collect()
+    assert len(freed_in) == 3

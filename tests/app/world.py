@@ -1,0 +1,94 @@
+"""A servo, a store and a clock that do as they are told."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from study_app.errors import StoreError
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.session.pages import TaskPage
+from study_app.session.transitions.events import Continue
+
+
+class World:
+    """Servo, store and clock of a session, with everything they were asked in ``done``."""
+
+    def __init__(self):
+        self.done = []
+        self.now_s = 0.0
+        self.fault = None
+        self.force_is_on = True
+        self.overruns = 0
+        self.rate_hz = 1000.0
+        self.worst_gap_s = 0.001
+        self.full = False
+        self.broken_clock = False
+        self.fingerprint = ""
+        self.samples = records(SAMPLE, 0)
+        self.telemetry = SimpleNamespace(reader=self._reader, position_at=lambda time_ns: (np.zeros(3), time_ns))
+        self.serial = 0
+
+    def _reader(self):
+        return SimpleNamespace(read=lambda: self.samples, dropped=0)
+
+    def load(self, _scene):
+        self.serial += 1
+        self.done.append("load")
+        return self.serial
+
+    def rest(self):
+        self.done.append("rest")
+
+    def stop_force(self):
+        self.done.append("stop_force")
+        self.force_is_on = False
+
+    def fade_in(self):
+        self.done.append("fade_in")
+        self.force_is_on = True
+
+    def now_ns(self):
+        if self.broken_clock:
+            raise RuntimeError("the clock fell off the wall")
+        return round(self.now_s * 1e9)
+
+    def seconds(self):
+        return self.now_s
+
+    def append(self, event, *, t_s=None, waits=True, **fields):
+        if self.full:
+            raise StoreError("no space left on the disk: free some")
+        self.done.append((event, fields))
+
+    def check_flushed(self):
+        pass
+
+    def write_tables(self):
+        pass
+
+    def finish(self, status, reason=""):
+        self.append("session_ended", status=status, reason=reason)
+
+    def events(self):
+        return [done[0] for done in self.done if isinstance(done, tuple)]
+
+
+def begin_trial(bridge, world):
+    """Go on to a trial, whose first frame is painted at once."""
+    world.now_s += 1.0
+    bridge.participant.event.emit(Continue(world.now_s))
+    assert isinstance(bridge.participant.page, TaskPage)
+    bridge.runner.frame_shown(world.now_ns(), world.now_ns())
+
+
+def tick(world, at_s):
+    """Return one sample of the scene now loaded, at a new time."""
+    world.now_s = at_s
+    sample = records(SAMPLE, 1)
+    sample.time_ns = round(at_s * 1e9)
+    sample.tick = round(at_s * 1000)
+    sample.scene = world.serial
+    sample.fresh = 1
+    return sample

@@ -1,0 +1,31 @@
+"""What a tick of unsteady drag takes beside one of drag, added mass and history, batch about batch.
+
+Run it by itself: ``python tests/benchmarks/haptics/unsteady_drag.py``.
+"""
+
+from __future__ import annotations
+
+import statistics
+
+from study_app.evaluation.cost import Bench
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.scene import Liquid, Scene
+
+MODELS = {"no effect": (), "apart": ("drag", "added_mass", "history"), "unsteady drag": ("unsteady_drag",)}
+GLYCERIN = Liquid(id="glycerin", density_kg_m3=1261, viscosity_pa_s=1.41, drag=Drag(law="haider-levenspiel"))
+
+
+def main() -> None:
+    """Print nanoseconds a tick of each beyond a tick without effects, and their ratio."""
+    liquids = {name: GLYCERIN.model_copy(update={"effects": effects}) for name, effects in MODELS.items()}
+    benches = {name: Bench(Scene(scale=3, liquids=(liquid,))) for name, liquid in liquids.items()}
+    for _ in range(300):
+        for bench in benches.values():
+            bench.batch()
+    rest_ns, apart_ns, law_ns = (statistics.median(bench.costs_ns) for bench in benches.values())
+    print(f"drag, added mass and history {apart_ns - rest_ns:.0f} ns, unsteady drag {law_ns - rest_ns:.0f} ns a tick")
+    print(f"ratio {(law_ns - rest_ns) / (apart_ns - rest_ns):.2f}")
+
+
+if __name__ == "__main__":
+    main()

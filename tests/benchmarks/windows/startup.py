@@ -1,0 +1,133 @@
+"""How soon the program answers and shows its windows, with a warm compile cache, and what it loads until then.
+
+Starts ``liquid-study --help``, ``liquid-study`` (home) and ``liquid-study run`` as a user would, on what display there
+is (without one on Qt's offscreen platform), and prints when each had answered or was first painted; then the modules
+that took longest to load until then, each without what it loads itself. Markdown, ready for the README. Run by itself:
+
+    python tests/benchmarks/windows/startup.py [--runs 5]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+# Runs inside the started program: tells the time at which each window was first painted, then ends it.
+PROBE = """
+import os, signal, sys, time
+from PySide6.QtCore import QEvent, QObject, QTimer
+from PySide6.QtWidgets import QApplication
+
+class Probe(QObject):
+    def __init__(self, wanted):
+        super().__init__()
+        self.wanted, self.seen = set(wanted), set()
+
+    def eventFilter(self, watched, event):
+        name = type(watched).__name__
+        if event.type() == QEvent.Type.Paint and name in self.wanted and name not in self.seen:
+            self.seen.add(name)
+            print("VISIBLE", name, time.time(), flush=True)
+            if self.seen == self.wanted:
+                QTimer.singleShot(0, lambda: os.kill(os.getpid(), signal.SIGTERM))
+        return False
+
+from study_app import app
+from study_app.app import main_controller
+from study_app.app.session import live_session
+made = main_controller.application_here
+def with_probe():
+    application = made()
+    application.probe = Probe(sys.argv[2].split(","))
+    application.installEventFilter(application.probe)
+    return application
+live_session.application_here = main_controller.application_here = with_probe
+if sys.argv[1] == "home":
+    app.home()
+else:
+    app.run("demo", participant="P001", windowed=True, results=__import__("pathlib").Path(sys.argv[3]))
+"""
+
+
+WINDOWS = {"home": ("MainWindow",), "run": ("OpeningWindow", "OperatorWindow", "ParticipantWindow")}
+BEGIN = "<!-- start-up: printed by python tests/benchmarks/windows/startup.py -->"
+END = "<!-- end of start-up -->"
+LIMITS_S = {"help": 0.3, "MainWindow": 2.0, "OpeningWindow": 2.0}
+NAMES = {
+    "help": "`--help`, printed",
+    "MainWindow": "home window",
+    "OpeningWindow": "`run`: note while all is made ready",
+    "OperatorWindow": "`run`: cockpit (2 s of measuring are in it)",
+    "ParticipantWindow": "`run`: participant's window",
+}
+DEAREST = 10
+
+
+def environment() -> dict[str, str]:
+    """Return the surroundings that the program is started in."""
+    found = dict(os.environ)
+    if not found.get("DISPLAY") and not found.get("WAYLAND_DISPLAY"):
+        found["QT_QPA_PLATFORM"] = "offscreen"
+    return found
+
+
+def once(kind: str, *options: str) -> tuple[dict[str, float], str]:
+    """Start the program once; return the seconds until it had answered or shown each window, and its errors."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, *options]
+        if kind == "help":
+            command += ["-m", "study_app", "--help"]
+        else:
+            command += ["-c", PROBE, kind, ",".join(WINDOWS[kind]), str(Path(folder) / "demo")]
+        began = time.time()
+        done = subprocess.run(command, capture_output=True, text=True, env=environment(), check=False, timeout=600)
+        ended = time.time()
+    if kind == "help":
+        return {"help": ended - began}, done.stderr
+    seen = [line.split() for line in done.stdout.splitlines() if line.startswith("VISIBLE")]
+    if len(seen) != len(WINDOWS[kind]):
+        sys.exit(f"{kind}: saw {[name for _, name, _ in seen]} of {WINDOWS[kind]}\n{done.stderr}")
+    return {name: float(at) - began for _, name, at in seen}, done.stderr
+
+
+def dearest(kind: str) -> list[tuple[str, float, float]]:
+    """Return the modules that took longest until the program stood: name, by itself and with what it loads [ms]."""
+    _, said = once(kind, "-X", "importtime")
+    rows = []
+    for line in said.splitlines():
+        words = line.removeprefix("import time:").split("|")
+        if len(words) == 3 and words[0].strip().isdigit():
+            rows.append((words[2].strip(), int(words[0]) / 1e3, int(words[1]) / 1e3))
+    return sorted(rows, key=lambda row: -row[1])[:DEAREST]
+
+
+def main() -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=5)
+    runs = parser.parse_args().runs
+    print(f"{BEGIN}\n\n| from the start of the program until | median of {runs} | slowest | promised |")
+    print("| --- | --: | --: | --: |")
+    for kind in ("help", *WINDOWS):
+        once(kind)  # the first may compile
+        times = [once(kind)[0] for _ in range(runs)]
+        for name in times[0]:
+            seconds = [one[name] for one in times]
+            limit = f"{LIMITS_S[name]:g} s" if name in LIMITS_S else ""
+            print(f"| {NAMES[name]} | {statistics.median(seconds):.2f} s | {max(seconds):.2f} s | {limit} |")
+    tables = {kind: dearest(kind) for kind in ("help", *WINDOWS)}
+    print(f"\nThe {DEAREST} modules that took longest to load until then, each by itself [ms]:\n")
+    print("| `--help` | home | `run` |\n| --- | --- | --- |")
+    for row in zip(*tables.values(), strict=True):
+        print(f"| {' | '.join(f'`{name}` {alone_ms:.1f}' for name, alone_ms, _ in row)} |")
+    print(f"\n{END}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,165 @@
+"""The commands: what they print, and the one line and exit code a user gets for bad input."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.evaluation import replay
+from study_app.protocol.load import source_bytes
+
+pytestmark = pytest.mark.slow
+
+
+def liquid_study(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "study_app", *words], cwd=cwd, capture_output=True, text=True, check=False
+    )
+
+
+def assert_one_line(finished: subprocess.CompletedProcess[str], *parts: str) -> None:
+    assert finished.returncode == 2
+    assert finished.stdout == ""
+    lines = finished.stderr.splitlines()
+    assert len(lines) == 1, finished.stderr
+    for part in parts:
+        assert part in lines[0]
+
+
+def test_help_names_every_command(tmp_path: Path) -> None:
+    finished = liquid_study("--help", cwd=tmp_path)
+    assert finished.returncode == 0
+    for command in ("check", "simulate", "run", "rehearse", "export", "plot", "unblind"):
+        assert f"\n  {command} " in finished.stdout
+
+
+def test_help_loads_neither_qt_nor_the_compiler_nor_multiprocessing(tmp_path: Path) -> None:
+    program = (
+        "import sys; sys.argv=['liquid-study','--help']\n"
+        "from study_app.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "avoided = {'PySide6', 'numba', 'pandas', 'matplotlib', 'numpy', 'pydantic', 'multiprocessing'}\n"
+        "print(sorted(avoided & set(sys.modules)))"
+    )
+    finished = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert finished.stdout.splitlines()[-1] == "[]"
+
+
+def test_unknown_command_is_one_line(tmp_path: Path) -> None:
+    assert_one_line(liquid_study("rehears", cwd=tmp_path), "rehears", "rehearse")
+
+
+def test_unknown_protocol_names_the_shipped_ones(tmp_path: Path) -> None:
+    finished = liquid_study("check", "rek2042", cwd=tmp_path)
+    assert finished.returncode == 2
+    assert "rek2042" in finished.stderr
+    assert "rek2024" in finished.stderr
+
+
+def test_check_far_from_the_checkout_tells_the_study_in_words(tmp_path: Path) -> None:
+    finished = liquid_study("check", "rek2024", cwd=tmp_path)
+    assert finished.returncode == 0, finished.stderr
+    assert "62" in finished.stdout
+    assert "8 N" in finished.stdout
+
+
+def test_check_takes_a_file_of_liquids_without_a_study(tmp_path: Path) -> None:
+    """One that has a part of a study needs all of it."""
+    liquids = "format = 1\n[liquids.tar]\ndensity_kg_m3 = 1153\n"
+    (tmp_path / "liquids.toml").write_text(liquids)
+    (tmp_path / "half.toml").write_text(liquids + '[study]\nname = "half"\n')
+    finished = liquid_study("check", "liquids.toml", cwd=tmp_path)
+    assert finished.returncode == 0, finished.stderr
+    assert "Force limit  8 N" in finished.stdout
+    assert "tar: effects named" in finished.stdout
+    half = liquid_study("check", "half.toml", cwd=tmp_path)
+    assert (half.returncode, half.stdout) == (2, "")
+    assert "sequence" in half.stderr
+
+
+def test_a_letter_that_the_console_lacks_stops_no_command(tmp_path: Path) -> None:
+    text = source_bytes("demo").decode().replace('title = "A first look"', 'title = "Łódź"', 1)
+    (tmp_path / "lodz.toml").write_text(text, encoding="utf-8")
+    told = subprocess.run(
+        [sys.executable, "-m", "study_app", "check", "lodz.toml"],
+        cwd=tmp_path,
+        capture_output=True,
+        check=False,
+        env={**os.environ, "PYTHONIOENCODING": "cp1252"},
+    )
+    assert (told.returncode, told.stderr) == (0, b"")
+    assert told.stdout.startswith(b"\\u0141\xf3d\\u017a (demo, version ")
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (("--participant", "P-1"), ("P-1", "only letters A-Z", "no dash")),
+        (("--participant", "P001", "--device", "falkon"), ("falkon", "mouse", "scripted")),
+        (("--participant", "P001", "--language", "xx"), ("xx", "en", "nl")),
+    ],
+)
+def test_run_refuses_what_it_cannot_use(tmp_path: Path, words: tuple[str, ...], parts: tuple[str, ...]) -> None:
+    results = tmp_path / "results"
+    assert_one_line(liquid_study("run", "rek2024", *words, "--results", str(results), cwd=tmp_path), *parts)
+    assert not results.exists()
+
+
+def test_simulate_names_the_bad_row_and_writes_nothing(tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("t_s,x_m,y_m,z_m\n0,0,0,0\n0.001,0,zero,0\n", encoding="utf-8")
+    words = ("rek2024", "--liquid", "water", "--path", "path.csv", "--to", "out.csv")
+    finished = liquid_study("simulate", *words, cwd=tmp_path)
+    assert finished.returncode == 2
+    assert "row 2" in finished.stderr or "line 3" in finished.stderr
+    assert "zero" in finished.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["path.csv"]
+
+
+def test_simulate_names_the_unknown_parameter(tmp_path: Path) -> None:
+    words = ("rek2024", "--liquid", "water", "--path", "circle", "--to", "out.csv")
+    assert_one_line(
+        liquid_study("simulate", *words, "--set", "densitee_kg_m3=1", cwd=tmp_path), "densitee_kg_m3", "density_kg_m3"
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_replay_that_compared_nothing_does_not_say_that_all_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is printed of a replay's findings, and the exit code."""
+
+    def replayed(count: int, **told: Any) -> tuple[int, str]:
+        some = {"recordings": count, "seconds": 9 * count, "lasted_s": 10.0 * count, "computed_s": 0.1 * count}
+        none: dict[str, Any] = {"took_s": 1.5, "differences": (), "missing": (), "uncompared": ()}
+        found = replay.Replayed(**(some | none | told))
+        monkeypatch.setattr(replay, "replay", lambda _: found)
+        done = CliRunner().invoke(commands, ["replay", "ses-01"])
+        return done.exit_code, done.output
+
+    nothing = "no force was compared, so the result is not proved\n"
+    assert replayed(0) == (3, f"the session kept no recordings\n{nothing}")
+    assert replayed(0, uncompared=("trial 1 is lost",)) == (3, f"trial 1 is lost\n{nothing}")
+    same = "1 recording, 10.0 s, recomputed 100 times as fast as it ran (1.5 s in all): "
+    assert replayed(1) == (0, f"{same}all compared forces are equal\n")
+    assert replayed(1, seconds=0, uncompared=("a gap",)) == (3, f"a gap\n{same}{nothing}")
+    same = same.replace("it ran", "they ran").replace("1 recording, 10.0", "2 recordings, 20.0")
+    assert replayed(2, uncompared=("a gap",)) == (0, f"a gap\n{same}all compared forces are equal\n")
+    assert replayed(2, missing=("a file",)) == (3, f"a file\n{same}all compared forces are equal\n")
+    differ = f"trial 1 differs\ntrial 2 has a gap\n{same}forces differ\n"
+    assert replayed(2, differences=("trial 1 differs",), uncompared=("trial 2 has a gap",)) == (3, differ)
+
+
+def test_verify_ends_with_a_verdict_and_its_exit_code(tmp_path: Path) -> None:
+    study = tmp_path / "study"
+    shutil.copytree(Path(__file__).parents[2] / "results" / "sample-rek2024", study)
+    verified = liquid_study("verify", "study", cwd=tmp_path)
+    assert (verified.returncode, verified.stdout.splitlines()[-1]) == (0, "12 sessions: sound")
+    table = study / "data" / "study-rek2024_description-participants_data.csv"
+    table.write_bytes(table.read_bytes() + b"\n")
+    verified = liquid_study("verify", "study", cwd=tmp_path)
+    assert (verified.returncode, verified.stdout.splitlines()[-1]) == (3, "12 sessions: not sound")

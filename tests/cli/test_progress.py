@@ -1,0 +1,56 @@
+"""Progress is for terminals: elsewhere a command prints only what its callers read."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+PROGRAM = textwrap.dedent(
+    """
+    import sys
+    from study_app.cli.progress import progress
+    with progress(*([print] if "plainly" in sys.argv else [])) as show:
+        show("counting [1]")
+        show("counting [2]", 0.5)
+        print("warning", file=sys.stderr)
+    print("result")
+    """
+)
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize(
+    ("words", "out"),
+    [((), "result\n"), (("plainly",), "counting [1]\ncounting [2]\nresult\n")],
+    ids=["nothing", "lines"],
+)
+def test_where_nobody_looks_nothing_but_what_was_asked_for_is_printed(words: tuple[str, ...], out: str) -> None:
+    done = subprocess.run([sys.executable, "-c", PROGRAM, *words], capture_output=True, text=True, cwd=ROOT, check=True)
+    assert (done.stdout, done.stderr) == (out, "warning\n")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX's")
+def test_a_terminal_shows_what_is_done_and_standard_output_stays_clean() -> None:
+    ours, theirs = os.openpty()
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM],
+            stdout=subprocess.PIPE,
+            stderr=theirs,
+            text=True,
+            cwd=ROOT,
+            check=True,
+            env=os.environ | {"TERM": "xterm", "COLUMNS": "80"},
+        )
+        shown = os.read(ours, 65536).decode()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    assert done.stdout == "result\n"
+    assert "counting [2]" in shown
+    assert "warning" in shown

@@ -1,0 +1,221 @@
+"""A device of another package: found at its entry point, and used everywhere, without a change of this package."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.devices.backends import backends
+from study_app.devices.registry import discover, list_devices, open_device
+from study_app.errors import DeviceError
+from study_app.gui.devices.view import DevicesPlace
+from study_app.gui.home.new_session_dialog import NewSessionDialog
+from study_app.protocol.load import load
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.viewmodels.device_list import devices_shown
+from study_app.viewmodels.home import study_facts
+from tests.compiled import needs_servo
+
+pytestmark = pytest.mark.slow
+
+DESCRIPTOR = """
+    from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, DeviceOption, Doctor, opened
+    from study_app.devices.doctor_report import Finding, Report
+
+
+    def open_toy(request):
+        from toy_driver import ToyHand
+
+        return opened(ToyHand(request))
+
+
+    def findings(state="not looked at"):
+        loose = Finding(1, "loose", "its string is tight", "its string is loose", state, "wear", "tighten it", "a look")
+        return (loose,)
+
+
+    def examine(name, *, options, faults, progress):
+        progress(f"Looking at {name}.")
+        return Report(("a string",), findings("found" if "loose" in faults else "ok"), None)
+
+
+    TOY = DeviceDescriptor(
+        name="toy-hand",
+        title="Toy hand",
+        icon="fast_forward",
+        kind="simulated",
+        degrees_of_freedom=2,
+        open=open_toy,
+        probe=lambda: [Backend("toy-hand", "a string", READY, "moves by itself, as a toy does")],
+        moves_by_itself=True,
+        options=(DeviceOption(name="toy-mass", title="Mass of the toy", help="Its mass in grams."),),
+        doctor=Doctor(findings=findings, examine=examine),
+    )
+"""
+DRIVER = """
+    from study_app.devices.simulated.simulated_device import SimulatedDevice
+    from study_app.haptics.kernels.plant import new_handle
+
+
+    class ToyHand(SimulatedDevice):
+        name = "toy-hand"
+
+        def __init__(self, request):
+            grams = float(request.options.get("toy-mass", 300))
+            handle = new_handle(mass_kg=grams / 1000, stiffness_npm=400.0, damping_nspm=30.0)
+            super().__init__(handle, request.workspace_m or (0.05, 0.05, 0.05), request.force_limit_n or 8.0)
+            self._tremble(request.random, 1e-5)
+"""
+
+
+def install(site: Path, package: str, entry_points: dict[str, str], **modules: str) -> None:
+    """Write an installed package: its modules and its metadata."""
+    site.mkdir(exist_ok=True)
+    for name, source in modules.items():
+        (site / f"{name}.py").write_text(dedent(source))
+    metadata = site / f"{package}-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    points = "".join(f"{name} = {value}\n" for name, value in entry_points.items())
+    (metadata / "entry_points.txt").write_text(f"[liquid_study.devices]\n{points}")
+
+
+@pytest.fixture
+def site(tmp_path, monkeypatch):
+    """Return a folder that packages can be installed into."""
+    folder = tmp_path / "site"
+    folder.mkdir()
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
+    monkeypatch.syspath_prepend(folder)
+    before = set(sys.modules)
+    yield folder
+    discover.cache_clear()
+    for name in set(sys.modules) - before:
+        if name.startswith("toy_"):
+            del sys.modules[name]
+
+
+@pytest.fixture
+def toy(site):
+    """Install the toy device."""
+    install(site, "toy_hand", {"toy-hand": "toy_hand:TOY"}, toy_hand=DESCRIPTOR, toy_driver=DRIVER)
+    discover.cache_clear()
+
+
+def liquid_study(*words: str):
+    return CliRunner().invoke(commands, words)
+
+
+@pytest.mark.usefixtures("toy")
+class TestDeviceOfAnotherPackage:
+    def test_is_listed_by_the_command_and_in_the_window(self, qtbot):
+        assert "toy-hand" in list_devices()
+        listed = liquid_study("devices")
+        assert "toy-hand            ready  (a string; simulated, 2 degrees of freedom)" in listed.output
+        place = DevicesPlace()
+        qtbot.addWidget(place)
+        place.show_devices(devices_shown(backends()), "toy-hand")
+        row = place.simulated.rows["toy-hand"]
+        assert row.title.text() == "Toy hand"
+        assert row.title.isChecked()
+        assert row.chip.word == "Ready"
+        assert row.diagnose.isVisibleTo(place)
+
+    def test_is_offered_for_a_session_with_its_option_and_a_folder_of_its_own(self, qtbot, tmp_path):
+        dialog = NewSessionDialog(study_facts("demo"), tmp_path / "results")
+        qtbot.addWidget(dialog)
+        dialog.open()
+        field = dialog.device_options.fields["toy-mass"]
+        assert not field.isVisible()
+        dialog.device.setCurrentIndex(dialog.device.findData("toy-hand"))
+        assert dialog.device.currentText() == "Toy hand (simulated)"
+        assert field.isVisible()
+        field.setText("250")
+        chosen = dialog.chosen()
+        assert (chosen.device, chosen.device_options) == ("toy-hand", {"toy-mass": "250"})
+        assert chosen.results == tmp_path / "results" / "demo-toy-hand"
+
+    def test_its_option_is_one_of_the_commands_that_open_it(self):
+        assert "--toy-mass TEXT" in liquid_study("run", "--help").output
+        refused = liquid_study("run", "demo", "--participant", "P001", "--device", "mouse", "--toy-mass", "250")
+        assert isinstance(refused.exception, DeviceError)
+        assert str(refused.exception).startswith("device 'mouse' takes no toy-mass; only these do: Toy hand:")
+
+    @needs_servo
+    def test_is_opened_with_its_option(self):
+        with open_device("toy-hand", options={"toy-mass": "250"}) as device:
+            assert device.describe()["mass_kg"] == 0.25
+
+    @needs_servo
+    def test_runs_a_session_whose_results_and_report_are_written(self, tmp_path):
+        study = tmp_path / "demo-toy-hand"
+        rehearsed = liquid_study("rehearse", "demo", "--device", "toy-hand", "--results", str(study))
+        assert rehearsed.exit_code == 0, rehearsed.output
+        (receipt,) = study.glob("data/*/*/receipt.json")
+        device = json.loads(receipt.read_text())["device"]
+        assert (device["name"], device["mass_kg"]) == ("toy-hand", 0.3)
+        reported = liquid_study("report", str(study), "--to", str(tmp_path / "report"))
+        assert reported.exit_code == 0, reported.output
+        assert "SIMULATED participants" in (tmp_path / "report" / "report.html").read_text()
+        trials = (tmp_path / "report" / "study-demo_description-trials_data.csv").read_text().splitlines()
+        assert len(trials) == 1 + len(build_schedule(load("demo"), "P001", 1).trials)
+        assert liquid_study("verify", str(study)).exit_code == 0
+
+    def test_is_examined_by_its_doctor(self):
+        found = liquid_study("devices", "doctor", "--device", "toy-hand", "--fault", "loose")
+        assert found.exit_code == 3
+        assert "Looking at toy-hand." in found.output
+        assert "FOUND          its string is loose" in found.output
+        assert liquid_study("devices", "doctor", "--device", "toy-hand").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("value", "source", "reason"),
+    [
+        ("toy_missing:TOY", "", "No module named 'toy_missing'"),
+        ("toy_broken:TOY", "raise RuntimeError('no such\\nlibrary')", "no such library"),
+        ("toy_broken:TOY", "TOY = 3", "toy_broken:TOY is no DeviceDescriptor but a int"),
+        ("toy_broken:TOY", DESCRIPTOR.replace('"toy-hand"', '"mouse"'), "a device named 'mouse' exists already"),
+        ("toy_broken:TOY", DESCRIPTOR.replace('"toy-hand"', '"Toy 1"'), "the device name 'Toy 1' is not permitted"),
+        ("toy_broken:TOY", DESCRIPTOR.replace('"simulated"', '"dreamt"'), "kind 'dreamt' of device 'toy-hand'"),
+    ],
+)
+def test_a_broken_entry_point_is_one_row_and_every_other_device_stays(site, qtbot, value, source, reason):
+    install(site, "toy_broken", {"toy": value}, toy_broken=source)
+    discover.cache_clear()
+    listed = liquid_study("devices")
+    assert listed.exit_code == 0
+    (broken,) = (one for one in backends() if one.name == "toy (toy_broken)")
+    assert reason in broken.why
+    assert "\n" not in broken.why
+    assert "toy (toy_broken)    not available  (entry point)" in listed.output
+    assert "uninstall the package toy_broken" in " ".join(listed.output.split())
+    place = DevicesPlace()
+    qtbot.addWidget(place)
+    place.show_devices(devices_shown(backends()), "mouse")
+    row = place.people.rows["toy (toy_broken)"]
+    assert row.chip.word == "Not available"
+    assert reason in row.why.text()
+    assert place.people.rows["mouse"].title.isChecked()
+    assert "toy" not in list_devices()
+
+
+def test_a_device_that_cannot_be_looked_for_hides_no_other(site):
+    install(
+        site,
+        "toy_blind",
+        {"toy": "toy_blind:TOY"},
+        toy_blind=DESCRIPTOR.replace(
+            '[Backend("toy-hand", "a string", READY, "moves by itself, as a toy does")]', "1 / 0"
+        ),
+    )
+    discover.cache_clear()
+    found = {one.name: one for one in backends()}
+    assert found["toy-hand"].why == "it cannot be looked for: division by zero"
+    assert {"mouse", "falcon", "scripted"} <= set(found)

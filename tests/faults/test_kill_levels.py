@@ -1,0 +1,71 @@
+"""A session with levels killed at random bytes of its journal presents, when it is resumed, what it would have."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.store.blinded.blinding import read_key
+from study_app.store.blinded.sealing import opened
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.tables.columns import DELIVERED, TRIALS
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+from tests.faults.support.killer_runs import outcomes_of
+from tests.platforms import needs_fork
+from tests.session.pairs import short_text
+
+KILLS = int(os.environ.get("LIQUID_STUDY_LEVEL_KILLS", "6"))
+TIMES = {"n", "at", "t_s", "previous", "attempt", "onset_s", "first_choice_s", "last_change_s", "first_s", "last_s"}
+MEASURES = {column.name for column in (*TRIALS, *DELIVERED) if column.kind in {"number", "integer"}} - {
+    "trial",
+    "index",
+    "of",
+    "part",
+}
+OF_TRIALS = {"trial_started", "interval_started", "interval_ended", "trial_ended", "responses", "passed_over"}
+
+pytestmark = [pytest.mark.slow, needs_servo, needs_fork, pytest.mark.timeout(300 + 60 * KILLS)]
+
+
+def told(study: Path) -> dict[tuple[Any, ...], Any]:
+    """Return what a journal says of the last attempt at each trial, sealed fields opened, without times and measures.
+
+    What was measured is left out: the simulated hand is elsewhere after a break, and the force fades in anew.
+    """
+    (session,) = StudyFolder(study).sessions()
+    found: dict[tuple[Any, ...], Any] = {}
+    for line in opened(journal.read(session.journal), read_key(study)):
+        if line["event"] in OF_TRIALS:
+            found[line["event"], line.get("trial", line.get("page")), line.get("interval")] = comparable(line)
+    return found
+
+
+def comparable(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: comparable(inner) for name, inner in value.items() if name not in TIMES | MEASURES}
+    return [comparable(inner) for inner in value] if isinstance(value, list) else value
+
+
+def test_a_session_killed_at_random_bytes_of_its_journal_equals_one_that_was_not(tmp_path: Path) -> None:
+    protocol = tmp_path / "levels.toml"
+    protocol.write_text(short_text())
+    outcomes = outcomes_of("killer", protocol, tmp_path, KILLS, 3, "bytes", limit_s=240 + 50 * KILLS)
+    whole = told(tmp_path / "whole")
+    assert sum(event == "trial_started" for event, *_ in whole) >= 7
+    assert all("level" in line for (event, *_), line in whole.items() if event == "trial_started")
+    killed = [outcome for outcome in outcomes if outcome["resumed"] is not None]
+    assert len(killed) > KILLS / 2
+    for outcome in killed:
+        study = Path(outcome["folder"])
+        assert outcome["resumed"] == 0, outcome
+        assert told(study) == whole, outcome["folder"]
+        (session,) = StudyFolder(study).sessions()
+        assert session.journal.read_text(encoding="utf-8").startswith(outcome["held"].rpartition("\n")[0])
+        assert reproduced(session.path).differences == []
+        assert verify(study, None).errors == ()

@@ -1,0 +1,44 @@
+"""What stands for a rehearsal in the tests of its dialog: tasks of a worker process."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from pathlib import Path
+
+from study_app.errors import StudyError
+from study_app.session.simulated.worker import RehearsalOrder
+from study_app.workers.server import Stop, Tell
+
+
+def fail(_order: RehearsalOrder, _tell: Tell, _stop: Stop) -> Path:
+    """Refuse."""
+    raise StudyError("no room left")
+
+
+def end(_order: RehearsalOrder, _tell: Tell, _stop: Stop) -> Path:
+    """End the process."""
+    sys.exit(7)
+
+
+def two(order: RehearsalOrder, tell: Tell, stop: Stop) -> Path:
+    """Do one participant, then, once asked to, the other."""
+    tell("R1: 8 responses (simulated)")
+    while not stop():
+        threading.Event().wait(0.01)
+    tell("R2: 8 responses (simulated)")
+    return order.results
+
+
+def endless(_order: RehearsalOrder, _tell: Tell, _stop: Stop) -> Path:
+    """Wait until the process is ended."""
+    threading.Event().wait()
+    raise AssertionError
+
+
+def deaf(order: RehearsalOrder, tell: Tell, stop: Stop) -> Path:
+    """Wait until the process is killed."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    tell("deaf")
+    return endless(order, tell, stop)

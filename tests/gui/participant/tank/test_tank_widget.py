@@ -1,0 +1,150 @@
+"""The tank: what is drawn, what is painted anew, and when a view counts as painted."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, QPoint
+from PySide6.QtGui import QRegion
+from PySide6.QtWidgets import QApplication
+
+from study_app.gui.participant.tank.frame import changes
+from study_app.gui.participant.tank_widget import TankWidget
+from tests.gui.participant.tank.painted import shown
+from tests.gui.small import view
+
+
+def test_ball_is_drawn_where_the_view_says(tank: TankWidget) -> None:
+    for position in ((0.0, 0.0, 0.0), (-0.04, 0.02, -0.02), (0.03, -0.02, 0.02)):
+        tank.show_view(view(position, lit=0))
+        ball = tank.ball
+        assert ball is not None
+        place = ball.middle.toPoint()
+        colour = tank.grab().toImage().pixelColor(place)
+        assert colour.red() > 170
+        assert colour.red() > colour.green() > colour.blue() + 20
+
+
+def test_lit_and_dim_targets_differ_in_shape_and_light(tank: TankWidget) -> None:
+    tank.show_view(view((0, 0.02, 0), lit=0))
+    left = shown(tank)
+    tank.show_view(view((0, 0.02, 0), lit=1))
+    right = shown(tank)
+    target = tank.targets[0]
+    x, y = round(target.middle.x()), round(target.middle.y())
+    on_ring = (y, round(target.middle.x() + target.radius))
+    assert left[on_ring].min() > 120  # a pale ring
+    box = np.s_[y - 60 : y + 60, x - 60 : x + 60]
+    assert left[box].mean() > right[box].mean() + 4
+
+
+def test_dwell_arc_closes_clockwise_from_the_top(tank: TankWidget) -> None:
+    target = tank.targets or (tank.prepare(), tank.targets)[1]
+    middle, radius = target[1].middle, target[1].radius
+    right_side = (round(middle.y()), round(middle.x() + radius))
+    left_side = (round(middle.y()), round(middle.x() - radius))
+    tank.show_view(view((0, 0.02, 0), dwell=0.5))
+    half = shown(tank)
+    assert half[right_side].min() > 235
+    assert half[left_side].min() < 235
+    tank.show_view(view((0, 0.02, 0), dwell=1.0))
+    assert shown(tank)[left_side].min() > 235
+
+
+def test_what_changed_lies_inside_the_region_painted_anew(tank: TankWidget) -> None:
+    first = view((0.01, 0.0, 0.01), lit=1, dwell=0.2, reached=3)
+    for second in (
+        view((0.012, 0.001, 0.01), lit=1, dwell=0.25, reached=3),
+        view((0.012, 0.001, 0.01), lit=1, dwell=0.25, reached=3),
+        view((-0.03, -0.02, -0.02), lit=0, dwell=0.0, reached=4),
+    ):
+        tank.show_view(first)
+        before, things = shown(tank), tank.things
+        tank.show_view(second)
+        after = shown(tank)
+        region = changes(things, tank.things)
+        differs = np.argwhere((before != after).any(axis=2))
+        outside = [(x, y) for y, x in differs if not region.contains(QPoint(int(x), int(y)))]
+        assert outside == []
+        first = second
+
+
+def test_small_motion_paints_a_small_part(tank: TankWidget) -> None:
+    tank.show_view(view((0.0, 0.0, 0.0), lit=1))
+    before = tank.things
+    tank.show_view(view((0.0005, 0.0, 0.0), lit=1))
+    area = sum(rect.width() * rect.height() for rect in changes(before, tank.things))
+    assert area < 0.06 * tank.width() * tank.height()
+
+
+def test_nothing_changed_paints_nothing_but_still_counts_as_a_frame(tank: TankWidget, qtbot: Any) -> None:
+    tank.show_view(view())
+    before = tank.things
+    QApplication.processEvents()
+    with qtbot.waitSignal(tank.painted, timeout=1000):
+        tank.show_view(view())
+    assert changes(before, tank.things) == QRegion()
+
+
+def test_painted_comes_once_a_view_with_the_time_of_what_was_drawn(tank: TankWidget, qtbot: Any) -> None:
+    told: list[int] = []
+    tank.painted.connect(told.append)
+    with qtbot.waitSignal(tank.painted, timeout=1000):
+        tank.show_view(view(sample_ns=5_123_456_789_012))
+    tank.repaint()  # as when the window is uncovered
+    assert told == [5_123_456_789_012]
+
+
+def test_a_view_is_painted_before_anything_else_is_done(tank: TankWidget, qtbot: Any) -> None:
+    qtbot.waitExposed(tank)
+    told: list[int] = []
+    tank.painted.connect(told.append)
+    for sample_ns in range(1, 6):
+        tank.show_view(view((0.004 * sample_ns, 0.0, 0.0), sample_ns=sample_ns))
+        assert told[-1] == sample_ns, "without a turn of the event loop"
+    QApplication.processEvents()
+    assert told == [1, 2, 3, 4, 5]
+
+
+@pytest.mark.slow
+def test_a_view_that_nobody_can_see_is_told_of_when_it_is_seen(tank: TankWidget, qtbot: Any) -> None:
+    told: list[int] = []
+    tank.painted.connect(told.append)
+    tank.show_view(view(sample_ns=1))
+    tank.hide()
+    tank.show_view(view(sample_ns=2))
+    tank.show_view(view(sample_ns=3))
+    assert told == [1]
+    with qtbot.waitSignal(tank.painted, timeout=1000):
+        tank.show()
+    assert told == [1, 3]
+
+
+def test_resize_draws_a_new_tank_of_the_new_size(tank: TankWidget) -> None:
+    tank.show_view(view())
+    first = tank.ball
+    tank.resize(1024, 640)
+    tank.show_view(view())
+    tank.resize(1366, 768)
+    tank.show_view(view())
+    assert tank.ball is not None
+    assert first is not None
+    assert tank.ball.radius > first.radius
+    assert shown(tank).shape == (768, 1366, 3)
+
+
+@pytest.mark.slow
+def test_references_to_none_stay_flat_over_200_repaints(tank: TankWidget) -> None:
+    def paint(count: int) -> None:
+        for frame in range(count):
+            tank.show_view(view((0.0001 * frame, 0, 0), dwell=frame % 50 / 50, lit=frame // 50 % 2))
+            tank.repaint()
+            QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+    paint(20)
+    before = sys.getrefcount(None)
+    paint(200)
+    assert abs(sys.getrefcount(None) - before) < 100

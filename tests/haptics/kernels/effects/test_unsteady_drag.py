@@ -1,0 +1,307 @@
+"""Unsteady drag: its limits, its symmetry, its energy, and what the fluid solver found."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from study_app.evaluation.reference_solutions import oscillation, start
+from study_app.evaluation.unsteady_law import unsteady_n
+from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS_RPS
+from study_app.haptics.model.laws import finite_reynolds
+from study_app.haptics.model.layout import LIMITER_ENERGY
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Box, Kalman, MotionBox
+from study_app.haptics.model.steady_state import steady
+from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.pack import pack
+from study_app.validation.cfd import fits, stored_flows
+from study_app.validation.stability.stability_cases import parse
+from study_app.validation.stability.verdict import judge
+from tests.haptics.scenes import COMPILED, UNBENT, Hand, liquid, moving, scene, vectors
+
+FLUIDS = {
+    "water": (998.2, 1.0016e-3),
+    "olive oil": (913, 0.084),
+    "gear oil": (890, 0.35),
+    "glycerin": (1261, 1.41),
+    "honey": (1420, 10),
+    "tar": (1150, 100),
+}
+ADDED_M3 = 0.5 * np.pi / 6 * 0.068**3
+compiled = pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")
+
+
+def tank(name, **fields):
+    """Return a scene of one liquid with unsteady drag, at scale 1."""
+    density_kg_m3, viscosity_pa_s = FLUIDS[name]
+    one = liquid(density_kg_m3, viscosity_pa_s=viscosity_pa_s, effects=("unsteady_drag",))
+    return scene(one.model_copy(update=fields), knee=UNBENT, scale=1.0, format=2)
+
+
+def force(felt, velocity_mps, interval_s=1e-3):
+    """Return the force (n, 3) along velocities (n, 3)."""
+    felt = felt.model_copy(update={"rate_hz": 1 / float(np.median(interval_s))})
+    return vectors(simulate(felt, moving(velocity_mps, interval_s)), "force")
+
+
+def random_motion(seed, ticks=3000, rest=300):
+    """Return velocities (n, 3) of strokes, circles and stops that begin at rest, up to about 0.6 m/s."""
+    random = np.random.default_rng(seed)
+    t_s = np.arange(ticks) / 1000
+    waves = [
+        random.normal(size=3)[:, None] * np.sin(2 * np.pi * hertz * t_s + random.uniform(0, 6.3, 3)[:, None]) / hertz
+        for hertz in random.uniform(0.3, 6, 5)
+    ]
+    steps = np.repeat(random.integers(0, 2, ticks // rest + 1), rest)[:ticks].astype(float)
+    smooth = np.convolve(np.concatenate([np.zeros(100), steps]), np.hanning(101) / np.hanning(101).sum())[1 : ticks + 1]
+    smooth[:2] = 0.0
+    return 0.3 * random.uniform(0.05, 1) * (sum(waves) * smooth).T
+
+
+def test_the_exponentials_are_the_kernel_within_1_5_percent_from_1_ms_to_30_s():
+    t_s = np.geomspace(1e-3, 30, 4000)
+    kernel = (np.array(WEIGHTS_RPS) * np.exp(-np.outer(t_s, RATES_PER_S))).sum(axis=1)
+    assert abs(kernel * np.sqrt(t_s) - 1).max() < 0.0155
+
+
+def test_steady_drag_is_stokes_at_rest_and_that_of_the_solver_to_re_200():
+    assert finite_reynolds(0.0) == 1
+    solved = stored_flows.steady().columns
+    for reynolds, coefficient in zip(solved["reynolds"], solved["drag_coefficient"], strict=True):
+        within = 0.017 if reynolds >= 1 else 0.03
+        assert finite_reynolds(reynolds) * 24 / reynolds == pytest.approx(coefficient, rel=within)
+
+
+@compiled
+@pytest.mark.parametrize("truth", [oscillation, start])
+@pytest.mark.parametrize("name", FLUIDS)
+def test_as_re_vanishes_it_is_stokes_added_mass_and_basset_within_a_percent(name, truth):
+    """Landau & Lifshitz §24 and Basset 1888, at Re 1e-5."""
+    box = MotionBox(speed_mps=0.6, acceleration_mps2=6)
+    felt = tank(name).model_copy(update={"motion": box, "rate_hz": 4000.0})
+    (case,) = truth(felt).cases
+    slow = Motion(case.motion.t_s, case.motion.position_m / 1e3, case.motion.velocity_mps / 1e3)
+    error_n = 1e3 * vectors(simulate(felt, slow), "force") - case.force_n
+    rms = np.sqrt(np.mean(error_n[case.counted] ** 2) / np.mean(case.force_n[case.counted] ** 2))
+    assert rms <= 0.01
+
+
+@compiled
+@pytest.mark.parametrize("table", stored_flows.stored(), ids=lambda it: it.case.name)
+def test_it_is_the_fluid_solver_within_4_percent_and_6_of_the_peak(table):
+    (model,) = [it for it in fits.MODELS if it.effects == ("unsteady_drag",)]
+    judged = fits.judge(model, table, {})
+    _, solved_n = fits.even(table)
+    assert judged.share <= 0.04
+    assert judged.worst_n <= 0.06 * abs(solved_n).max()
+
+
+@compiled
+@pytest.mark.parametrize(("interval_s", "within"), [(1e-3, 0.002), (4e-3, 0.01), (2e-2, 0.02)])
+@pytest.mark.parametrize("name", FLUIDS)
+def test_it_equals_its_law_by_the_letter(name, interval_s, within):
+    """The letter has exact exponentials; the steps of the kernel approximate them, and late ticks need them."""
+    velocity = random_motion(3, ticks=1500) + np.array([0.1, 0.0, -0.05])
+    velocity = velocity[:: round(interval_s / 1e-3)]
+    felt, even_s = tank(name), np.full(len(velocity), interval_s)
+    by_letter = unsteady_n(felt, velocity, np.diff(velocity, axis=0, prepend=velocity[:1]) / interval_s, even_s)
+    assert abs(force(felt, velocity, even_s) - by_letter).max() <= within * abs(by_letter).max()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_turning_the_motion_turns_the_force(seed):
+    velocity = random_motion(seed, ticks=600 if COMPILED else 60, rest=20) + np.array([0.1, 0.2, 0.05])
+    by = Rotation.random(rng=np.random.default_rng(seed))
+    straight = force(tank("glycerin"), velocity)
+    assert abs(force(tank("glycerin"), by.apply(velocity)) - by.apply(straight)).max() <= 1e-12 * abs(straight).max()
+
+
+def highest_gain(name, seeds):
+    """Return the greatest net work on the hand since rest over ½ m_a v²."""
+    found = 0.0
+    for seed in seeds:
+        velocity = random_motion(seed)
+        mean = (velocity + np.concatenate([np.zeros((1, 3)), velocity[:-1]])) / 2
+        work_j = np.cumsum((force(tank(name), velocity) * mean).sum(axis=1) * 1e-3)
+        top = (velocity**2).sum(axis=1).max()
+        found = max(found, work_j.max() / (0.5 * FLUIDS[name][0] * ADDED_M3 * top)) if top > 0 else found
+    return found
+
+
+@compiled
+@pytest.mark.parametrize("name", FLUIDS)
+def test_no_motion_gains_energy(name):
+    assert highest_gain(name, range(12)) <= 1e-3
+
+
+@compiled
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", FLUIDS)
+def test_none_of_300_motions_gains_energy(name):
+    assert highest_gain(name, range(300)) <= 1e-3
+
+
+@compiled
+@pytest.mark.parametrize("name", FLUIDS)
+@pytest.mark.parametrize("tick_ms", [0.25, 0.5, 2, 4])
+def test_ticks_from_a_quarter_to_4_ms_feel_the_same(tick_ms, name):
+    def stroke(interval_s):
+        t_s = np.arange(0, 2, interval_s)
+        return np.outer(np.sin(6 * t_s), [0.3, 0.0, 0.4]), t_s
+
+    (usual, t_s), (other, other_s) = stroke(1e-3), stroke(tick_ms * 1e-3)
+    expected = force(tank(name), usual)
+    found = force(tank(name), other, np.full(len(other), tick_ms * 1e-3))
+    errors = [abs(np.interp(t_s, other_s, found[:, k]) - expected[:, k])[10:-10].max() for k in range(3)]
+    assert max(errors) <= 0.03 * abs(expected).max()
+
+
+@compiled
+@pytest.mark.parametrize("interval_s", [2e-4, 1e-3, 4e-3, 2e-2])
+def test_long_and_fast_ticks_stay_bounded(interval_s):
+    velocity = np.zeros((400, 3))
+    velocity[::2, 0], velocity[1::2, 1] = 100.0, -100.0
+    velocity[200:] = 0.0
+    felt = force(tank("water"), velocity, np.full(400, interval_s))
+    assert np.isfinite(felt).all()
+    assert abs(felt[300:]).max() <= abs(felt[:200]).max()
+
+
+def test_a_body_that_moves_already_meets_steady_drag_at_once():
+    velocity = np.tile([0.1, 0.2, -0.2], (200, 1))
+    felt = force(tank("glycerin"), velocity)
+    stokes_nspm = 3 * np.pi * 1.41 * 0.068
+    steady = -stokes_nspm * finite_reynolds(1261 * 0.3 * 0.068 / 1.41) * velocity[0]
+    assert felt == pytest.approx(np.tile(steady, (200, 1)), rel=1e-9)
+
+
+@compiled
+def test_after_a_stop_the_wake_pushes_on_and_what_is_remembered_ends_as_zero():
+    velocity = np.zeros((60_000, 3))
+    velocity[10:400] = [0.5, 0.0, 0.0]
+    felt = force(tank("glycerin"), velocity)[:, 0]
+    assert felt[399] < 0 < felt[450] < -felt[399]
+    hand = Hand(tank("tar", effects=("unsteady_drag",)))
+    hand.sweep(0.2, 50)
+    for _ in range(3000):
+        hand.tick((0.01, 0.0, 0.0))
+    memory = hand.model.liquid_states[0].unsteady_drag.memory_mps
+    assert not memory[5:].any()
+    assert not ((memory != 0) & (abs(memory) < 1e-300)).any()
+
+
+def sent_and_due(name, scale, hand_mps, stop=0):
+    """Return along x the force sent, that which is due, late drag, and its limits at the speeds u and |w|."""
+    felt = tank(name).model_copy(update={"scale": scale, "force_limit_n": 20.0})
+    hand = Hand(felt)
+    sample = hand.sweep(hand_mps, 800)[-1]
+    for _ in range(stop):
+        sample = hand.tick((hand_mps * 0.8, 0.0, 0.0))
+    local, delay = hand.model.liquid_states[0], hand.safety[0].delay_ticks
+    most_nspm = hand.model.parameters[0].slope_limit_nspm[delay]
+    stokes_nspm = 3 * np.pi * FLUIDS[name][1] * 0.068
+    late_n = -stokes_nspm * local.unsteady_drag.excess_mps[0]
+    most_n = max(most_nspm - stokes_nspm, 0.0) * local.late_mps
+    due_n = -min(stokes_nspm, most_nspm) * local.relative_mps[0] + np.clip(late_n, -most_n, most_n)
+    due_n += hand.model.liquids[0].inertia_share[delay] * local.inertia_n[0, 0]
+    return sample.device_force_n[0], due_n, late_n, most_n, most_n / local.late_mps * abs(local.relative_mps[0])
+
+
+@compiled
+@pytest.mark.parametrize(
+    ("name", "scale", "limited"), [("tar", 3.0, True), ("glycerin", 40.0, True), ("honey", 3.0, False)]
+)
+def test_late_drag_is_held_to_what_the_slope_limit_leaves(name, scale, limited):
+    sent_n, due_n, late_n, most_n, _ = sent_and_due(name, scale, 0.1)
+    assert sent_n == pytest.approx(due_n, rel=1e-9)
+    assert late_n < 0
+    assert (-late_n > most_n) == limited
+    assert (
+        steady(tank(name).model_copy(update={"scale": scale, "force_limit_n": 20.0}), 0.1).limit == "slope"
+    ) == limited
+
+
+@compiled
+def test_after_a_stop_the_slope_limit_leaves_the_force_as_it_is():
+    sent_n, due_n, late_n, most_n, at_w_n = sent_and_due("glycerin", 3.0, 0.2, stop=150)
+    assert sent_n == pytest.approx(due_n, rel=1e-9)
+    assert at_w_n < abs(late_n) < most_n
+    assert sent_n > 0
+
+
+@compiled
+@pytest.mark.parametrize(
+    "line",
+    [
+        "liquid=physical2_olive_oil scale=20 rate_hz=2000 delay=0 mass_kg=0.03 hand=thrown plant=arm",
+        "liquid=physical2_glycerin scale=20 rate_hz=2000 delay=3 hand=light motion=stroke mass_kg=0.25 viscous_nspm=0 "
+        "coulomb_n=0.3 plant=arm",
+    ],
+)
+def test_late_drag_leaves_closed_loops_stable(line):
+    assert judge(parse(line), safe=True).stable
+
+
+def test_added_mass_and_history_keep_the_stable_share_of_their_own_effects():
+    apart = liquid(1420, viscosity_pa_s=10, effects=("drag", "added_mass", "history"))
+    for velocity in (Kalman(), scene().velocity):
+        together = tank("honey").model_copy(update={"velocity": velocity, "scale": 3.0})
+        shares = [
+            pack(it).liquids[0].inertia_share for it in (together, together.model_copy(update={"liquids": (apart,)}))
+        ]
+        assert (shares[0] >= shares[1]).all()
+        assert (shares[0] < 1).any()
+
+
+@compiled
+def test_the_reserve_is_that_of_added_mass_and_history_together():
+    hand = Hand(tank("glycerin"))
+    hand.sweep(0.2, 500)
+    state, liquid_state = hand.model.state[0], hand.model.liquid_states[0]
+    mass_kg = 1261 * ADDED_M3 + 0.5 * 1.5 * 0.068**2 * np.sqrt(np.pi * 1261 * 1.41)
+    share = hand.model.liquids[0].inertia_share[hand.safety[0].delay_ticks]
+    assert state.returnable_j == pytest.approx(0.5 * share * mass_kg * (liquid_state.motion_mps**2).sum())
+
+
+@compiled
+def test_after_leaving_the_past_is_forgotten():
+    pool = liquid(1261, viscosity_pa_s=1.41, effects=("unsteady_drag",), region=Box(size_m=(1, 1, 1)))
+    velocity = np.zeros((260, 3))
+    velocity[50:100, 0] = 1.0
+    motion = moving(velocity)
+    motion.position_m[:, 0] = np.where(np.arange(260) < 100, 0.0, np.where(np.arange(260) < 140, 1.0, 0.0))
+    felt = simulate(scene(pool, format=2), motion).fx_n
+    assert abs(felt[99]) > 0.1
+    assert not felt[125:].any()
+
+
+def test_under_a_surface_drag_goes_by_the_area_and_inertia_by_the_volume():
+    """A ball a quarter under: its frontal area and its volume shares are those of the surface."""
+    pool = liquid(1261, viscosity_pa_s=1.41, region=Box(size_m=(2, 2, 2)), effects=("unsteady_drag", "surface"))
+    whole = pool.model_copy(update={"effects": ("unsteady_drag",)})
+    shallow_m = 1.0 + 0.017  # of the centre: a quarter of the diameter is in
+    velocity = np.zeros((3, 3))
+    velocity[1:, 0] = 0.3
+    motion = moving(velocity)
+    motion.position_m[:, 1] = shallow_m - np.array([0.034, 0.0, 0.0])
+    part = vectors(simulate(scene(pool, knee=UNBENT, format=2), motion), "force")
+    motion.position_m[:, 1] = 0.0
+    deep = vectors(simulate(scene(whole, knee=UNBENT, format=2), motion), "force")
+    stokes_n = 3 * np.pi * 1.41 * 0.068 * 0.3
+    area, volume = (np.arccos(0.5) - 0.5 * np.sqrt(0.75)) / np.pi, 0.25 * 0.5**2 * 2.5
+    inertial_n = -deep[1, 0] - stokes_n
+    assert -part[1, 0] == pytest.approx(stokes_n * area + inertial_n * volume, rel=2e-3)
+
+
+@compiled
+@pytest.mark.parametrize("name", ["olive oil", "gear oil", "glycerin", "honey"])
+def test_the_passivity_controller_leaves_strokes_and_stops_alone(name):
+    """What it returns after a stop is within the reserve, read from encoder counts at scale 3."""
+    t_s = np.arange(4000) / 1000
+    swell = np.minimum(t_s, 1) * np.clip(3 - t_s, 0, 1)
+    felt = tank(name).model_copy(update={"scale": 3.0})
+    for hertz, reach_m in ((0.5, 0.03), (1.6, 0.02), (3.0, 0.01)):
+        counts = np.rint(np.outer(reach_m * np.sin(2 * np.pi * hertz * t_s) * swell / 38e-6, [1.0, 0.0, 0.3]))
+        sent = simulate(felt, Motion(t_s, 3 * 38e-6 * counts))
+        assert sent.device_fx_n.any()
+        assert not (sent.limiters & LIMITER_ENERGY).any()

@@ -1,0 +1,17 @@
+"""A servo on a virtual clock with the device that tests steer."""
+
+import pytest
+
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
+from tests.haptics.probe import Probe
+
+
+@pytest.fixture
+def probe():
+    return Probe()
+
+
+@pytest.fixture
+def servo(probe):
+    return Servo(probe, clock=VirtualClock())

@@ -1,0 +1,9 @@
+"""What tests need of the operating system."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")

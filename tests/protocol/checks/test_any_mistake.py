@@ -1,0 +1,48 @@
+"""Whatever is written in place of a value, or left out, is a fault with its line and no other error."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import pytest
+
+from study_app.errors import ProtocolError
+from study_app.protocol.load import parse
+from tests.protocol.forms.mixed import MIXED
+from tests.protocol.groups.grouped import GROUPS, STUDY
+from tests.protocol.trials.studies import BLOCK, HEAD
+
+VALUE = re.compile(r'(?<== )("[^"]*"|\[[^\[\]=]*\]|[-\d.]+|true|false)')
+WRONG = ('"rating"', "{}", '{ nl = "x" }', "[1]", "-1e308")
+
+
+def mistakes(text: str) -> Iterator[str]:
+    lines = text.split("\n")
+    for number in range(len(lines)):
+        yield "\n".join(lines[:number] + lines[number + 1 :])
+    for found in VALUE.finditer(text):
+        for wrong in WRONG:
+            yield text[: found.start()] + wrong + text[found.end() :]
+
+
+def is_refused(text: str) -> bool:
+    try:
+        parse(text.encode(), "wrong")
+    except ProtocolError:
+        return True
+    return False
+
+
+@pytest.mark.parametrize("text", [HEAD + BLOCK, STUDY + GROUPS, MIXED], ids=["levels", "groups", "questions"])
+def test_any_mistake_is_a_protocol_error(text: str) -> None:
+    assert sum(map(is_refused, mistakes(text))) > len(text.splitlines())
+
+
+def test_show_if_of_a_rating_without_the_language_of_the_study_is_a_protocol_error() -> None:
+    rating = '{ id = "thick", kind = "rating", scale = "five", text = "Thick?", short = "Thick" }, '
+    text = STUDY.replace("[questionnaires.end]", '[scales.five]\nlabels.nl = ["a", "b"]\n\n[questionnaires.end]')
+    text = text.replace('items = [{ id = "comment",', f'items = [{rating}{{ id = "comment",')
+    text = text.replace("required = false", 'show_if = { item = "thick", is = 1 }')
+    with pytest.raises(ProtocolError, match=r"scales\.five\.labels"):
+        parse(text.encode(), "wrong")

@@ -1,0 +1,141 @@
+"""What check reports of paced motions: each row with its line and hint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pytest
+
+from study_app.errors import ProtocolError
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.steady_state import steady
+from study_app.protocol.checks.pace import FASTER
+from study_app.protocol.load import parse
+from study_app.protocol.model import Follow, Protocol
+
+STUDY = """\
+format = 2
+sequence = ["thicker"]
+study.name = "pace"
+[liquids.damper]
+drag = { law = "linear", damping_nspm = 8 }
+[conditions.damper]
+liquid = "damper"
+[tasks.stir]
+kind = "follow"
+amplitude_mm = 25
+[stimuli.damping]
+vary = "damping_nspm"
+standards = [8]
+levels = [0.02, 0.6]
+[methods.few]
+kind = "constant"
+repetitions = 2
+[blocks.thicker]
+stimulus = "damping"
+design = "2ifc"
+method = "few"
+task = "stir"
+"""
+CONDITIONS = ('stimulus = "damping"\ndesign = "2ifc"\nmethod = "few"', 'conditions = ["damper"]')
+REACH = (
+    'kind = "follow"\namplitude_mm = 25',
+    'kind = "reach"\ntargets_mm = [[-20, 0, 0], [20, 0, 0]]\nradius_mm = 5\ndwell_s = 0.2\ncount = 2\n'
+    'instruction = "Reach."',
+)
+HIDDEN = ('liquid = "damper"\n[tasks', 'liquid = "damper"\nball = "hidden"\n[tasks')
+
+
+def study(edits: Iterable[tuple[str, str]]) -> Protocol:
+    text = STUDY
+    for old, new in edits:
+        assert old in text
+        text = text.replace(old, new)
+    return parse(text.encode(), "pace.toml")
+
+
+@pytest.mark.parametrize(
+    ("edits", "place", "message", "hint"),
+    [
+        (
+            [("[8]", "[40]")],
+            "stimuli.damping.levels",
+            "standard 40 at level 0.6 gives 64 N·s/m at the hand; the slope limit (1000 Hz, ewma, 1 tick) is 53",
+            "levels to 0.325, or the standard to 33.1",
+        ),
+        (
+            [("[8]", "[32]")],
+            "stimuli.damping.levels",
+            "51.2 N·s/m at 1.2 times the paced 0.157 m/s is 9.7 N; device.force_limit_n is 8",
+            "amplitude_mm = 20.7 or frequency_hz = 0.82",
+        ),
+        (
+            [CONDITIONS, ("damping_nspm = 8", "damping_nspm = 45")],
+            "blocks.thicker.conditions",
+            '"damper" at 1.2 times the paced 0.157 m/s is 8.5 N; device.force_limit_n is 8',
+            "amplitude_mm = 23.5 or frequency_hz = 0.94",
+        ),
+        (
+            [("amplitude_mm = 25", "amplitude_mm = 10\nfrequency_hz = 3")],
+            "tasks.stir.frequency_hz",
+            "at 3 Hz the velocity estimator passes 96.9 % of a damper",
+            "at most 1.6 Hz: 99 %",
+        ),
+        (
+            [("amplitude_mm = 25", "amplitude_mm = 60")],
+            "tasks.stir.amplitude_mm",
+            "60 mm with radius 6 mm leaves the tank",
+            "device.workspace_mm reaches to 50 mm",
+        ),
+        (
+            [HIDDEN, REACH],
+            "conditions.damper.ball",
+            'is hidden, but block "thicker" has a reaching task: nobody could aim',
+            'a task of kind "follow" or "explore"',
+        ),
+    ],
+)
+def test_each_row_is_reported_at_its_line(edits: list[tuple[str, str]], place: str, message: str, hint: str) -> None:
+    with pytest.raises(ProtocolError) as refused:
+        study(edits)
+    (problem,) = refused.value.problems
+    assert problem.place.startswith(place)
+    assert (problem.message, problem.hint) == (message, hint)
+    assert problem.line is not None
+
+
+@pytest.mark.parametrize(
+    "edits",
+    [
+        [],
+        [("[8]", "[32]"), ("amplitude_mm = 25", "amplitude_mm = 20.7")],
+        [("[8]", "[32]"), ("amplitude_mm = 25", "amplitude_mm = 25\nfrequency_hz = 0.82")],
+        [("[8]", "[33.1]"), ("amplitude_mm = 25", "amplitude_mm = 20")],
+        [("amplitude_mm = 25", "amplitude_mm = 10\nfrequency_hz = 1.6")],
+        [HIDDEN],
+    ],
+)
+def test_what_a_hint_suggests_passes_and_is_not_clipped(edits: list[tuple[str, str]]) -> None:
+    protocol = study(edits)
+    task = protocol.tasks["stir"]
+    assert isinstance(task, Follow)
+    stimulus = protocol.stimuli["damping"]
+    strongest = stimulus.comparison(stimulus.standards[0], stimulus.levels[1])
+    scene = protocol.scene_for("damper")
+    damper = scene.liquids[0]
+    drag = damper.drag.model_copy(update={"damping_nspm": strongest})
+    felt: Scene = scene.model_copy(update={"liquids": (damper.model_copy(update={"drag": drag}),)})
+    assert steady(felt, FASTER * task.fastest_stroke((0.1, 0.06, 0.06)).speed_mps).limit is None
+
+
+@pytest.mark.parametrize(
+    ("line", "place"),
+    [
+        ('[conditions.x]\nliquid = "water"\nball = "hidden"', "conditions.x.ball: belongs to format 2"),
+        ('[tasks.x]\nkind = "follow"', 'tasks.x.kind: "follow" belongs to format 2'),
+    ],
+)
+def test_new_keys_and_values_belong_to_format_2(line: str, place: str) -> None:
+    with pytest.raises(ProtocolError) as refused:
+        parse(f'format = 1\nstudy.name = "old"\n{line}\n'.encode(), "old.toml")
+    assert any(place in str(problem) for problem in refused.value.problems)

@@ -1,0 +1,151 @@
+"""The steps of one session in a study whose groups or sessions differ."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from study_app.errors import ProtocolError, StudyError
+from study_app.protocol.describe import describe, expected_duration_s
+from study_app.protocol.groups.own_protocol import own_protocol, variants
+from study_app.protocol.groups.steps import every_step, refuse_beyond_last, steps_of
+from study_app.protocol.load import load
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.balance import balances, numbered
+from study_app.protocol.orders.block_orders import orders_of, orders_of_receipt
+from study_app.protocol.orders.schedule import build_schedule, draw_key
+from study_app.protocol.streams import stream
+from study_app.store.receipt import without_conditions
+from tests.protocol.groups.grouped import GROUPS, grouped
+
+SESSIONS = 'sequences = [["hello", "thin"], ["thick", "thin", "end"]]\n'
+HEAD = "format = 2\n"
+
+
+def sessions() -> Protocol:
+    """Return the study without groups, with two sessions that differ."""
+    return grouped((HEAD, HEAD + SESSIONS), groups="")
+
+
+def test_a_group_has_its_own_sequence_in_every_session() -> None:
+    study = grouped()
+    for session in (1, 2, 7):
+        assert steps_of(study, "first_thin", session) == ("hello", "thin", "thick", "end")
+        assert steps_of(study, "first_thick", session) == ("hello", "thick", "thin")
+    assert every_step(study) == study.steps == ("hello", "thin", "thick", "end")
+    refuse_beyond_last(study, 99)
+
+
+def test_a_group_without_a_sequence_has_that_of_the_study() -> None:
+    groups = '[groups.own]\nsequences = [["thick"], ["thin"]]\n[groups.other]\nshare = 2\n'
+    study = grouped((HEAD, f'{HEAD}sequence = ["hello", "thin", "end"]\n'), groups=groups)
+    assert steps_of(study, "other", 3) == ("hello", "thin", "end")
+    assert steps_of(study, "own", 2) == ("thin",)
+    refuse_beyond_last(study, 3)
+    assert study.steps == ("thick", "thin", "hello", "end")
+
+
+def test_a_session_beyond_the_last_is_refused() -> None:
+    study = sessions()
+    assert steps_of(study, None, 2) == ("thick", "thin", "end")
+    for refused in (lambda: steps_of(study, None, 3), lambda: refuse_beyond_last(study, 3)):
+        with pytest.raises(StudyError, match=r"^session 3: .* has 2 \(sequences\); permitted: 1 to 2$"):
+            refused()
+    refuse_beyond_last(study, 2)
+
+
+def test_a_session_has_its_own_blocks_forms_parts_and_duration() -> None:
+    study = sessions()
+    first, second = (one.protocol for one in variants(study))
+    assert [block.id for block in first.blocks_in_order] == ["thin"]
+    assert (first.parts, second.parts, study.parts) == (1, 2, 2)
+    assert [(block.id, block.part) for block in second.main_blocks] == [("thick", 1), ("thin", 2)]
+    assert not first.forms
+    assert list(second.forms) == ["end"]
+    assert [orders_of(one).answers for one in (first, second)] == [2, 7]
+    assert expected_duration_s(first) < expected_duration_s(second)
+
+
+def test_the_key_has_the_blocks_of_all_groups_and_sessions() -> None:
+    assert set(draw_key(sessions(), stream(1, "key").random)) == {"thin", "thick"}
+
+
+@pytest.mark.parametrize(("group", "session"), [("first_thin", 1), ("first_thick", 2)])
+def test_a_receipt_gives_the_orders_of_a_group(group: str, session: int) -> None:
+    study = grouped()
+    kept = json.loads(json.dumps(without_conditions(study)))
+    own = orders_of(own_protocol(study, group, session))
+    assert orders_of_receipt(kept, group=group, session=session) == own
+    trials = build_schedule(own, "P001", 5).trials
+    assert [trial.part for trial in trials] == sorted(trial.part or 0 for trial in trials), "parts count up"
+
+
+def test_a_study_of_one_sequence_is_as_it_was() -> None:
+    study = load("demo")
+    (one,) = variants(study)
+    assert one.protocol is study
+    assert one.name == ""
+    assert study.steps == study.sequence
+
+
+def test_describe_has_duration_and_answers_of_each_group_and_session() -> None:
+    text = describe(grouped())
+    assert "Group first_thin (about 2 min, 7 answers)" in text
+    assert "Group first_thick (about 1 min, 6 answers)" in text
+    assert "first_thick, share 1" in text
+    assert "Session 2 (about 1 min, 7 answers)" in describe(sessions())
+
+
+def test_design_judges_each_group_over_its_own_participants() -> None:
+    judged = list(balances(grouped(), numbered(7), 1))
+    assert [one.session for one in judged] == ["group first_thin", "group first_thick"]
+    assert sorted(one.participants for one in judged) == [3, 4]
+    (alone,) = balances(grouped(), numbered(1), 1)
+    assert alone.participants == 1
+
+
+@pytest.mark.parametrize(
+    ("groups", "place", "words"),
+    [
+        ('[groups.one]\nsequence = ["hello", "thin", "thick", "end"]\n', "groups", "there is only one group"),
+        (GROUPS.replace('"thick", ', "").replace(', "thin"]', "]"), "groups", 'block "thick" is in no group'),
+        (GROUPS.replace("[groups.first_thick]", "[groups.first_thick]\nsequences = [[]]"), None, "at least 1"),
+        (
+            GROUPS.replace('"hello", "thick"', '"hello", "thik"'),
+            "groups.first_thick.sequence.2",
+            'no page or block "thik"',
+        ),
+        (GROUPS.replace('"thick", "thin"', '"thin", "thin"'), "groups.first_thick.sequence.3", "comes twice"),
+        (GROUPS.replace('"hello", ', ""), "pages.hello", "comes nowhere in sequence"),
+        (GROUPS + "share = 0\n", "groups.first_thick.share", "must be at least 1"),
+        (GROUPS + 'sequences = [["thin"]]\n', "groups.first_thick.sequences", "either sequence or sequences"),
+    ],
+)
+def test_check_names_what_is_wrong_with_groups(groups: str, place: str | None, words: str) -> None:
+    with pytest.raises(ProtocolError) as raised:
+        grouped(groups=groups)
+    problems = {problem.place: str(problem) for problem in raised.value.problems}
+    assert words in "\n".join(problems.values())
+    assert place is None or words in problems[place]
+
+
+@pytest.mark.parametrize(
+    ("added", "place", "words"),
+    [
+        ('sequence = ["hello"]\n', "sequence", "is used by no group"),
+        (f'sequence = ["hello"]\n{SESSIONS}', "sequences", "give either sequence or sequences"),
+    ],
+)
+def test_check_names_a_sequence_that_nobody_has(added: str, place: str, words: str) -> None:
+    with pytest.raises(ProtocolError) as raised:
+        grouped((HEAD, HEAD + added))
+    assert any(problem.place == place and words in problem.message for problem in raised.value.problems)
+
+
+@pytest.mark.parametrize("key", ["groups", "sequences"])
+def test_groups_and_sequences_belong_to_format_2(key: str) -> None:
+    added = (HEAD, f"format = 1\n{SESSIONS}") if key == "sequences" else (HEAD, "format = 1\n")
+    with pytest.raises(ProtocolError) as raised:
+        grouped(added)
+    assert any(problem.place == key and problem.message == "belongs to format 2" for problem in raised.value.problems)

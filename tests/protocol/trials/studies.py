@@ -1,0 +1,121 @@
+"""A study with a block of levels, as text: its designs and methods are added by each test."""
+
+from __future__ import annotations
+
+from study_app.protocol.load import parse
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key
+from study_app.protocol.streams import stream
+from study_app.protocol.trials.answered import heard_of
+from study_app.protocol.trials.due import Due, next_level
+from study_app.protocol.trials.keyed import Key
+from study_app.protocol.trials.method import Heard
+from study_app.protocol.trials.tracks import design_of
+
+HEAD = """\
+format = 2
+sequence = ["viscosity"]
+
+[study]
+name = "levels"
+version = "1"
+languages = ["en"]
+title = "Which one is thicker?"
+
+[device]
+workspace_mm = [100, 60, 60]
+
+[scene]
+scale = 2
+
+[limits]  # what explorations of oil deliver is not what these tests are about
+level_error_percent = 100
+withheld_percent = 100
+
+[liquids.thin]
+density_kg_m3 = 1000
+viscosity_pa_s = 1
+effects = ["drag"]
+drag = { law = "haider-levenspiel" }
+
+[liquids.thick]
+density_kg_m3 = 1260
+viscosity_pa_s = 4
+effects = ["drag"]
+drag = { law = "haider-levenspiel" }
+
+[conditions.oil]
+liquid = "thin"
+
+[conditions.other]
+liquid = "thick"
+
+[conditions.late]
+liquid = "thin"
+delay_ms = 100
+
+[tasks.stir]
+kind = "explore"
+min_s = 1
+max_s = 3
+instruction = "Stir."
+
+[stimuli.viscosity]
+condition = "oil"
+vary = "viscosity_pa_s"
+standards = [1, 2]
+levels = [0.1, 0.8]
+
+[methods.few]
+kind = "constant"
+levels = [0.2, 0.4, 0.8]
+repetitions = 8
+"""
+BLOCK = """
+[blocks.viscosity]
+part = 1
+title = "Viscosity"
+setting_label = "Pair"
+code_prefix = "V"
+task = "stir"
+stimulus = "viscosity"
+design = "2ifc"
+method = "few"
+"""
+SECRET = bytes(range(32))
+
+
+def study(*edits: tuple[str, str], more: str = "") -> Protocol:
+    """Return the study with edits of its text and more tables."""
+    text = HEAD + BLOCK + more
+    for old, new in edits:
+        assert old in text
+        text = text.replace(old, new)
+    return parse(text.encode(), "levels.toml")
+
+
+def key_of(protocol: Protocol, secret: bytes = SECRET) -> Key:
+    """Return a key drawn with a fixed seed."""
+    return Key(draw_key(protocol, stream(1, "key").random), secret)
+
+
+def run(protocol: Protocol, key: Key, answer: str = "", participant: str = "P001", seed: int = 1) -> list[Due]:
+    """Return what the trials of a session present; each is answered alike, or correctly where ``answer`` is empty."""
+    schedule = build_schedule(protocol, participant, seed)
+    return [due for due, _ in answered(protocol, key, schedule, answer)]
+
+
+def answered(protocol: Protocol, key: Key, schedule: Schedule, answer: str = "") -> list[tuple[Due, Heard]]:
+    """Return what each trial presents, with the answer to it; trials that are passed over are left out."""
+    heard: list[Heard] = []
+    found = []
+    for trial in schedule.trials:
+        due = next_level(protocol, key, schedule, trial, heard)
+        if due is None:
+            continue
+        design = design_of(protocol, protocol.blocks[trial.block])
+        given = answer or design.correct(due.arrangement) or ""
+        block, level = protocol.blocks[trial.block], due.level
+        heard.append(heard_of(protocol, block, trial.number, trial.code, level, due.arrangement, given))
+        found.append((due, heard[-1]))
+    return found

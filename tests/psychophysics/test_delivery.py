@@ -1,0 +1,135 @@
+"""The delivered level: exact for a force that is exact, with the estimator's known biases through the compiled tick."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.motion import Motion as Path
+from study_app.haptics.model.scene import Ewma, Liquid, Scene, Velocity
+from study_app.haptics.runtime.offline import samples_along
+from study_app.psychophysics.delivery import at, damping, difference, motion, share
+from tests.compiled import needs_servo
+
+RATE_HZ = 1000.0
+COUNT_M = 38e-6
+"""An encoder count of a Falcon at the handle."""
+
+
+def swing(frequency_hz: float = 1.0, amplitude_m: float = 0.02, lasts_s: float = 3.0) -> tuple[Any, Any]:
+    """Return times (n,) [s] and positions (n, 3) [m] of an even swing along x."""
+    t_s = np.arange(round(lasts_s * RATE_HZ)) / RATE_HZ
+    return t_s, np.column_stack((amplitude_m * np.sin(2 * np.pi * frequency_hz * t_s), 0 * t_s, 0 * t_s))
+
+
+def damper(b_nspm: float, scale: float, velocity: Velocity) -> Scene:
+    drag = Drag(law="linear", damping_nspm=b_nspm)
+    liquid = Liquid(id="damper", density_kg_m3=1000, effects=("drag",), drag=drag)
+    return Scene(liquids=(liquid,), scale=scale, velocity=velocity)
+
+
+def felt(b_nspm: float, t_s: Any, position_m: Any, scale: float = 1.0, velocity: Velocity | None = None) -> Any:
+    """Return the samples of a hand's motion through a damper, with its positions in the hand frame."""
+    samples = samples_along(damper(b_nspm, scale, velocity or Ewma()), Path(t_s, scale * position_m))
+    samples.position_m = position_m
+    return samples
+
+
+def fitted(samples: Any, t_s: Any, from_s: float = 1.0) -> tuple[float, float]:
+    moved = motion(t_s, samples.position_m, 1 / RATE_HZ).after(from_s)
+    found = damping(at(moved.times_s, t_s, samples.device_force_n), moved)
+    assert found is not None
+    return found
+
+
+def test_damping_and_mass_of_an_exact_force_are_found() -> None:
+    t_s, position_m = swing()
+    position_m[:, 1] = 0.01 * np.cos(2 * np.pi * 1.7 * t_s)
+    moved = motion(t_s, position_m, 1 / RATE_HZ)
+    force_n = -8.0 * moved.velocity_mps - 0.2 * moved.acceleration_mps2
+    assert damping(force_n, moved) == pytest.approx((8.0, 0.2), rel=1e-12)
+    true_mps = 2 * np.pi * 0.02 * np.cos(2 * np.pi * moved.times_s)
+    assert moved.velocity_mps[:, 0] == pytest.approx(true_mps, abs=1e-5)
+
+
+def test_a_cubic_is_differentiated_exactly_at_uneven_times_to_the_error_of_interpolation() -> None:
+    t_s = np.arange(400) / RATE_HZ
+    cubic = np.column_stack((t_s**3, 2 * t_s - t_s**2, 0 * t_s))
+    even = motion(t_s, cubic, 1 / RATE_HZ)
+    assert even.velocity_mps[:, 0] == pytest.approx(3 * even.times_s**2, abs=1e-10)
+    assert even.acceleration_mps2[:, 1] == pytest.approx(np.full(len(even.times_s), -2.0), rel=1e-8)
+    late_s = t_s + 1e-4 * np.random.default_rng(1).uniform(size=len(t_s))
+    uneven = motion(late_s, np.column_stack((late_s**3, 0 * t_s, 0 * t_s)), 1 / RATE_HZ)
+    assert uneven.velocity_mps[:, 0] == pytest.approx(3 * uneven.times_s**2, abs=1e-4)
+
+
+@pytest.mark.parametrize("position_m", [np.zeros((2000, 3)), np.zeros((30, 3)), np.zeros((0, 3))])
+def test_a_hand_at_rest_has_no_damping(position_m: Any) -> None:
+    moved = motion(np.arange(len(position_m)) / RATE_HZ, position_m, 1 / RATE_HZ)
+    assert damping(np.ones((len(moved.times_s), 3)), moved) is None
+    assert moved.rms_speed_mps == 0
+
+
+def test_the_share_sent_is_a_regression_on_the_model_force() -> None:
+    model_n = np.random.default_rng(2).normal(size=(100, 3))
+    assert share(0.9 * model_n, model_n) == pytest.approx(0.9)
+    assert share(model_n, 0 * model_n) is None
+
+
+def test_what_comparison_and_standard_share_cancels() -> None:
+    assert difference([6.0, 6.5], [False, True]) == pytest.approx(0.5)
+    assert difference([6.0, 9.0, 6.0], [True, False, True]) == pytest.approx(-3.0)
+    assert difference([6.0, None], [False, True]) is None
+    assert difference([6.0, 7.0], [True, True]) is None
+
+
+@needs_servo
+@pytest.mark.parametrize(("frequency_hz", "low"), [(1.0, 0.005), (2.0, 0.014)])
+def test_the_lag_of_ewma_takes_its_share_through_the_compiled_tick(frequency_hz: float, low: float) -> None:
+    t_s, position_m = swing(frequency_hz)
+    b_nspm, _ = fitted(felt(8, t_s, position_m), t_s)
+    assert 1 - b_nspm / 8 == pytest.approx(low, abs=0.002)
+
+
+@needs_servo
+@pytest.mark.parametrize("b_nspm", [4.0, 32.0])
+def test_the_same_lag_acts_as_a_negative_mass_of_9_ms_times_the_damping(b_nspm: float) -> None:
+    t_s, position_m = swing()
+    assert fitted(felt(b_nspm, t_s, position_m), t_s)[1] == pytest.approx(-9.4e-3 * b_nspm, rel=0.05)
+
+
+@needs_servo
+def test_encoder_counts_of_a_falcon_scatter_the_damping_by_a_fifth_of_a_percent() -> None:
+    found = []
+    for phase in range(20):
+        t_s, position_m = swing(amplitude_m=0.02 + 1e-5 * phase)
+        counted_m = np.rint((position_m + 1e-6 * phase) / COUNT_M) * COUNT_M
+        found.append(fitted(felt(8, t_s, counted_m), t_s)[0] / 8)
+    assert np.std(found) < 0.004
+    assert 1 - np.mean(found) == pytest.approx(0.005, abs=0.003)
+
+
+@needs_servo
+@pytest.mark.parametrize("velocity", [Ewma(), Scene.model_fields["velocity"].get_default(call_default_factory=True)])
+def test_a_linear_law_is_a_damper_at_the_hand_at_any_scale(velocity: Velocity) -> None:
+    t_s, position_m = swing()
+    found = [felt(8, t_s, position_m, scale, velocity) for scale in (0.5, 1.0, 3.0, 10.0)]
+    forces_n = [samples.device_force_n for samples in found]
+    for scale, samples, force_n in zip((0.5, 1.0, 3.0, 10.0), found, forces_n, strict=True):
+        assert force_n == pytest.approx(-8.0 * samples.velocity_mps / scale, abs=1e-9)
+        assert force_n == pytest.approx(forces_n[1], abs=1e-6)
+    assert fitted(found[2], t_s)[0] == pytest.approx(8.0, rel=0.01)
+
+
+def test_nothing_but_numpy_and_itself_is_loaded() -> None:
+    program = (
+        "import sys, study_app.psychophysics.delivery\n"
+        "print(sorted(name for name in sys.modules if name.startswith(('study_app.', 'scipy', 'pandas', 'numba'))))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "['study_app.psychophysics', 'study_app.psychophysics.delivery']"

@@ -1,0 +1,93 @@
+"""Every number that the program writes about a trial, and a classifier that names what was presented by them."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+from scipy.stats import binomtest
+
+from study_app.store.folders import SessionFolder
+from study_app.store.journals.journal import Line
+
+ABOUT_ANSWERS = frozenset({"item_shown", "choice", "responses"})
+ABOUT_RECORDINGS = frozenset({"samples_recorded", "samples_unrecorded", "frames_recorded"})
+TIMES_OF_ACTIONS = frozenset({"t_s", "t_task_s", "trial_started_s", "interval_started_s", "gap_s"})
+PASSED_OVER = (
+    TIMES_OF_ACTIONS | ABOUT_RECORDINGS | {"n", "trial", "attempt", "index", "of", "part", "session", "interval"}
+)
+
+Numbers: TypeAlias = dict[str, float]
+Trials: TypeAlias = dict[tuple[str, int], tuple[str, Numbers]]
+"""By participant and trial: the condition, and every number written about the trial."""
+
+
+def every_number(
+    session: SessionFolder, study: str, lines: Iterable[Line], presented: Callable[[Line], str | None]
+) -> Trials:
+    """Return what a session's files hold about each trial beside answers, times of actions, recordings.
+
+    Parameters
+    ----------
+    session, study
+        The session's folder, and the study's name.
+    lines : iterable of Line
+        The lines of its journal, as they were written.
+    presented : callable
+        Returns what the trial that a line begins presented, None for a trial that is left out.
+    """
+    lines = list(lines)
+    found: Trials = {}
+    for line in lines:
+        if line["event"] == "trial_started" and (what := presented(line)) is not None:
+            found[session.participant, line["trial"]] = (what, {})
+    for line in lines:
+        trial = (session.participant, line.get("trial"))
+        if trial in found and line["event"] not in ABOUT_ANSWERS:
+            found[trial][1].update(numbers(line, f"{line['event']} {line.get('interval', '')} "))
+    for name in ("trials", "intervals"):
+        if not session.table(study, name).exists():
+            continue
+        with session.table(study, name).open(encoding="utf-8", newline="") as table:
+            for row in csv.DictReader(table):
+                trial = (session.participant, int(row["trial"]))
+                if trial in found:
+                    found[trial][1].update(numbers(row, f"{name} {row.get('interval', '')} "))
+    return found
+
+
+def numbers(said: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a line or row, flags among them, and how long each text is."""
+    for name, value in said.items():
+        if name not in PASSED_OVER:
+            try:
+                yield prefix + name, float({"true": 1, "false": 0}.get(value, value))
+            except (TypeError, ValueError):
+                yield f"{prefix}{name}, length", float(len(str(value)))
+
+
+def told(trials: Trials) -> tuple[int, int, float]:
+    """Return how many conditions the nearest mean names, of how many trials, and the p of chance alone.
+
+    By all numbers together and by each alone, whichever tells most; p is corrected for having tried all (Bonferroni).
+    The means are those of the other sessions; every number counts by its standard deviation there.
+    """
+    names = sorted({name for _, said in trials.values() for name in said})
+    values = np.array([[said.get(name, 0.0) for name in names] for _, said in trials.values()])
+    people = np.array([person for person, _ in trials])
+    conditions = np.array([condition for condition, _ in trials.values()])
+    kinds = np.unique(conditions)
+    hits = np.zeros(1 + len(names), dtype=int)
+    for person in np.unique(people):
+        others = people != person
+        scale = values[others].std(axis=0)
+        scale[scale < 1e-12] = np.inf
+        means = np.array([values[others & (conditions == kind)].mean(axis=0) for kind in kinds])
+        each = ((values[~others][:, None] - means) / scale) ** 2
+        far = np.concatenate([each.sum(axis=2, keepdims=True), each], axis=2)
+        hits += (kinds[far.argmin(axis=1)] == conditions[~others][:, None]).sum(axis=0)
+    right = int(hits.max())
+    p = binomtest(right, len(people), 1 / len(kinds), alternative="greater").pvalue
+    return right, len(people), min(float(p) * len(hits), 1.0)

@@ -1,0 +1,254 @@
+"""Two rehearsals whose keys differ write and show the same, but for what is sealed; numbers tell no level."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import pytest
+
+from study_app.protocol.load import load
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.streams import stream
+from study_app.protocol.trials.tracks import design_of
+from study_app.session.simulated import participant
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.blinded import sealing
+from study_app.store.blinded.blinding import open_or_draw_key, read_key
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.progress import Progress
+from study_app.store.tables.columns import SEALED
+from study_app.viewmodels.operator import Session, operator_view
+from study_app.viewmodels.servo_health import Vitals
+from study_app.viewmodels.session.stages import stages
+from tests.compiled import needs_servo
+from tests.protocol.trials.studies import BLOCK, HEAD
+from tests.session.sealed.numbers_written import Trials, every_number, told
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+MORE = """
+[scales.thickness]
+labels.en = ["thin", "medium", "thick"]
+
+[stimuli.value]
+condition = "oil"
+vary = "viscosity_pa_s"
+level = "value"
+levels = [0.5, 8]
+
+[stimuli.delay]
+condition = "oil"
+vary = "delay_ms"
+spacing = "linear"
+levels = [20, 200]
+
+[designs.rated]
+kind = "rating"
+scale = "thickness"
+
+[methods.five]
+kind = "constant"
+levels = 5
+repetitions = 1
+
+[blocks.detect]
+task = "stir"
+stimulus = "delay"
+design = "yesno"
+method = "five"
+
+[blocks.rate]
+task = "stir"
+stimulus = "value"
+design = "rated"
+method = "five"
+
+[blocks.number]
+task = "stir"
+stimulus = "value"
+design = "estimation"
+method = "five"
+
+[blocks.pairs]
+task = "stir"
+design = "2ifc"
+conditions = ["oil", "other", "late"]
+standard = "oil"
+repetitions = 2
+"""
+EDITS = (
+    ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "pairs"]'),
+    ("repetitions = 8", "repetitions = 2"),
+    ("min_s = 1", "min_s = 0.3"),
+    ("part = 1\n", ""),
+    ('code_prefix = "V"\n', ""),
+)
+SESSIONS = 12
+HIDDEN = {"sealed", "key_hash", "at", "previous", "fingerprint"}
+"""What may differ: sealed fields, hashes, and the time of day."""
+
+Said: TypeAlias = dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    text = HEAD + BLOCK + MORE
+    for old, new in EDITS:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path_factory.mktemp("levels") / "levels.toml"
+    path.write_text(text)
+    return path
+
+
+def answer_blindly(study: Protocol, block: Any, item: Any, sensed: Any, before: Any, draw: Callable[[], float]) -> Any:
+    """Answer by the draw alone, whatever was felt."""
+    design, share = design_of(study, block), draw()
+    if design.reply == "choice":
+        return design.answers[int(share * len(design.answers))]
+    return 1 + int(share * 3) if design.reply == "rating" else round(1 + 9 * share, 2)
+
+
+def run(protocol: Path, folder: Path, secret: int) -> Path:
+    """Rehearse a session under a key drawn from ``secret``."""
+    folder.mkdir(parents=True)
+    open_or_draw_key(folder, load(str(protocol)), stream(secret, "blinding").random)
+    return rehearse(protocol, participants=1, seed=4, results=folder, recordings=False)
+
+
+@pytest.fixture(scope="module")
+def blindly() -> Any:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(participant, "answer", answer_blindly)
+        yield patch
+
+
+@pytest.fixture(scope="module")
+def first(protocol: Path, blindly: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return run(protocol, tmp_path_factory.mktemp("first") / "study", 1)
+
+
+@pytest.fixture(scope="module")
+def second(protocol: Path, blindly: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return run(protocol, tmp_path_factory.mktemp("second") / "study", 2)
+
+
+def said_in(folder: Path) -> Said:
+    """Return what every file of a study says, but for the key and for what may differ."""
+    found: Said = {}
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder).as_posix()
+        if path.is_dir() or path.name in {"key.sealed", "checksums.sha256", "fingerprints.txt"}:
+            found[name] = None
+        elif path.suffix == ".csv":
+            with path.open(newline="", encoding="utf-8") as file:
+                found[name] = [
+                    {column: cell for column, cell in row.items() if not column.endswith("_at")}
+                    for row in csv.DictReader(file)
+                ]
+        else:
+            text = path.read_text(encoding="utf-8")
+            parts = text.splitlines() if path.suffix == ".jsonl" else [text]
+            found[name] = [shown(json.loads(part)) for part in parts] if path.suffix.startswith(".json") else text
+    return found
+
+
+def shown(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: shown(inner) for name, inner in value.items() if name not in HIDDEN and not name.endswith("_at")}
+    return [shown(inner) for inner in value] if isinstance(value, list) else value
+
+
+def operator_views(folder: Path, protocol: Path) -> list[Any]:
+    """Return all that the operator saw of a session, event by event."""
+    study = load(str(protocol))
+    schedule = build_schedule(study, "P001", 4)
+    session = Session(study, schedule, stages(study, schedule), "P001", 60.0, 40, 0.002, "scripted", "hand", ())
+    progress = Progress()
+    views = []
+    (place,) = StudyFolder(folder).sessions()
+    for line in journal.read(place.journal):
+        progress.take(line)
+        views.append(operator_view(session, progress, Vitals(), now_s=line["t_s"], force_on=True))
+    return views
+
+
+def levels(folder: Path) -> list[Any]:
+    (place,) = StudyFolder(folder).sessions()
+    lines = sealing.opened(journal.read(place.journal), read_key(folder))
+    return [(line["level"], line["arrangement"]) for line in lines if line["event"] == "trial_started"]
+
+
+def test_sessions_under_two_keys_present_different_levels(first: Path, second: Path) -> None:
+    assert len(levels(first)) == len(levels(second)) > 30
+    assert sum(one != other for one, other in zip(levels(first), levels(second), strict=True)) > 15
+
+
+def test_sessions_under_two_keys_write_the_same_but_for_sealed_fields(first: Path, second: Path) -> None:
+    one, other = said_in(first), said_in(second)
+    assert len(one) > 8
+    assert {name for name in one if one[name] != other.get(name)} | (set(other) - set(one)) == set()
+
+
+def test_a_planted_leak_makes_them_differ(first: Path, protocol: Path, blindly: Any, tmp_path: Path) -> None:
+    """One measure of one event is not sealed."""
+    with blindly.context() as patch:
+        left = {**sealing._SEALED_IN, "interval_ended": SEALED - {"force_peak_n"}}
+        patch.setattr(sealing, "_SEALED_IN", left)
+        other = said_in(run(protocol, tmp_path / "planted", 2))
+    one = said_in(first)
+    assert {name.rpartition("/")[2] for name in one if one[name] != other.get(name)} == {"journal.jsonl"}
+
+
+def test_the_operator_sees_the_same_under_two_keys(first: Path, second: Path, protocol: Path) -> None:
+    views = operator_views(first, protocol)
+    assert views == operator_views(second, protocol)
+    assert any(view.track for view in views)
+
+
+@pytest.fixture(scope="module")
+def sessions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a study of one block of pairs, answered by what was felt."""
+    folder = tmp_path_factory.mktemp("told")
+    text = HEAD + BLOCK
+    for old, new in EDITS[2:]:
+        text = text.replace(old, new)
+    path = folder / "pairs.toml"
+    path.write_text(text.replace("repetitions = 8", "repetitions = 4"))
+    return rehearse(path, participants=SESSIONS, seed=6, results=folder / "study", recordings=False)
+
+
+def numbers_of(folder: Path, what: str) -> Trials:
+    """Return every number written about each trial, with its ``what``: level, standard or arrangement."""
+    key = read_key(folder)
+    found: Trials = {}
+    for session in StudyFolder(folder).sessions():
+        lines = journal.read(session.journal)
+        presented = {line["n"]: line for line in sealing.opened(lines, key)}
+        found |= every_number(session, "levels", lines, lambda line, of=presented: str(of[line["n"]][what]))
+    return found
+
+
+@pytest.mark.parametrize("what", ["level", "standard", "arrangement"])
+def test_no_number_that_is_written_tells_what_was_presented(sessions: Path, what: str) -> None:
+    right, trials, p = told(numbers_of(sessions, what))
+    assert trials == SESSIONS * 24
+    assert p > 0.01, f"{right} of {trials} trials were told (p = {p:.2g})"
+
+
+@pytest.mark.parametrize("what", ["level", "standard", "arrangement"])
+def test_after_unblinding_the_same_search_tells_it(sessions: Path, tmp_path: Path, what: str) -> None:
+    """So the search can fail, and what was sealed is there."""
+    folder = tmp_path / "opened"
+    shutil.copytree(sessions, folder)
+    assert unblind(folder, "AB", "to see that it tells").left == ()
+    right, trials, p = told(numbers_of(folder, what))
+    assert p < 0.005, f"{right} of {trials} trials were told (p = {p:.2g})"

@@ -1,0 +1,120 @@
+"""A study of dampers felt along a paced swing: rehearsed, computed again, evaluated."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study_app.analysis.report.write_report import report
+from study_app.evaluation.replay import replay
+from study_app.haptics.model.layout import LIMITER_FADE
+from study_app.protocol.describe import describe
+from study_app.protocol.load import load
+from study_app.protocol.model import Follow
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.folders import StudyFolder
+from study_app.store.recording_files import read_samples
+from tests.compiled import needs_servo
+
+pytestmark = needs_servo
+
+STUDY = """\
+format = 2
+study = { name = "dampers", title = "Dampers" }
+scene = { scale = 3, fade_s = 0.3 }
+sequence = ["dampers"]
+
+[liquids.thin]
+drag = { law = "linear", damping_nspm = 4 }
+[liquids.thick]
+drag = { law = "linear", damping_nspm = 16 }
+
+[conditions.thin]
+liquid = "thin"
+ball = "hidden"
+[conditions.thick]
+liquid = "thick"
+ball = "hidden"
+
+[tasks.stir]
+kind = "follow"
+cycles = 2
+
+[scales.agreement]
+labels.en = ["1", "2", "3", "4", "5"]
+[questionnaires.felt]
+intro = "How was it?"
+item_order = "fixed"
+items = [{ id = "thick", kind = "rating", scale = "agreement", text = "It felt thick.", short = "Thick" }]
+
+[blocks.dampers]
+conditions = ["thin", "thick"]
+repetitions = 2
+order = "shuffled"
+questionnaire = "felt"
+"""
+
+
+@pytest.fixture(scope="module")
+def study_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("dampers") / "dampers.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def results(study_file: Path) -> Path:
+    return rehearse(study_file, participants=2, seed=1, results=study_file.parent / "results")
+
+
+def test_every_trial_is_followed_to_its_end_and_valid(results: Path) -> None:
+    trials = [
+        row
+        for path in results.rglob("*description-trials_data.csv")
+        for row in csv.DictReader(path.read_text(encoding="utf-8").splitlines())
+    ]
+    assert len(trials) == 8
+    assert {(row["outcome"], row["valid"]) for row in trials} == {("complete", "true")}
+
+
+def test_the_hand_keeps_the_pace_and_feels_a_damper_faded_in_over_300_ms(study_file: Path, results: Path) -> None:
+    protocol = load(study_file)
+    task = protocol.tasks["stir"]
+    assert isinstance(task, Follow)
+    dampings = set()
+    for session in StudyFolder(results).sessions():
+        # The first trial begins within the fade of the start.
+        for path in sorted(session.path.glob("recordings/trial-00[2-4].parquet")):
+            samples = read_samples(path)
+            samples = samples[samples.scene != 0]
+            since_s = (samples.time_ns - samples.time_ns[0]) * 1e-9
+            force_n, velocity_mps = samples.force_n, samples.velocity_mps / protocol.scene.scale
+            b_nspm = -np.sum(force_n * velocity_mps) / np.sum(velocity_mps**2)
+            assert force_n == pytest.approx(-b_nspm * velocity_mps, abs=1e-3)
+            dampings.add(round(float(b_nspm), 2))
+            judged = (since_s >= task.lead_s) & (since_s <= task.limit_s)
+            rms_mps = np.sqrt(np.mean(np.sum(velocity_mps[judged] ** 2, axis=1)))
+            assert rms_mps == pytest.approx(task.rms_speed_mps, rel=0.1)
+            faded_s = since_s[samples.limiters & LIMITER_FADE != 0]
+            assert faded_s.max() == pytest.approx(0.3, abs=0.01)
+    assert dampings == {4.0, 16.0}
+
+
+def test_replay_finds_no_difference(results: Path) -> None:
+    found = [replay(session.path) for session in StudyFolder(results).sessions()]
+    assert found
+    assert {(one.differences, one.uncompared, one.recordings) for one in found} == {((), (), 4)}
+
+
+def test_the_report_is_written(results: Path, tmp_path: Path) -> None:
+    assert report(results, tmp_path / "report")[0].name == "report.html"
+
+
+def test_check_says_what_is_done(study_file: Path) -> None:
+    described = describe(load(study_file))
+    assert "follow a target of 6 mm that swings ±20 mm at 1 Hz: 2 swings after 1 s" in described
+    assert "ball hidden" in described
+    assert "16 N·s/m at the hand" in described

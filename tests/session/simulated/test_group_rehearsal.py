@@ -1,0 +1,58 @@
+"""A rehearsal of a study with groups that was interrupted goes on in the participant's group."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.session.simulated.rehearsal import rehearse, resume
+from study_app.store.blinded.blinding import read_key
+from study_app.store.blinded.sealing import opened
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+from tests.protocol.groups.grouped import GROUPS, STUDY
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+
+def told(study: Path, session: SessionFolder) -> tuple[str, list[tuple[Any, ...]], list[Any]]:
+    """Return the group, the trials and the answers of a session."""
+    lines = opened(journal.read(session.journal), read_key(study))
+    trials = {line["trial"]: (line["block"], line["code"]) for line in lines if line["event"] == "trial_started"}
+    answers = {line["trial"]: line["items"][0]["value"] for line in lines if line["event"] == "responses"}
+    return lines[0]["group"], sorted(trials.items()), sorted(answers.items())
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("groups")
+    (folder / "grouped.toml").write_text((STUDY + GROUPS).replace("min_s = 1\nmax_s = 3", "min_s = 0.3\nmax_s = 0.6"))
+    return rehearse(folder / "grouped.toml", participants=2, seed=3, results=folder / "study", recordings=False)
+
+
+@pytest.mark.parametrize("share", [0.15, 0.4, 0.6, 0.9])
+def test_a_resumed_participant_stays_in_the_group_and_answers_alike(study: Path, tmp_path: Path, share: float) -> None:
+    folder = tmp_path / "study"
+    shutil.copytree(study, folder)
+    groups = set()
+    (folder / "fingerprints.txt").unlink()
+    for session in StudyFolder(folder).sessions():
+        whole = told(folder, session)
+        groups.add(whole[0])
+        content = session.journal.read_bytes()
+        session.journal.write_bytes(content[: round(share * len(content))])
+        for made in (*session.path.glob("*.csv"), session.checksums):
+            made.unlink()
+        text = session.receipt.read_text().replace('"status": "completed"', '"status": "unfinished"')
+        session.receipt.write_text(text)
+        resume(session.path, protocol=study.parent / "grouped.toml")
+        assert told(folder, session) == whole
+        assert reproduced(session.path).differences == []
+    assert groups == {"first_thin", "first_thick"}
+    assert verify(folder, None).errors == ()

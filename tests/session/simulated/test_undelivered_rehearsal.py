@@ -1,0 +1,160 @@
+"""A study whose strong levels the force limit clips: such trials come again, are not asked about, and are given up."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.evaluation.replay import replay
+from study_app.session.simulated.rehearsal import rehearse, resume
+from study_app.store.blinded.blinding import read_key
+from study_app.store.blinded.sealing import opened
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+from tests.store.forging import change, cut
+
+pytestmark = needs_servo
+
+STUDY = """\
+format = 2
+study.name = "clipped"
+device.force_limit_n = 2.5
+scene = { scale = 3, fade_s = 0.3 }
+[limits]
+level_error_percent = 5  # free motions are faster than paced ones: the velocity estimator's lag takes up to 3 %
+[liquids.damper]
+drag = { law = "linear", damping_nspm = 4 }
+[tasks.stir]
+kind = "explore"
+min_s = 1
+max_s = 4
+instruction = "Stir."
+[stimuli.damping]
+vary = "damping_nspm"
+levels = [0.1, 4]
+[methods.few]
+kind = "constant"
+levels = 2
+repetitions = 2
+[blocks.thicker]
+stimulus = "damping"
+design = "2ifc"
+method = "few"
+"""
+STRONG = 4.0
+ATTEMPTS = 3
+
+
+@pytest.fixture(scope="module")
+def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("clipped") / "clipped.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def study(protocol: Path) -> Path:
+    return rehearse(protocol, participants=1, seed=1, results=protocol.parent / "results")
+
+
+@pytest.fixture
+def session(study: Path, tmp_path: Path) -> Path:
+    """Return the session in a copy of the study, which may be changed."""
+    shutil.copytree(study, tmp_path / "study")
+    return StudyFolder(tmp_path / "study").sessions()[0].path
+
+
+def lines_of(session: Path) -> list[dict[str, Any]]:
+    return [dict(line) for line in opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2]))]
+
+
+def rows_of(session: Path, table: str) -> list[dict[str, str]]:
+    (path,) = session.glob(f"*description-{table}_data.csv")
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def by_trial(lines: list[dict[str, Any]], event: str) -> dict[int, list[dict[str, Any]]]:
+    found: dict[int, list[dict[str, Any]]] = {}
+    for line in lines:
+        if line["event"] == event:
+            found.setdefault(line["trial"], []).append(line)
+    return found
+
+
+def outcomes(lines: list[dict[str, Any]]) -> list[tuple[int, int, str]]:
+    return [(line["trial"], line["attempt"], line["outcome"]) for line in lines if line["event"] == "trial_ended"]
+
+
+def answers(lines: list[dict[str, Any]]) -> list[tuple[int, Any]]:
+    return [(line["trial"], line["items"][0]["value"]) for line in lines if line["event"] == "responses"]
+
+
+def test_clipped_intervals_are_invalid_and_their_trials_come_again_and_are_not_asked_about(session: Path) -> None:
+    lines = lines_of(session)
+    started, ended = by_trial(lines, "trial_started"), by_trial(lines, "trial_ended")
+    answered = set(by_trial(lines, "responses"))
+    strong = {trial for trial, attempts in started.items() if attempts[0]["level"] == STRONG}
+    assert len(strong) == 2
+    assert answered == set(started) - strong
+    for trial in strong:
+        assert [line["outcome"] for line in ended[trial]] == ["invalid"] * ATTEMPTS
+        assert len({(line["level"], line["standard"], line["arrangement"]) for line in started[trial]}) == 1
+    invalid = [line for line in lines if line["event"] == "interval_ended" and "invalid" in line]
+    assert len(invalid) == ATTEMPTS * len(strong)
+    for line in invalid:
+        arrangement = started[line["trial"]][0]["arrangement"]
+        assert arrangement[line["interval"] - 1] == "C"
+        assert line["invalid"] == ["level_error_percent", "force_limit_n"]
+        assert line["limiter_norm"] > 0
+
+
+def test_what_was_delivered_as_requested_is_within_its_limit(session: Path) -> None:
+    for line in lines_of(session):
+        if line["event"] == "interval_ended" and "invalid" not in line:
+            asked = min((4.0, 4.4), key=lambda one: abs(one - line["value_delivered"]))
+            assert line["value_delivered"] == pytest.approx(asked, rel=0.05)
+            assert line["force_share"] == pytest.approx(1.0, abs=0.02)
+
+
+def test_tables_say_invalid_and_why_without_a_number(session: Path) -> None:
+    trials, intervals = rows_of(session, "trials"), rows_of(session, "intervals")
+    assert sum(row["outcome"] == "invalid" for row in trials) == 2 * ATTEMPTS
+    assert {row["valid"] for row in trials if row["outcome"] == "invalid"} == {"false"}
+    assert {row["invalid_reasons"] for row in intervals} == {"n/a", "level_error_percent force_limit_n"}
+    assert not {"value_delivered", "force_share", "apparent_mass_kg", "pace_mps"} & {*intervals[0]}
+
+
+def test_journal_recordings_and_answers_agree(study: Path) -> None:
+    session = StudyFolder(study).sessions()[0].path
+    assert replay(session).proved
+    found = reproduced(session)
+    assert (found.differences, found.followed) == ([], ["thicker: 4 of 4 levels follow from the answers"])
+    checked = verify(study, None)
+    assert (checked.errors, checked.warnings) == ((), ())
+
+
+def test_a_delivered_value_that_is_not_the_recordings_is_found(session: Path) -> None:
+    def edit(lines: list[dict[str, Any]]) -> None:
+        next(line for line in lines if line["event"] == "interval_ended")["value_delivered"] += 1e-6
+
+    change(session, edit)
+    assert any("value_delivered differs" in one for one in replay(session).differences)
+
+
+def test_a_session_ended_between_two_attempts_goes_on_to_the_same_answers(session: Path, protocol: Path) -> None:
+    whole = lines_of(session)
+    invalid = [index for index, line in enumerate(whole) if line.get("outcome") == "invalid"]
+    content = (session / "journal.jsonl").read_bytes()
+    cut(session, len(b"".join(content.splitlines(keepends=True)[: invalid[1] + 1])))
+    resume(session, protocol=protocol)
+    again = lines_of(session)
+    assert outcomes(again) == outcomes(whole)
+    assert answers(again) == answers(whole)
+    assert reproduced(session).differences == []

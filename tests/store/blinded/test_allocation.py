@@ -1,0 +1,273 @@
+"""Participants come into groups: one entry each, whoever begins at the same time or is killed, and sealed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from study_app.errors import StoreError, StudyError
+from study_app.protocol.forms.simulated_observer import NOTHING_FELT
+from study_app.protocol.groups.own_protocol import own_protocol
+from study_app.protocol.orders.schedule import build_schedule, stream
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.session.simulated.trial_features import Feelings
+from study_app.store.blinded.allocation import allocate, allocated, claims, session_protocol
+from study_app.store.blinded.blinding import open_or_draw_key
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions.reopen import reopen
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+from tests.protocol.groups.grouped import GROUPS, STUDY, grouped
+
+SOURCE = (STUDY + GROUPS).encode()
+GROUP_NAMES = ("first_thin", "first_thick")
+
+
+def begun(folder: Path, participant: str, session: int = 1) -> SessionStore:
+    start = SessionStart(
+        participant,
+        session=session,
+        seed=11,
+        operator="AB",
+        language="en",
+        device={"name": "scripted"},
+        screens={},
+        simulated=False,
+    )
+    return begin(folder, grouped(), SOURCE, start)
+
+
+def events(store: SessionStore) -> list[str]:
+    return [line["event"] for line in store.lines]
+
+
+def test_participants_have_entries_in_the_order_of_their_first_sessions(tmp_path: Path) -> None:
+    for number, participant in enumerate(("P009", "P001", "X"), start=1):
+        with begun(tmp_path / "s", participant) as store:
+            assert store.lines[0]["entry"] == number
+            assert events(store) == ["session_started", "allocated"]
+            assert allocate(StudyFolder(tmp_path / "s"), store.key, participant).entry == number  # type: ignore[union-attr]
+    assert [claim.participant for claim in claims(StudyFolder(tmp_path / "s"))] == ["P009", "P001", "X"]
+    assert not verify(tmp_path / "s").errors
+
+
+def test_a_participant_keeps_the_group_in_session_2(tmp_path: Path) -> None:
+    study = StudyFolder(tmp_path / "s")
+    groups = {}
+    for participant in ("P001", "P002"):
+        for session in (1, 2):
+            with begun(study.path, participant, session) as store:
+                found = allocated(study, store.key, participant)
+                assert found is not None
+                assert groups.setdefault(participant, found.group) == found.group
+                assert ("allocated" in events(store)) == (session == 1), "once per participant"
+    assert set(groups.values()) == set(GROUP_NAMES)
+    own = session_protocol(study, grouped(), "P002", 2)
+    assert own.sequence == own_protocol(grouped(), groups["P002"], 2).sequence
+    assert len(claims(study)) == 2
+
+
+def test_no_file_names_a_group_of_a_participant(tmp_path: Path) -> None:
+    """Of two folders that differ in the secret alone, everything readable is the same for other groups."""
+    readable: dict[str, str] = {}
+    for number in range(12):
+        study = StudyFolder(tmp_path / f"s{number}")
+        with begun(study.path, "P001") as store:
+            found = allocated(study, store.key, "P001")
+            line = next(line for line in store.lines if line["event"] == "allocated")
+            (claim,) = (json.loads(path.read_text()) for path in study.allocated.iterdir())
+        assert found is not None
+        assert set(line) == {"n", "event", "t_s", "at", "entry", "sealed", "previous"}
+        assert (claim.pop("sealed"), line["sealed"]) == (found.sealed, found.sealed)
+        assert claim == {"entry": 1, "participant": "P001"}
+        readable[found.group] = found.sealed
+        receipt = json.loads(store.folder.receipt.read_text())
+        assert "entry" not in receipt
+        assert "group" not in receipt
+    assert len(readable) == 2
+    assert len({len(sealed) for sealed in readable.values()}) == 1, "the length tells nothing"
+
+
+RACER = """
+import sys
+from pathlib import Path
+from study_app.store.blinded.allocation import allocate
+from study_app.store.blinded.blinding import read_key
+from study_app.store.folders import StudyFolder
+study = StudyFolder(Path(sys.argv[1]))
+key = read_key(study.path)
+print("ready", flush=True)
+sys.stdin.readline()
+for number in range(40):
+    print(allocate(study, key, f"{sys.argv[2]}{number}", waits=False).entry, flush=True)
+"""
+
+
+def test_two_programs_at_once_never_share_an_entry(tmp_path: Path) -> None:
+    open_or_draw_key(tmp_path, grouped())
+    racers = [
+        subprocess.Popen(
+            [sys.executable, "-c", RACER, str(tmp_path), name], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        for name in ("A", "B")
+    ]
+    assert [racer.stdout.readline() for racer in racers if racer.stdout] == ["ready\n"] * 2
+    for racer in racers:
+        assert racer.stdin
+        racer.stdin.write("go\n")
+        racer.stdin.flush()
+    entries = [int(line) for racer in racers for line in racer.communicate(timeout=60)[0].splitlines()]
+    assert sorted(entries) == list(range(1, 81))
+    key = open_or_draw_key(tmp_path, grouped())
+    study = StudyFolder(tmp_path)
+    counts = Counter(allocated(study, key, claim.participant).group for claim in claims(study))  # type: ignore[union-attr]
+    assert counts == dict.fromkeys(GROUP_NAMES, 40)
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from study_app.store.sessions import begin as module
+from tests.store.blinded.test_allocation import begun
+module.first_words = lambda *_, **__: os.kill(os.getpid(), signal.SIGKILL)
+begun(Path(sys.argv[1]), "P001")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is a signal of POSIX systems")
+def test_a_program_killed_between_claim_and_first_line_leaves_a_consistent_folder(tmp_path: Path) -> None:
+    study = StudyFolder(tmp_path / "s")
+    with begun(study.path, "P000"):
+        pass
+    root = Path(__file__).parents[3]
+    killed = subprocess.run([sys.executable, "-c", KILLED, str(study.path)], cwd=root, timeout=60, check=False)
+    assert killed.returncode == -9
+    assert [claim.participant for claim in claims(study)] == ["P000", "P001"]
+    found = verify(study.path)
+    assert not found.errors
+    assert any("who has no session yet" in str(warning) for warning in found.warnings)
+    with begun(study.path, "P002") as other, begun(study.path, "P001") as store:
+        assert (store.lines[0]["entry"], other.lines[0]["entry"]) == (2, 3)
+        assert "allocated" in events(store)
+
+
+def test_an_entry_left_empty_stays_unused(tmp_path: Path) -> None:
+    study = StudyFolder(tmp_path / "s")
+    with begun(study.path, "P001"):
+        pass
+    (study.allocated / "002.json").touch()
+    with begun(study.path, "P002") as store:
+        assert store.lines[0]["entry"] == 3
+    found = verify(study.path)
+    assert not found.errors
+    assert any("it stays unused" in str(warning) for warning in found.warnings)
+
+
+def test_a_session_resumed_before_its_allocation_was_journalled_journals_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patched:
+        patched.setattr("study_app.store.sessions.begin.note_allocation", lambda _: None)
+        with begun(tmp_path / "s", "P001") as store:
+            assert events(store) == ["session_started"]
+    with reopen(store.folder.path, grouped(), SOURCE, operator="", device={}, screens={}) as again:
+        assert events(again)[-1] == "allocated"
+    with reopen(store.folder.path, grouped(), SOURCE, operator="", device={}, screens={}) as again:
+        assert events(again).count("allocated") == 1
+
+
+def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Path) -> None:
+    study = StudyFolder(tmp_path / "s")
+    for participant in ("P001", "P002", "P003"):
+        with begun(study.path, participant):
+            pass
+    first, second, third = sorted(study.allocated.iterdir())
+    held = [path.read_text() for path in (first, second, third)]
+
+    def errors() -> str:
+        return "\n".join(str(error) for error in verify(study.path).errors)
+
+    assert errors() == ""
+    second.unlink()
+    assert "is missing, though participant P002 has entry 2" in errors()
+    with pytest.raises(StoreError, match=r"002\.json is missing, though participant P002 has entry 2"):
+        begun(study.path, "P002", 2)
+    second.write_text(held[0].replace('"entry": 1', '"entry": 2'))
+    assert "002.json: was changed" in errors()
+    second.write_text(held[1])
+    third.write_text(held[2].replace("P003", "P004"))
+    assert "was changed" in errors()
+    with pytest.raises(StoreError, match="restore it from a copy"):
+        begun(study.path, "P003", 2)
+    third.write_text(held[2])
+    key = open_or_draw_key(study.path, grouped())
+    extra = allocate(study, key, "P009")
+    assert extra is not None
+    (study.allocated / "004.json").unlink()
+    with begun(study.path, "P005") as store:
+        assert store.lines[0]["entry"] == 4
+    assert errors() == ""
+
+
+def test_an_entry_of_a_session_is_never_assigned_again(tmp_path: Path) -> None:
+    study = StudyFolder(tmp_path / "s")
+    with begun(study.path, "P001"):
+        pass
+    (study.allocated / "001.json").unlink()
+    with begun(study.path, "P002") as store:
+        assert store.lines[0]["entry"] == 2
+
+
+def test_other_groups_need_another_folder(tmp_path: Path) -> None:
+    with begun(tmp_path / "s", "P001"):
+        pass
+    with pytest.raises(StoreError, match="other conditions"):
+        open_or_draw_key(
+            tmp_path / "s", grouped(groups=GROUPS.replace("[groups.first_thin]", "[groups.first_thin]\nshare = 2"))
+        )
+
+
+def test_a_session_that_the_group_does_not_have_is_refused_before_anything_is_claimed(tmp_path: Path) -> None:
+    study = grouped(("format = 2\n", 'format = 2\nsequences = [["hello", "thin"], ["thick", "end"]]\n'), groups="")
+    start = SessionStart("P001", session=3, seed=1, operator="", language="en", device={}, screens={}, simulated=False)
+    with pytest.raises(StudyError, match="permitted: 1 to 2"):
+        begin(tmp_path / "s", study, SOURCE, start)
+    assert not (tmp_path / "s").exists()
+
+
+def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> None:
+    source = tmp_path / "grouped.toml"
+    source.write_bytes(SOURCE)
+    folder = rehearse_answers(str(source), participants=4, seed=3, results=tmp_path / "r", felt=_felt())
+    study = StudyFolder(folder)
+    key = open_or_draw_key(folder, grouped(), stream(3, "blinding").random)
+    for session in study.sessions():
+        found = allocated(study, key, session.participant)
+        assert found is not None
+        own = own_protocol(grouped(), found.group, 1)
+        trials = [line["code"] for line in journal.read(session.journal) if line["event"] == "trial_started"]
+        assert trials == [trial.code for trial in build_schedule(own, session.participant, 3).trials]
+        assert reproduced(session.path).differences == []
+    assert not verify(folder).errors
+    unblind(folder, "AB", "a test")
+    assert not verify(folder).errors
+    assert not verify(folder).psychds.errors
+    table = study.participants("grouped").read_text().splitlines()
+    assert table[0].endswith(",group")
+    assert Counter(line.rsplit(",", 1)[1] for line in table[1:]) == dict.fromkeys(GROUP_NAMES, 2)
+    trials = study.sessions()[0].table("grouped", "trials").read_text().splitlines()
+    assert trials[0].endswith(",group")
+    assert trials[1].rsplit(",", 1)[1] in GROUP_NAMES
+
+
+def _felt() -> Feelings:
+    return {(block, condition): (NOTHING_FELT,) for block in ("thin", "thick") for condition in ("water", "honey")}

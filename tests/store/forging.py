@@ -1,0 +1,81 @@
+"""What a person does who changes results by hand and computes anew whatever a program computed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from study_app.store.blinded.blinding import read_key
+from study_app.store.blinded.sealing import opened, sealed
+from study_app.store.checksums import write_checksums
+from study_app.store.folders import StudyFolder
+from study_app.store.journals.journal import read
+from study_app.store.journals.journal_writer import line_bytes
+from study_app.store.sessions.open_session import Place, table_files
+from study_app.store.tables.participants import write_participants
+from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
+
+Lines = list[dict[str, Any]]
+
+
+def forge(journal: Path, change: Callable[[Lines], object], *, chained: bool = True) -> None:
+    """Change the lines of a journal, number them anew, and make every ``previous`` right or leave it out."""
+    lines = [json.loads(line) for line in journal.read_bytes().splitlines()]
+    change(lines)
+    content = b""
+    for number, line in enumerate(lines, start=1):
+        line["n"] = number
+        line.pop("previous", None)
+        if chained:
+            line["previous"] = hashlib.sha256(content).hexdigest()
+        content += json.dumps(line, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
+    journal.write_bytes(content)
+
+
+def cover_up(study: Path) -> None:
+    """Make tables, checksums and fingerprints of a study so that they fit the journals and receipts there are."""
+    folder = StudyFolder(study)
+    folder.fingerprints.unlink(missing_ok=True)
+    for session in folder.sessions():
+        lines = read(session.journal)
+        name = lines[0]["study"]
+        for path, content in table_files(Place(folder, session, name), lines, None):
+            path.write_bytes(content)
+        session.checksums.unlink(missing_ok=True)
+        if lines[-1]["event"] == "session_ended":
+            note_fingerprint(folder, session, fingerprint(write_checksums(session, {})))
+        write_participants(folder, name)
+
+
+def nothing(_lines: Lines) -> None:
+    """Change nothing."""
+
+
+def change(session: Path, edit: Callable[[Lines], None], after: Callable[[Lines], None] = nothing) -> None:
+    """Change the journal as somebody would who has the key, before and after it is sealed."""
+    path = session / "journal.jsonl"
+    key = read_key(session.parents[2])
+    lines: Lines = [dict(line) for line in opened(read(path), key)]
+    edit(lines)
+    closed = [lines[0], *({**sealed(lines[0], line["event"], line, key)} for line in lines[1:])]
+    after(closed)
+    content = b""
+    for number, line in enumerate(closed, start=1):
+        content += line_bytes({**line, "n": number, "previous": hashlib.sha256(content).hexdigest()})
+    path.write_bytes(content)
+
+
+def cut(session: Path, size: int) -> None:
+    """Leave so many bytes of the journal, and nothing that a session writes when it ends."""
+    path = session / "journal.jsonl"
+    path.write_bytes(path.read_bytes()[:size])
+    for made in (*session.glob("*.csv"), session / "checksums.sha256"):
+        made.unlink()
+    (session.parents[2] / "fingerprints.txt").unlink(missing_ok=True)
+    shutil.rmtree(session / "recordings")
+    receipt = session / "receipt.json"
+    receipt.write_text(receipt.read_text().replace('"status": "completed"', '"status": "unfinished"'))

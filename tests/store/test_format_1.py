@@ -1,0 +1,64 @@
+"""Format 1 is frozen: what rehearsals of the shipped studies wrote when it was recorded, they write now."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.folders import StudyFolder
+from study_app.store.tables.columns import TABLES
+
+RECORDED: dict[str, dict[str, str]] = json.loads((Path(__file__).parent / "format_1.json").read_text())
+UNEQUAL = ("at", "previous", "version", "sha256", "frames_sha256")
+"""Fields of the journal that differ from run to run or with the program's version."""
+
+WALL_CLOCK = {column.name for columns in TABLES.values() for column in columns if column.kind == "time"}
+
+
+def sha256(content: object) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
+
+
+def journal(path: Path) -> list[dict[str, object]]:
+    """Return the lines without what differs from run to run; the recorder writes its own lines whenever it is done."""
+    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    kept = [{name: value for name, value in line.items() if name not in UNEQUAL} for line in lines]
+    told = [line for line in kept if line["event"] != "recorded"]
+    recorded = [{**line, "t_s": None} for line in kept if line["event"] == "recorded"]
+    recorded.sort(key=lambda line: (line["trial"], line["attempt"]))
+    return [{**line, "n": number} for number, line in enumerate((*told, *recorded), start=1)]
+
+
+def table(path: Path) -> list[list[str]]:
+    header, *rows = csv.reader(io.StringIO(path.read_text(encoding="utf-8"), newline=""))
+    blank = [name in WALL_CLOCK for name in header]
+    return [header, *(["" if hidden else cell for hidden, cell in zip(blank, row, strict=True)] for row in rows)]
+
+
+def hashes(folder: StudyFolder) -> Iterator[tuple[str, str]]:
+    yield "key", hashlib.sha256(folder.key.read_bytes()).hexdigest()
+    for path in sorted(folder.path.rglob("*_data.csv")):
+        yield path.relative_to(folder.path).as_posix(), sha256(table(path))
+    for session in folder.sessions():
+        place = session.path.relative_to(folder.path).as_posix()
+        yield f"{place}/journal", sha256(journal(session.journal))
+        yield f"{place}/protocol", sha256(json.loads(session.receipt.read_text(encoding="utf-8"))["protocol"])
+
+
+@pytest.mark.parametrize(
+    "name", ["demo", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rek2024", "physical_liquids"))]
+)
+def test_rehearsal_writes_the_bytes_recorded_for_format_1(name: str, tmp_path: Path) -> None:
+    folder = rehearse(name, participants=2, seed=1, results=tmp_path / name)
+    assert dict(hashes(StudyFolder(folder))) == RECORDED[name]
+
+
+def test_hashes_of_format_1_cover_two_participants_of_each_shipped_study() -> None:
+    assert {name: len(found) for name, found in RECORDED.items()} == {"rek2024": 10, "demo": 10, "physical_liquids": 10}

@@ -1,0 +1,138 @@
+"""Sessions that run, stopped or crashed: what is a warning, and what an error all the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.store.journals import journal
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.verification.verify_study import verify
+from tests.store.forging import forge
+from tests.store.verification.findings import PARTICIPANTS, SESSION, replace, told, warned
+
+
+def test_what_should_be_known_is_a_warning(study: Path, start: Callable[..., SessionStore]) -> None:
+    with start("P009", recordings=True) as store:
+        told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+        for trial in (1, 2):
+            store.append("trial_started", trial=trial, attempt=1, **told_of)
+        store.append("recording_lost", trial=1, attempt=1, reason="No space left on device")
+        later = {"operator": "AB", "device": "mouse", "version": "99.0"}
+        store.append("session_resumed", gap_s=None, torn_bytes=0, **later)
+        store.append("weather", sky="blue")
+        store.write_tables()
+    with store.folder.journal.open("ab") as file:
+        file.write(b'{"n":')
+    (store.folder.path / ".receipt.json.0123abcd.tmp").write_bytes(b"{")
+    (study / "data" / ".x.csv.0123abcd.tmp").write_bytes(b"{")
+    store.folder.recordings.mkdir()
+    (store.folder.recordings / "trial-002.parquet").write_bytes(b"PAR1")
+    (study / "data" / "sub-P010" / "ses-01").mkdir(parents=True)
+    open_one = start("P011")
+    findings = verify(study)
+    open_one.close()
+    for sentence in (
+        "sub-P009/ses-01: is unfinished: resume it, or leave it unfinished",
+        "sub-P009/ses-01/journal.jsonl: its last 5 bytes are an incomplete line",
+        "sub-P009/ses-01/journal.jsonl: has events 'weather', which this version does not know",
+        "sub-P009/ses-01/.receipt.json.0123abcd.tmp: is an incomplete file",
+        "sub-P009/ses-01/recordings: trial 1, attempt 1 has none: No space left on device",
+        "sub-P009/ses-01/recordings/trial-002.parquet: is in no line of the journal",
+        "sub-P010/ses-01: was created, but the program ended before it wrote a journal",
+        "sub-P011/ses-01: is open in another program",
+        "data/.x.csv.0123abcd.tmp: is an incomplete file of a program that was ended, or is being written",
+    ):
+        assert sentence in warned(findings)
+    assert told(findings) == ""
+
+
+def test_the_trace_of_a_crash_is_told_and_an_empty_one_is_not(study: Path) -> None:
+    trace = study / SESSION / "crash.txt"
+    trace.touch()
+    assert "crash" not in warned(verify(study))
+    trace.write_text("Fatal Python error: Segmentation fault")
+    findings = verify(study)
+    assert findings.errors == ()
+    assert "sub-P007/ses-01/crash.txt: shows where the program crashed" in warned(findings)
+
+
+def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(
+    study: Path, start: Callable[..., SessionStore]
+) -> None:
+    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    store = start("P009", recordings=True)
+    store.folder.recordings.mkdir()
+    for trial in (1, 2):
+        store.append("trial_started", trial=trial, attempt=1, **told_of)
+    (store.folder.recordings / ".trial-002.parquet.0123abcd.tmp").touch()
+    (store.folder.recordings / "trial-001.parquet").write_bytes(b"PAR1")
+    place = "data/sub-P009/ses-01"
+    running = [line for line in warned(verify(study)).splitlines() if place in line]
+    assert [line for line in running if "differs from the journal" not in line] == [
+        (f"{place}: is open in another program")
+    ]
+    store.close()
+    left = warned(verify(study))
+    assert ".trial-002.parquet.0123abcd.tmp: is an incomplete file" in left
+    assert "trial-001.parquet: is in no line of the journal; resuming the session adds it" in left
+    assert "recordings: trial 1, attempt 1 has none, and the journal gives no reason" in left
+
+
+def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
+    study: Path, start: Callable[..., SessionStore], summary: dict[str, Any]
+) -> None:
+    """Its program was killed before it wrote them; those of the others may not."""
+    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    with start("P000") as store:
+        store.append("trial_started", trial=1, attempt=1, **told_of)
+        store.append("trial_ended", trial=1, attempt=1, outcome="complete", **summary)
+    findings = verify(study)
+    assert findings.errors == ()
+    for path in (PARTICIPANTS, "sub-P000/ses-01/subject-P000_session-01_task-brackish_description-trials_data.csv"):
+        assert f"{path}: differs from the journal, from line 2 on; rebuild renews it" in warned(findings)
+    replace("withdrawn", "completed")(study / PARTICIPANTS)
+    assert f"{PARTICIPANTS}: differs from the journal" in told(verify(study))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        (PARTICIPANTS, "P000,1,", "P999,1,"),
+        (PARTICIPANTS, "P000,1,false", "P000,1,true"),
+        (PARTICIPANTS, "unfinished", "unfinished\r"),
+        ("data/sub-P000/ses-01/*trials_data.csv", "complete", "com\rplete"),
+    ],
+)
+def test_a_table_of_a_session_that_has_not_ended_tells_nothing_else_than_its_journal(
+    study: Path, start: Callable[..., SessionStore], summary: dict[str, Any], name: str, old: str, new: str
+) -> None:
+    """Nor does a table that is no CSV end in a traceback."""
+    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    with start("P000") as store:
+        store.append("trial_started", trial=1, attempt=1, **told_of)
+        store.append("trial_ended", trial=1, attempt=1, outcome="complete", **summary)
+        store.write_tables()
+    assert verify(study).errors == ()
+    (path,) = study.glob(name)
+    replace(old, new)(path)
+    assert f"{path.relative_to(study).as_posix()}: differs from the journal" in told(verify(study))
+
+
+def test_a_trial_without_its_recording_is_known_at_the_end(study: Path, start: Callable[..., SessionStore]) -> None:
+    store = start("P009", recordings=True)
+    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    store.append("trial_started", trial=1, attempt=1, **told_of)
+    store.finish("aborted")
+    assert "recordings: trial 1, attempt 1 has none, and the journal gives no reason" in warned(verify(study))
+
+
+def test_samples_that_were_dropped_are_known(study: Path) -> None:
+    path = study / SESSION / "journal.jsonl"
+    (first,) = [n for n, line in enumerate(journal.read(path)) if line["event"] == "recorded" and line["trial"] == 1]
+    forge(path, lambda lines: lines[first].update(samples_unrecorded=7))
+    assert "recordings/trial-001.parquet: lacks 7 samples" in warned(verify(study))

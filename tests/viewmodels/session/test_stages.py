@@ -1,0 +1,124 @@
+"""What the operator is told of a session's progress is what its journal holds."""
+
+from __future__ import annotations
+
+from study_app.protocol.load import load
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.store.limits import within_limits
+from study_app.store.progress import Progress
+from study_app.viewmodels.session.stages import stages
+
+
+def test_pages_and_trials_move_the_step_and_keep_their_durations(told):
+    told.welcome()
+    assert told.progress.here == 0
+    told.start(1)
+    assert told.progress.here == 1
+    assert told.progress.durations_s == {0: 10.0}
+    assert told.session.trial(told.progress) == told.schedule.trials[0]
+
+
+def test_answers_are_those_on_disk(told):
+    told.welcome()
+    told.start(1)
+    told.end(1)
+    assert sum(told.progress.answered.values()) == 0
+    told.answer(1)
+    assert sum(told.progress.answered.values()) == 2
+
+
+def test_an_interrupted_trial_is_not_done_and_starts_again_in_place(told):
+    told.welcome()
+    told.start(1)
+    told.end(1, outcome="interrupted")
+    told.tell("paused", by="operator")
+    assert told.progress.broken == {}
+    assert told.progress.paused
+    told.tell("resumed")
+    told.start(1, attempt=2)
+    assert not told.progress.paused
+    assert told.progress.here == 1
+
+
+def test_a_trial_beyond_a_limit_is_done_but_not_within_limits(told):
+    limit = told.protocol.limits.lateness_ms
+    told.welcome()
+    told.start(1)
+    told.end(1, lateness_p99_ms=limit * 0.9)
+    told.answer(1)
+    told.start(2)
+    told.end(2, lateness_p99_ms=limit * 1.1)
+    assert told.session.broken(told.progress) == {1: (), 2: (("lateness_p99_ms", limit * 1.1, limit),)}
+    assert ("Trials within limits", "1 of 2") in told.view().counts
+
+
+def test_a_picture_that_came_too_early_is_judged_as_in_the_trials_table(told):
+    told.welcome()
+    told.start(1)
+    told.make_single_blind()
+    told.end(1, delay_error_p95_ms=-40.0)
+    assert within_limits({"delay_error_p95_ms": -40.0}, told.protocol.limits.model_dump()) is False
+    assert told.session.broken(told.progress) == {1: (("delay_error_p95_ms", -40.0, 25.0),)}
+    told.start(2)
+    told.end(2)
+    assert ("Trials within limits", "1 of 2") in told.view().counts
+
+
+def test_a_repeat_takes_back_the_trials_answers(told):
+    told.welcome()
+    told.start(1)
+    told.end(1)
+    told.answer(1)
+    told.tell("repeat", trial=1, reason="phone rang")
+    assert told.progress.answered == {}
+    assert told.progress.broken == {}
+    assert told.progress.repeats == 1
+
+
+def test_a_resumed_session_is_where_its_journal_says_and_an_attempt_takes_back_the_one_before(told):
+    told.welcome()
+    told.start(1)
+    told.end(1)
+    told.answer(1)
+    told.tell("broke", what="cable")
+    told.tell("session_resumed", 60.0)
+    assert told.progress.broke == ""
+    told.start(1, attempt=2)
+    assert (told.progress.answered, told.progress.broken) == ({}, {})
+    assert told.session.trial(told.progress).number == 1
+    again = Progress()
+    again.take({"event": "page_shown", "t_s": 1.0, "page": "welcome"})
+    again.take({"event": "note", "t_s": 2.0, "kind": "mark", "text": ""})
+    assert (again.here, [note.kind for note in again.notes], again.t_s) == (0, ["mark"], 2.0)
+
+
+def test_a_page_is_the_step_after_the_present_one_and_stays_it_when_shown_again(told):
+    told.welcome()
+    told.start(2)
+    told.tell("page_shown", 1.0, page="reaching")
+    assert told.schedule.steps[told.progress.here].page_id == "reaching"
+    told.tell("page_shown", 1.0, page="reaching")  # after a resume: nothing moves
+    assert told.schedule.steps[told.progress.here].page_id == "reaching"
+
+
+def test_long_blocks_are_one_row_and_short_ones_a_row_a_trial():
+    protocol = load("rek2024")
+    labels = [stage.label for stage in stages(protocol, build_schedule(protocol, "P001", 1))]
+    assert "Liquid setting 1" in labels
+    assert "Liquid setting 3" in labels
+    assert "Delay setting 1 to 7" in labels
+
+
+def test_rows_cover_every_step_once():
+    protocol = load("rek2024")
+    schedule = build_schedule(protocol, "P001", 1)
+    covered = [step for stage in stages(protocol, schedule) for step in range(stage.first, stage.last + 1)]
+    assert covered == list(range(len(schedule.steps)))
+
+
+def test_rows_name_no_condition_and_no_liquid():
+    protocol = load("rek2024")
+    said = " ".join(stage.label for stage in stages(protocol, build_schedule(protocol, "P001", 1))).lower()
+    secrets = {name for block in protocol.main_blocks for name in block.conditions}
+    for secret in (*secrets, "water", "honey", "oil", "ms"):
+        assert secret not in said.split()

@@ -1,0 +1,99 @@
+"""The operator reads how a track is doing, and nothing that depends on a level or on whether answers were correct."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.store.progress import Progress
+from study_app.viewmodels.session.track_health import track_words
+from tests.protocol.trials.studies import study
+
+CHOICES = {"first": "First", "second": "Second"}
+
+
+class Told:
+    """A session's progress, told trial by trial."""
+
+    def __init__(self, protocol: Protocol) -> None:
+        self.schedule = build_schedule(protocol, "P001", 1)
+        self.progress = Progress()
+
+    def tell(self, event: str, at_s: float, **fields: Any) -> None:
+        sealed = {"sealed": "00"} if event == "trial_started" else {}
+        self.progress.take({"event": event, "t_s": at_s, **sealed, **fields})
+
+    def trial(self, number: int, answer: str, seconds: float = 1.0, attempt: int = 1) -> None:
+        self.tell("trial_started", number * 10, trial=number, attempt=attempt)
+        self.tell("trial_ended", number * 10 + 4, trial=number, attempt=attempt, outcome="complete")
+        item = {"item": "choice_2ifc", "value": answer, "onset_s": 5.0, "first_s": 5.0 + seconds}
+        self.tell("responses", number * 10 + 6, trial=number, attempt=attempt, items=[item])
+
+    def lines(self) -> tuple[str, ...]:
+        trial = next(one for one in self.schedule.trials if one.number == self.progress.of_intervals)
+        return track_words(self.progress, self.schedule, trial, CHOICES)
+
+
+@pytest.fixture
+def told() -> Told:
+    return Told(study(("standards = [1, 2]", "standards = [1]")))
+
+
+def test_a_track_shows_answers_shares_run_and_time(told: Told) -> None:
+    for number, answer in enumerate(("first", "first", "second", "first"), start=1):
+        told.trial(number, answer, seconds=number / 2)
+    code = told.schedule.trials[0].code
+    assert told.lines() == (
+        f"Track {code}: 4 of at most 24 answered",
+        "First 75 %, Second 25 %",
+        "longest run 2",
+        "median answer time 1.25 s",
+    )
+
+
+def test_a_run_of_8_and_a_median_below_300_ms_are_marked(told: Told) -> None:
+    for number in range(1, 8):
+        told.trial(number, "second", seconds=0.31)
+    assert not any(line.endswith("check") for line in told.lines())
+    told.trial(8, "second", seconds=0.1)
+    assert "longest run 8: check" in told.lines()
+    for number in range(9, 18):
+        told.trial(number, "first", seconds=0.29)
+    assert "median answer time 0.29 s: check" in told.lines()
+
+
+def test_what_was_repeated_is_counted_with_its_reason(told: Told) -> None:
+    told.tell("trial_started", 1.0, trial=1, attempt=1)
+    told.tell("trial_ended", 2.0, trial=1, attempt=1, outcome="interrupted")
+    told.trial(1, "first", attempt=2)
+    told.tell("repeat", 20.0, trial=1, reason="hand slipped")
+    told.trial(1, "second", attempt=3)
+    assert told.lines()[0].endswith("1 of at most 24 answered")
+    assert told.lines()[1] == "First 0 %, Second 100 %"
+    assert told.lines()[-2:] == ("repeated 1: interrupted", "repeated 1: hand slipped")
+
+
+def test_tracks_are_counted_apart(told: Told) -> None:
+    told = Told(study())
+    codes = [trial.code for trial in told.schedule.trials[:6]]
+    assert len(set(codes)) == 2
+    for number in range(1, 7):
+        told.trial(number, "first")
+    assert told.lines()[0] == f"Track {codes[5]}: {codes.count(codes[5])} of at most 24 answered"
+
+
+def test_a_program_that_ended_is_a_reason(told: Told) -> None:
+    told.tell("trial_started", 1.0, trial=1, attempt=1)
+    told.tell("session_resumed", 50.0)
+    told.trial(1, "first", attempt=2)
+    assert told.lines()[-1] == "repeated 1: program ended"
+
+
+def test_a_trial_without_intervals_has_no_track(told: Told) -> None:
+    told.trial(1, "first")
+    assert told.progress.of_intervals == 1
+    told.progress.take({"event": "trial_started", "t_s": 30.0, "trial": 2, "attempt": 1})
+    assert told.progress.of_intervals is None

@@ -1,0 +1,215 @@
+"""A worker process answers orders piece by piece, stops when asked to, and a crash is an answer too."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from study_app.errors import StudyError
+from study_app.workers import client as clients
+from study_app.workers.client import WorkerClient
+from study_app.workers.messages import Crashed, Refused, Stopped
+from study_app.workers.server import Stop, Tell
+
+SOON_S = 60.0
+
+
+def carry_out(order: str, tell: Tell, stop: Stop) -> object:
+    """Do what an order says."""
+    tell(f"{order} begun")
+    match order:
+        case "refuse":
+            raise StudyError("it cannot be done")
+        case "mistake":
+            raise ZeroDivisionError
+        case "die":
+            os.kill(os.getpid(), signal.SIGKILL)
+        case "wait":
+            while not stop():
+                threading.Event().wait(0.01)
+            raise Stopped("given up")
+        case "ignore":
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
+            tell("deaf")
+            threading.Event().wait()
+        case "loaded":
+            return sorted({"PySide6", "numba", "pandas"} & sys.modules.keys())
+        case "priority":
+            return psutil.Process().nice()
+    return order
+
+
+class Tried(WorkerClient[str, Any]):
+    """A client that keeps what was answered."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("tests.workers.test_client:carry_out", name="tried", **options)
+        self.kept: list[tuple[int, Any]] = []
+
+    def answers(self, wait_s: float = 0.0) -> list[tuple[int, Any]]:
+        found = super().answers(wait_s)
+        self.kept += found
+        return found
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[..., Tried]]:
+    """Return what starts a worker; each is closed, and none is left."""
+    started: list[Tried] = []
+
+    def made(**options: Any) -> Tried:
+        started.append(Tried(**options))
+        return started[-1]
+
+    yield made
+    for one in started:
+        one.close()
+        one.wait_until_ended()
+        assert one.ended
+    assert not [child for child in multiprocessing.active_children() if child.name == "tried"]
+
+
+def answers_until(worker: Tried, number: int, wanted: Callable[[Any], bool]) -> list[Any]:
+    """Return the answers to an order until one is ``wanted``."""
+    end_s = time.monotonic() + SOON_S
+    while True:
+        found = [answer for of_number, answer in worker.kept if of_number == number]
+        if found and wanted(found[-1]):
+            return found
+        assert time.monotonic() < end_s, found
+        worker.answers(wait_s=0.1)
+
+
+def is_last(answer: Any) -> bool:
+    return not isinstance(answer, str) or " " not in answer
+
+
+def test_orders_are_carried_out_one_after_the_other_and_a_refusal_is_a_sentence(
+    start: Callable[..., Tried],
+) -> None:
+    worker = start()
+    first, refused, last = (worker.order(order) for order in ("first", "refuse", "last"))
+    found: list[tuple[int, Any]] = []
+    end_s = time.monotonic() + SOON_S
+    while (last, "last") not in found:
+        assert time.monotonic() < end_s, found
+        found += worker.answers(wait_s=0.1)
+    assert found == [
+        (first, "first begun"),
+        (first, "first"),
+        (refused, "refuse begun"),
+        (refused, Refused("it cannot be done")),
+        (last, "last begun"),
+        (last, "last"),
+    ]
+    assert worker.works
+
+
+@pytest.mark.parametrize("how", ["stop", "another order"])
+def test_an_order_is_given_up_when_that_is_asked_for_or_another_comes(start: Callable[..., Tried], how: str) -> None:
+    worker = start()
+    waiting = worker.order("wait")
+    answers_until(worker, waiting, lambda answer: answer == "wait begun")
+    following = worker.order("next") if how == "another order" else worker.stop()
+    assert answers_until(worker, waiting, is_last) == ["wait begun", Refused("given up", stopped=True)]
+    following = following or worker.order("next")
+    assert answers_until(worker, following, is_last)[-1] == "next"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize(("order", "exit_code", "words"), [("die", -9, "signal 9"), ("mistake", 1, "exit code 1")])
+def test_a_process_that_ends_answers_every_order_once_with_how_it_ended(
+    start: Callable[..., Tried], order: str, exit_code: int, words: str
+) -> None:
+    worker = start()
+    first, second = worker.order(order), worker.order("next")
+    found: list[tuple[int, Any]] = []
+    end_s = time.monotonic() + SOON_S
+    while not any(number == second for number, _ in found):
+        assert time.monotonic() < end_s, found
+        found += worker.answers(wait_s=0.1)
+    assert found == [(first, f"{order} begun"), (first, Crashed(exit_code)), (second, Crashed(exit_code))]
+    assert words in Crashed(exit_code).sentence
+    assert worker.answers() == []
+    assert not worker.works
+    third = worker.order("to nobody")
+    assert worker.answers() == [(third, Crashed(exit_code))]
+
+
+def test_a_process_that_does_not_listen_is_killed(start: Callable[..., Tried], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clients, "PATIENCE_S", 0.05)
+    worker = start()
+    answers_until(worker, worker.order("ignore"), lambda answer: answer == "deaf")
+    worker.close()
+    assert not worker.works
+    worker.wait_until_ended()
+    assert worker.ended
+    worker.order("to nobody")
+    assert worker.answers() == []
+
+
+def test_a_process_loads_what_its_task_loads_and_may_have_the_lowest_priority(
+    start: Callable[..., Tried],
+) -> None:
+    worker = start(background=True)
+    assert answers_until(worker, worker.order("loaded"), is_last)[-1] == []
+    if sys.platform != "win32":
+        assert answers_until(worker, worker.order("priority"), is_last)[-1] == 19
+
+
+def test_many_orders_do_not_make_the_client_wait(start: Callable[..., Tried]) -> None:
+    """A pipe holds some 64 kB; a process that is busy reads orders all the same."""
+    worker = start()
+    busy = worker.order("wait")
+    answers_until(worker, busy, lambda answer: answer == "wait begun")
+    for _ in range(100):
+        last = worker.order("x" * 10_000)
+    assert answers_until(worker, last, is_last)[-1] == "x" * 10_000
+
+
+PROGRAM = """
+    import signal, sys, threading
+    from study_app.workers.client import WorkerClient
+    signal.signal(signal.SIGINT, lambda *_: sys.exit(130))
+    worker = WorkerClient("tests.workers.test_client:carry_out", name="tried")
+    number = worker.order("wait")
+    while (number, "wait begun") not in worker.answers(wait_s=0.1):
+        pass
+    print(worker.process.pid, flush=True)
+    threading.Event().wait()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL], ids=["interrupted", "killed"])
+def test_a_worker_ends_with_its_program_and_prints_no_traceback(number: int) -> None:
+    program = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(PROGRAM)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        cwd=Path(__file__).parents[2],
+    )
+    assert program.stdout is not None
+    worker = psutil.Process(json.loads(program.stdout.readline()))
+    if number == signal.SIGINT:
+        os.killpg(program.pid, number)
+    else:
+        program.kill()
+    _, err = program.communicate(timeout=SOON_S)
+    assert psutil.wait_procs([worker], timeout=SOON_S)[1] == []
+    assert err == ""
