@@ -227,8 +227,10 @@ class ByMouse(Person):
         tank = self._plan.widget.geometry()  # below the strip
         middle = self._place("getwindowgeometry", "--shell", self.window) + tank.center()
         strays = min(tank.width(), tank.height()) // 4
+        longest = 400
         while right_px:
-            step = max(-400, min(400, right_px))
+            longest = 799 - longest  # Qt drops a motion to the place of the motion before, even after a jump between
+            step = max(-longest, min(longest, right_px))
             self.program.xdotool("mousemove_relative", "--", str(step), "0")
             right_px -= step
             wait_for(lambda: (self._pointer() - middle).manhattanLength() <= strays, "the pointer near the middle")
