@@ -1,7 +1,7 @@
 """A walk through the thesis' whole study in its real windows: what comes next, where it lies, and what is on the disk.
 
-What comes next is told by the session's own machine, which knows no window; where it lies, by the same widgets laid out
-off screen at the same size.
+The session's own transitions, which know no window, say what comes next; the same widgets, laid out off screen at the
+same size, say where it lies.
 """
 
 from __future__ import annotations

@@ -160,18 +160,18 @@ class _Showing:
 
     def hold(self) -> tuple[Shown, ...]:
         """Hold the session and return what was shown in it."""
-        machine = open_rig(self._chosen.device, study_settings(self._protocol, self._chosen.tremor()))
+        rig = open_rig(self._chosen.device, study_settings(self._protocol, self._chosen.tremor()))
         schedule = build_schedule(self._protocol, self._chosen.participant, self._chosen.seed)
         try:
-            with open_store(self._chosen, self._protocol, self._source, machine, {}) as store:
+            with open_store(self._chosen, self._protocol, self._source, rig, {}) as store:
                 bridge = open_windows(
-                    self._chosen, self._protocol, schedule, store, machine, LIGHT, refresh_hz=self._refresh_hz
+                    self._chosen, self._protocol, schedule, store, rig, LIGHT, refresh_hz=self._refresh_hz
                 )
                 self._size(bridge)
                 self._run(bridge)
                 paced = bridge.paced
         finally:
-            machine.stop()
+            rig.stop()
         if self._ended:
             raise KeyboardInterrupt
         if bridge.trouble:

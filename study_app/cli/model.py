@@ -48,11 +48,11 @@ def assignment(change: str) -> tuple[str, str]:
 def scene(scene: str, liquid: str | None) -> None:
     """Print the effects that a scene needs and why, the measured cost of each, and the expected force error."""
     from study_app.evaluation.cost import report
-    from study_app.evaluation.expected_error import foretold
+    from study_app.evaluation.expected_error import error_report
     from study_app.protocol.load import load_scene, load_scenes
 
     chosen = [load_scene(scene, liquid)] if liquid else list(load_scenes(scene).values())
-    click.echo("\n\n".join(f"{report(one)}\n{foretold(one)}" for one in chosen))
+    click.echo("\n\n".join(f"{report(one)}\n{error_report(one)}" for one in chosen))
 
 
 @click.command()

@@ -45,11 +45,11 @@ class Expected(NamedTuple):
 
 
 def expected(scene: Scene) -> Expected:
-    """Measure a scene's cost and foretell its error; of several liquids that with the greatest one."""
+    """Measure a scene's cost and predict its error; of several liquids that with the greatest one."""
     return Expected(measure(scene).scene_ns, *_errors(resolve(scene)))
 
 
-def foretold(scene: Scene) -> str:
+def error_report(scene: Scene) -> str:
     """Return the expected error as a line of text."""
     error_share, error_n, known_share, against = _errors(resolve(scene))
     known = f"{100 * known_share:.2g} %" if known_share > ROUNDING else "none"

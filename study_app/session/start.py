@@ -31,7 +31,7 @@ MEASURED_S = 2.0  # so long the servo is looked at before a session
 class Ready:
     """Device and servo at rest, and what was measured of them; ``masking`` of its motors, where that was asked."""
 
-    machine: Rig
+    rig: Rig
     facts: Facts
     masking: Masking | None = None
 
@@ -58,14 +58,14 @@ def check(chosen: NewSession, study: Protocol) -> None:
     check_conditions(folder.path, study)
 
 
-def measured(machine: Rig, chosen: NewSession, *, sleep: Callable[[float], object] = time.sleep) -> Facts:
+def measured(rig: Rig, chosen: NewSession, *, sleep: Callable[[float], object] = time.sleep) -> Facts:
     """Return what the pre-flight judges, but for the screen; a ``sleep`` that does not wait cuts it short."""
     from study_app.session.preflight_measurements import measure  # noqa: PLC0415 - the compiler: only once it is needed
 
     return measure(
-        machine.servo,
+        rig.servo,
         chosen.results,
-        device=machine.device.name,
+        device=rig.device.name,
         screen=Screen(refresh_hz=0.0, scaling=1.0),
         participant=chosen.participant,
         recordings=chosen.recordings,
@@ -78,7 +78,7 @@ def open_store(
     chosen: NewSession,
     protocol: Protocol,
     source: bytes,
-    machine: Rig,
+    rig: Rig,
     screens: dict[str, Any],
     masking: Masking | None = None,
 ) -> SessionStore:
@@ -89,10 +89,10 @@ def open_store(
             protocol,
             source,
             operator=chosen.operator,
-            device=machine.described,
+            device=rig.described,
             screens=screens,
             motors_masked=None if masking is None else masking.entry,
-            now_ns=machine.servo.now_ns,
+            now_ns=rig.servo.now_ns,
         )
     start = SessionStart(
         chosen.participant,
@@ -100,11 +100,11 @@ def open_store(
         seed=chosen.seed,
         operator=chosen.operator,
         language=chosen.language,
-        device=machine.described,
+        device=rig.described,
         screens=screens,
         simulated=descriptor_of(chosen.device).simulated,
         pilot=chosen.pilot,
         recordings=chosen.recordings,
         motors_masked=None if masking is None else masking.entry,
     )
-    return begin(chosen.results, protocol, source, start, clock=SessionClock(machine.servo.now_ns))
+    return begin(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))

@@ -106,7 +106,7 @@ class WorkerClient(Generic[Order, Answer]):
         return found
 
     def close(self) -> None:
-        """Ask the process to end, whatever it is doing; a thread waits for it, and kills it after ``PATIENCE_S``."""
+        """Ask the process to end, even during a request; a thread waits for it, and kills it after ``PATIENCE_S``."""
         if self._closed:
             return
         self._closed = True

@@ -141,7 +141,7 @@ def test_a_device_that_is_gone_at_the_end_does_not_keep_the_window_away(
     visit.window.place("home").session_asked.emit(CHOSEN)
     live = visit.live
     assert live is not None
-    live.machine = machine  # type: ignore[assignment]
+    live.rig = machine  # type: ignore[assignment]
     live.cancel()
     assert machine.stopped
     assert visit.window.isVisible()

@@ -101,7 +101,7 @@ class LiveSession(QObject):
         self.error: StudyError | None = None
         self.bridge: SessionBridge | None = None
         self.note: OpeningWindow | None = None
-        self.machine: Rig | None = None
+        self.rig: Rig | None = None
         self._store: SessionStore | None = None
         self._crash_trace: CrashTrace | None = None
         self._closed = False
@@ -155,26 +155,26 @@ class LiveSession(QObject):
 
     def _make_ready(self) -> None:
         """Compile, open, start and measure, in a thread of its own; whatever comes of it goes to ``_begin``."""
-        machine: Rig | None = None
+        rig: Rig | None = None
         try:
             load_windows()
             study = self.chosen.read_protocol()
             check(self.chosen, study)
             settings = study_settings(study, self.chosen.tremor(), self.chosen.device_options)
-            machine = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
-            made: object = Ready(machine, measured(machine, self.chosen, sleep=self._ending.wait))
+            rig = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
+            made: object = Ready(rig, measured(rig, self.chosen, sleep=self._ending.wait))
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
-            if machine is not None:
+            if rig is not None:
                 with suppress(StudyError):  # what came first says why
-                    machine.stop()
+                    rig.stop()
         self._ready.emit(made)
 
     def _begin(self, made: object) -> None:
         """Ask the operator, or claim the session on the disk and open the two windows at once."""
         self._working = False
         if isinstance(made, Ready):
-            self.machine = made.machine
+            self.rig = made.rig
         if self._closed:
             self._let_go()
             self.deleteLater()
@@ -216,14 +216,14 @@ class LiveSession(QObject):
             raise made if isinstance(made, Exception) else TypeError(made)
         from study_app.app.session.windows import open_windows  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
-        chosen, machine = self.chosen, made.machine
+        chosen, rig = self.chosen, made.rig
         source = chosen.read_source()
         protocol = parse(source, chosen.source)
         shown_on, operated_on = self.screens()
         found = checks(made.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()), protocol)
         self._pass_checks(found)
         screens = described(self.settings, shown_on, operated_on)
-        self._store = open_store(chosen, protocol, source, machine, screens, made.masking)
+        self._store = open_store(chosen, protocol, source, rig, screens, made.masking)
         self._crash_trace = CrashTrace(self._store.folder.crash)
         self._store.append("preflight", checks=[one.entry for one in found])
         protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
@@ -237,7 +237,7 @@ class LiveSession(QObject):
             protocol,
             schedule,
             self._store,
-            machine,
+            rig,
             self.theme,
             start,
             text_scale=text_scale,
@@ -338,15 +338,15 @@ class LiveSession(QObject):
             asked.close()
 
     def _let_go(self) -> None:
-        machine, self.machine = self.machine, None
+        rig, self.rig = self.rig, None
         reconnection = self.bridge.reconnection if self.bridge is not None else None
         if reconnection is not None and not reconnection.wait(self.patience_s):  # it gives up now that this is closed
-            machine = None  # its thread has it, at zero force, until the program ends
+            rig = None  # its thread has it, at zero force, until the program ends
         store, self._store = self._store, None
         crash_trace, self._crash_trace = self._crash_trace, None
         try:
-            if machine is not None:
-                machine.stop()
+            if rig is not None:
+                rig.stop()
         finally:
             if crash_trace is not None:
                 crash_trace.close()

@@ -99,7 +99,7 @@ class Appraisal:
 class Preflight(QObject):
     """Shows the window before a session, has things measured again, and tells what was decided, once.
 
-    The machine stays somebody else's; the servo ticks at rest meanwhile, and ``failed`` comes when it stops itself.
+    The rig stays its opener's; the servo ticks at rest meanwhile, and ``failed`` comes when it stops itself.
     """
 
     started = Signal(object)
@@ -174,7 +174,7 @@ class Preflight(QObject):
     def _look(self) -> None:
         """Watch over the servo, which a device that is unplugged stops, and take what was said of the scenes."""
         try:
-            self._ready.machine.servo.check()
+            self._ready.rig.servo.check()
         except StudyError as error:
             self._timer.stop()
             self.failed.emit(error)
@@ -195,7 +195,7 @@ class Preflight(QObject):
 
     def _measure(self) -> None:
         try:
-            found: object = measured(self._ready.machine, self._chosen, sleep=self._ending.wait)
+            found: object = measured(self._ready.rig, self._chosen, sleep=self._ending.wait)
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             found = error
         self._measured.emit(found)

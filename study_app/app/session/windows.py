@@ -43,7 +43,7 @@ def open_windows(
     protocol: Protocol,
     schedule: Schedule,
     store: SessionStore,
-    machine: Rig,
+    rig: Rig,
     theme: Theme,
     start: Start = FIRST,
     *,
@@ -57,7 +57,7 @@ def open_windows(
     must be at least, ``photodiode`` whether the tank has a corner for one. With ``refresh_hz`` there are so many
     frames a second by the clock, whatever the screen's rate is.
     """
-    clock, device, servo = store.clock.seconds, machine.device, machine.servo
+    clock, device, servo = store.clock.seconds, rig.device, rig.servo
     journal = WatchedJournal(store, progress_of(opened(store.lines, store.key)), clock)
     described = descriptor_of(chosen.device)
     operator = OperatorWindow(
@@ -83,7 +83,7 @@ def open_windows(
     )
     hand = hand_of(device)
     parts = Parts(
-        session=_facts(chosen, protocol, schedule, machine),
+        session=_facts(chosen, protocol, schedule, rig),
         key=store.key.codes,
         secret=store.key.nonce,
         language=chosen.language,
@@ -93,7 +93,7 @@ def open_windows(
         recorder=store.recorder,
         start=start,
         exclude=_excluder(chosen),
-        reconnect=machine.reconnect,
+        reconnect=rig.reconnect,
         aim_m=_aim(hand, servo),
         point_to=getattr(device, "point_to", None) if described.pointer else None,
         press=getattr(device, "press", None) if described.pointer else None,
@@ -117,7 +117,7 @@ def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
     return leave_out
 
 
-def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: Rig) -> Session:
+def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, rig: Rig) -> Session:
     """Return what the operator's window says throughout."""
     described = descriptor_of(chosen.device)
     return Session(
@@ -131,8 +131,8 @@ def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: 
         device_name=described.title,
         device_icon=described.icon,
         device_rows=(
-            ("Priority", str(machine.servo.describe()["priority"]).partition(" (")[0]),
-            *_calibration(machine.device),
+            ("Priority", str(rig.servo.describe()["priority"]).partition(" (")[0]),
+            *_calibration(rig.device),
         ),
     )
 

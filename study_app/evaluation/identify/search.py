@@ -78,7 +78,7 @@ class Problem:
 
     z (p,) are the numbers of the search: u, but for a scaling whose length is searched too, there the logarithm of
     their ratio. ``least`` and ``most`` (p,) are its range, ``start`` the scene's own values in it, ``axes`` those of
-    the force that count: measured or foretold to be other than zero.
+    the force that count: measured or predicted to be other than zero.
 
     Raises
     ------

@@ -61,7 +61,7 @@ def value_of(scene: Scene, name: str) -> float:
     Raises
     ------
     StudyError
-        An unknown name, or no number.
+        The name is unknown, or its value is not a number.
     """
     table, field = _places(_tables(scene.model_dump()), name)[0]
     value = table[field]

@@ -1,4 +1,4 @@
-"""The force of an even motion by arithmetic: what the servo will send, foretold without the compiler."""
+"""The force of an even motion by arithmetic: what the servo will send, computed without the compiler."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ borders between them are even too.
 **Rows** are dealt by enrolment: the last number in the participant's id (P007 is number 7). Numbers 1 … rows are the
 first round, the next as many the second; each round deals all rows in an order of its own. That order comes from a
 stream of the *study*, not of the session, because sessions have seeds of their own and would not fill a round. So a
-session's row depends on the study's name, the block's name and the id alone. It can be foretold, which does no harm:
+session's row depends on the study's name, the block's name and the id alone. It is predictable, which does no harm:
 rows are rows of codes, and what a code stands for is sealed. An id without a number takes a row drawn from the id
 itself: even on average only.
 """

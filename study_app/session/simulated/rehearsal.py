@@ -1,8 +1,8 @@
 """Whole sessions with simulated participants, faster than real time, through everything a real one goes through.
 
-The machine, the runner, the servo's compiled loop, the store and the checks of every questionnaire are the same; only
-the device, the clock, the screen and the participant are simulated. Time is the servo's virtual clock, so that the same
-call into another folder gives the same tables but for wall-clock times. Every row says that it is simulated.
+The transitions, the runner, the servo's compiled loop, the store and the checks of every questionnaire are the same;
+only the device, the clock, the screen and the participant are simulated. Time is the servo's virtual clock, so that the
+same call into another folder gives the same tables but for wall-clock times. Every row says that it is simulated.
 
 What a participant does and answers in a trial is drawn from streams of that trial. A rehearsal that was killed and
 resumed answers as one that was not: from what is felt in the whole session, which is computed again for that.
@@ -92,20 +92,20 @@ def rehearse(
         check_unused(StudyFolder(folder), person, 1)
     for person in people:
         began = time.perf_counter()
-        with rehearsal_rig(study, person, seed, device) as machine:
+        with rehearsal_rig(study, person, seed, device) as rig:
             start = SessionStart(
                 person,
                 seed=seed,
                 operator="",
                 language=study.study.languages[0],
-                device=machine.described,
+                device=rig.described,
                 screens=REHEARSED_SCREENS,
                 simulated=True,
                 recordings=recordings,
             )
-            store = begin(folder, study, source, start, clock=SessionClock(machine.servo.now_ns))
+            store = begin(folder, study, source, start, clock=SessionClock(rig.servo.now_ns))
             own = session_protocol(StudyFolder(folder), study, person, 1)
-            lasted_s, answers = _run(own, build_schedule(own, person, seed), machine, store, FIRST)
+            lasted_s, answers = _run(own, build_schedule(own, person, seed), rig, store, FIRST)
             proof = store.fingerprint
         if progress is not None:
             took_s = time.perf_counter() - began
@@ -138,31 +138,31 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
     source = read(name)
     study = parse(source, name)
     person, seed = begun["participant"], begun["seed"]
-    with rehearsal_rig(study, person, seed, begun["device"]) as machine:
+    with rehearsal_rig(study, person, seed, begun["device"]) as rig:
         store = reopen(
             session_folder,
             study,
             source,
             operator="",
-            device=machine.described,
+            device=rig.described,
             screens=REHEARSED_SCREENS,
-            now_ns=machine.servo.now_ns,
+            now_ns=rig.servo.now_ns,
             now=max(datetime.now().astimezone(), datetime.fromisoformat(lines[-1]["at"])),
         )
         own = session_protocol(locate(session_folder)[0], study, person, begun["session"])
         schedule = build_schedule(own, person, seed)
-        _run(own, schedule, machine, store, resume_at(own, schedule, lines, store.key))
+        _run(own, schedule, rig, store, resume_at(own, schedule, lines, store.key))
 
 
-def _run(study: Protocol, schedule: Schedule, machine: Rig, store: SessionStore, start: Start) -> tuple[float, int]:
+def _run(study: Protocol, schedule: Schedule, rig: Rig, store: SessionStore, start: Start) -> tuple[float, int]:
     """Run an open session to its end; return how long it lasted in its own time [s], and its answers."""
     with store:
         known = (
             {}
             if start is FIRST
-            else _felt_in_whole_session(study, schedule, machine.device.name, store.key.codes, store.key.nonce)
+            else _felt_in_whole_session(study, schedule, rig.device.name, store.key.codes, store.key.nonce)
         )
-        rehearsal = RehearsedSession(study, schedule, machine, store, start, known=known)
+        rehearsal = RehearsedSession(study, schedule, rig, store, start, known=known)
         rehearsal.run()
     return store.clock.seconds(), rehearsal.answers
 
@@ -172,8 +172,6 @@ def _felt_in_whole_session(
 ) -> dict[int, tuple[Felt, ...]]:
     """Return what is felt in each trial (by number) of a session that is not interrupted."""
     felt: dict[int, tuple[Felt, ...]] = {}
-    with rehearsal_rig(study, schedule.participant, schedule.seed, device) as machine:
-        RehearsedSession(
-            study, schedule, machine, Unkept(machine.servo.now_ns, codes, secret), felt=felt.__setitem__
-        ).run()
+    with rehearsal_rig(study, schedule.participant, schedule.seed, device) as rig:
+        RehearsedSession(study, schedule, rig, Unkept(rig.servo.now_ns, codes, secret), felt=felt.__setitem__).run()
     return felt

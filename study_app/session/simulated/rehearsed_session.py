@@ -61,7 +61,7 @@ class RehearsedSession(SimulatedParticipant):
         What is run.
     schedule : Schedule
         In what order.
-    machine : Rig
+    rig : Rig
         Servo, device and clock.
     store : KeptSession
         Where it is kept.
@@ -77,7 +77,7 @@ class RehearsedSession(SimulatedParticipant):
         self,
         study: Protocol,
         schedule: Schedule,
-        machine: Rig,
+        rig: Rig,
         store: KeptSession,
         start: Start = FIRST,
         felt: Callable[[int, tuple[Felt, ...]], object] | None = None,
@@ -86,16 +86,16 @@ class RehearsedSession(SimulatedParticipant):
         super().__init__(study, schedule)
         self._known = known or {}
         self._tell_felt = felt
-        self.machine = machine
-        hand = hand_of(machine.device)
+        self.rig = rig
+        hand = hand_of(rig.device)
         assert hand is not None  # noqa: S101 - `rehearsal_rig` has looked
         self._hand = hand
         self._now_s = store.clock.seconds
         self._felt_in: dict[int, tuple[Felt, ...]] = {}
-        self._touch = machine.servo.telemetry.reader()
+        self._touch = rig.servo.telemetry.reader()
         self._next_frame_ns = 0
         self._paint: Draw = self._stream("screen")
-        ports = Ports(machine.servo, store, self._present, self._now_s, store.recorder)
+        ports = Ports(rig.servo, store, self._present, self._now_s, store.recorder)
         self._runner = Runner(study, schedule, store.key.codes, ports, study.study.languages[0], start, store.key.nonce)
 
     def _seconds(self) -> float:
@@ -132,7 +132,7 @@ class RehearsedSession(SimulatedParticipant):
                 case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
                 case _:
-                    raise SessionError(f"the rehearsal failed: {self.machine.servo.fault or self.page}")
+                    raise SessionError(f"the rehearsal failed: {self.rig.servo.fault or self.page}")
 
     def _present(self, page: Page) -> None:
         self.page = page
@@ -147,7 +147,7 @@ class RehearsedSession(SimulatedParticipant):
 
     def _advance(self, seconds: float) -> None:
         """Let the servo take its ticks; who ends the program ends them, and without them no time passes."""
-        servo = self.machine.servo
+        servo = self.rig.servo
         if servo.advance(max(1, round(seconds * servo.rate_hz))) == 0 and servo.fault is None:
             raise SessionError("the rehearsal was stopped from outside")
 
@@ -159,7 +159,7 @@ class RehearsedSession(SimulatedParticipant):
         self._paint = self._stream(f"{named}/screen")
         senses = Senses(self._study.scene.scale)
         self._touch.read()
-        self._next_frame_ns = self.machine.servo.now_ns()
+        self._next_frame_ns = self.rig.servo.now_ns()
         hand = hand_for(page.task, arm, draw, self._now_s())
         self.look(senses)  # the first frame, with which the trial begins, is painted at once
         while page is self.page:
@@ -179,7 +179,7 @@ class RehearsedSession(SimulatedParticipant):
     def look(self, senses: Senses) -> TankView | None:
         """Show the frames that are due since the last look; return what the newest showed, None where none was due."""
         view = None
-        while self._next_frame_ns <= self.machine.servo.now_ns():
+        while self._next_frame_ns <= self.rig.servo.now_ns():
             view = self._runner.view(self._next_frame_ns)
             if view is not None:
                 low, high = PAINT_S

@@ -11,20 +11,7 @@ from dataclasses import replace
 
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.store.tables.column import Column
-from study_app.store.tables.identity_columns import (
-    ATTEMPT,
-    BLOCK,
-    CODE,
-    INDEX,
-    PART,
-    PARTICIPANT,
-    PHASE,
-    PILOT,
-    SESSION,
-    SIMULATED,
-    STUDY,
-    TRIAL,
-)
+from study_app.store.tables.identity_columns import CODE, PARTICIPANT, SESSION, SESSION_COLUMNS, TRIAL, TRIAL_COLUMNS
 
 
 def _measure(name: str, description: str, unit: str = "", *, sealed: bool = False) -> Column:
@@ -44,17 +31,8 @@ def _delay_error(name: str, which: str) -> Column:
 
 
 RESPONSES: tuple[Column, ...] = (
-    STUDY,
-    PARTICIPANT,
-    SESSION,
-    SIMULATED,
-    PILOT,
-    TRIAL,
-    ATTEMPT,
-    BLOCK,
-    PHASE,
-    PART,
-    INDEX,
+    *SESSION_COLUMNS,
+    *TRIAL_COLUMNS,
     CODE,
     Column("item", "text", "Id of the statement; its text is in the session's receipt."),
     Column("number", "integer", "Position of the statement on its page, from 1.", minimum=1),
@@ -78,13 +56,9 @@ RESPONSES: tuple[Column, ...] = (
 _RESPONSES_BY_NAME = {column.name: column for column in RESPONSES}
 
 RESPONSES_2: tuple[Column, ...] = (
-    STUDY,
-    PARTICIPANT,
-    SESSION,
-    SIMULATED,
-    PILOT,
+    *SESSION_COLUMNS,
     Column("form", "text", "Id of the questionnaire that was presented on its own; n/a after a trial.", may_miss=True),
-    *(replace(column, may_miss=True) for column in (TRIAL, ATTEMPT, BLOCK, PHASE, PART, INDEX, CODE)),
+    *(replace(column, may_miss=True) for column in (*TRIAL_COLUMNS, CODE)),
     replace(_RESPONSES_BY_NAME["item"], description="Id of the question; its words are in the session's receipt."),
     Column("kind", "text", "Kind of the question: statement, rating, slider, number, choice, text."),
     replace(_RESPONSES_BY_NAME["number"], description="Place of the question on its page, from 1, as shown."),
@@ -115,17 +89,8 @@ _LIMITERS = {
 }
 
 TRIALS: tuple[Column, ...] = (
-    STUDY,
-    PARTICIPANT,
-    SESSION,
-    SIMULATED,
-    PILOT,
-    TRIAL,
-    ATTEMPT,
-    BLOCK,
-    PHASE,
-    PART,
-    INDEX,
+    *SESSION_COLUMNS,
+    *TRIAL_COLUMNS,
     Column("of", "integer", "Number of trials in the block.", minimum=1),
     CODE,
     Column("trial_started_at", "time", "Time when the trial began."),
@@ -277,11 +242,7 @@ INTERVALS: tuple[Column, ...] = (
 """Intervals of the trials of a study with designs."""
 
 PARTICIPANTS: tuple[Column, ...] = (
-    STUDY,
-    PARTICIPANT,
-    SESSION,
-    SIMULATED,
-    PILOT,
+    *SESSION_COLUMNS,
     Column(
         "status",
         "text",

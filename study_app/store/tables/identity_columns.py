@@ -25,3 +25,9 @@ PHASE = Column(
 PART = Column("part", "integer", "Part of the study, as shown to the participant.", minimum=1, may_miss=True)
 INDEX = Column("index", "integer", "Position of the trial in its block, from 1.", minimum=1)
 CODE = Column("code", "text", "What was presented, as a code (L1, D3 ...) that the sealed key translates.")
+
+SESSION_COLUMNS = (STUDY, PARTICIPANT, SESSION, SIMULATED, PILOT)
+"""Which session a row is about."""
+
+TRIAL_COLUMNS = (TRIAL, ATTEMPT, BLOCK, PHASE, PART, INDEX)
+"""Which trial of it."""

@@ -9,28 +9,15 @@ import pytest
 
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
-from tests.protocol.trials.studies import BLOCK, HEAD
+from tests.protocol.trials.studies import FIVE_POINTS, SHORT, text_of
 
 MORE = """
-[scales.thickness]
-labels.en = ["very thin", "thin", "medium", "thick", "very thick"]
-
-[stimuli.value]
-condition = "oil"
-vary = "viscosity_pa_s"
-level = "value"
-levels = [0.5, 8]
-
 [stimuli.around]
 condition = "oil"
 vary = "viscosity_pa_s"
 level = "value"
 standards = [2]
 levels = [0.5, 8]
-
-[designs.rated]
-kind = "rating"
-scale = "thickness"
 
 [designs.numbered]
 kind = "estimation"
@@ -73,23 +60,13 @@ conditions = ["oil", "other", "late"]
 standard = "oil"
 repetitions = 4
 """
-EDITS = (
-    ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "equal", "pairs"]'),
-    ("repetitions = 8", "repetitions = 2"),
-    ("min_s = 1", "min_s = 0.3"),
-    ("part = 1\n", ""),
-    ('code_prefix = "V"\n', ""),
-)
+SEQUENCE = ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "equal", "pairs"]')
 
 
 @pytest.fixture(scope="session")
 def sealed_levels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("levels")
-    text = HEAD + BLOCK + MORE
-    for old, new in EDITS:
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "levels.toml").write_text(text)
+    (folder / "levels.toml").write_text(text_of(SEQUENCE, *SHORT, more=FIVE_POINTS + MORE))
     return rehearse(folder / "levels.toml", participants=3, seed=2, results=folder / "study", recordings=False)
 
 

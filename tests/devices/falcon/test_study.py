@@ -206,7 +206,7 @@ def test_a_cable_pulled_in_a_trial_keeps_the_data_marks_the_trial_and_lets_it_go
     def pull_the_cable(self, senses):
         looks.append(self.page.trial)
         if looks.count(2) == 40:
-            self.machine.device.hand.faults.on("unplugged")
+            self.rig.device.hand.faults.on("unplugged")
         return look(self, senses)
 
     folder = StudyFolder(tmp_path / "demo")

@@ -38,8 +38,8 @@ LEFT = Qt.MouseButton.LeftButton
 class Scene:
     """What happens to the session, step by step; ``told`` is what was seen."""
 
-    def __init__(self, machines: list[Rig], pictures: Path | None) -> None:
-        self.machines, self.pictures = machines, pictures
+    def __init__(self, rigs: list[Rig], pictures: Path | None) -> None:
+        self.rigs, self.pictures = rigs, pictures
         self.told: dict[str, Any] = {"errors": []}
         self.step = self.unplug
 
@@ -64,8 +64,8 @@ class Scene:
         return isinstance(participant.page, TroublePage | PausePage)
 
     @property
-    def machine(self) -> Rig:
-        return self.machines[0]
+    def rig(self) -> Rig:
+        return self.rigs[0]
 
     def picture(self, name: str) -> None:
         if self.pictures is not None:
@@ -76,7 +76,7 @@ class Scene:
 
     def unplug(self, participant: ParticipantWindow, _operator: OperatorWindow) -> bool:
         if isinstance(participant.page, TaskPage) and participant.tank is not None and participant.tank.isVisible():
-            self.machine.device.hand.faults.on("unplugged")
+            self.rig.device.hand.faults.on("unplugged")
             self.step = self.try_while_unplugged
         return isinstance(participant.page, TaskPage)
 
@@ -86,7 +86,7 @@ class Scene:
                 operator.come_forward()
                 return True
             self.told["lost"] = {
-                "force": self.machine.servo.force_is_on,
+                "force": self.rig.servo.force_is_on,
                 "banner": operator.banner.what.text(),
                 "advice": operator.banner.then.text(),
                 "page": participant.page.paragraph,
@@ -104,7 +104,7 @@ class Scene:
         if said.startswith("Not connected"):
             self.told["still unplugged"] = said
             self.picture("not-connected")
-            self.machine.device.hand.faults.off("unplugged")
+            self.rig.device.hand.faults.off("unplugged")
             QTest.mouseClick(operator.banner.reconnect, LEFT)
             self.told["button while connecting"] = operator.banner.reconnect.isEnabled()
             self.step = self.resume
@@ -113,8 +113,8 @@ class Scene:
     def resume(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         if isinstance(participant.page, PausePage):
             self.told["reconnected"] = {
-                "force": self.machine.servo.force_is_on,
-                "fault": self.machine.servo.fault,
+                "force": self.rig.servo.force_is_on,
+                "fault": self.rig.servo.fault,
                 "held": participant.page.held,
                 "banner": operator.banner.isVisible(),
                 "resume": operator.buttons.pause.text(),
@@ -130,7 +130,7 @@ class Scene:
 
     def break_panels(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         if isinstance(participant.page, TaskPage):
-            self.told["force in the next attempt"] = self.machine.servo.force_is_on
+            self.told["force in the next attempt"] = self.rig.servo.force_is_on
             self.painted, StepLine.paintEvent = StepLine.paintEvent, _paints_badly
             self.drawn, TracePlot.show_traces = TracePlot.show_traces, _fails
             operator.update()
@@ -141,7 +141,7 @@ class Scene:
         covers = operator.panels.covers
         if len(covers) == 2 and all(cover is not None and cover.isVisible() for cover in covers.values()):
             self.told["panels"] = sorted(cover.toolTip() for cover in covers.values())
-            self.told["force with failed panels"] = self.machine.servo.force_is_on
+            self.told["force with failed panels"] = self.rig.servo.force_is_on
             self.told["trouble with failed panels"] = operator.banner.isVisible()
             operator.come_forward()
             self.step = self.see_lines_in_front
@@ -165,7 +165,7 @@ class Scene:
             recording_files.SamplesFile = self.samples_file
             self.told["recording"] = lost
             self.told["page at the loss"] = type(participant.page).__name__
-            self.told["force without a recording"] = self.machine.servo.force_is_on
+            self.told["force without a recording"] = self.rig.servo.force_is_on
             self.told["notices"] = [one.text() for one in operator.findChildren(QLabel) if "recorder" in one.text()]
             operator.come_forward()
             self.step = self.see_loss
@@ -204,10 +204,10 @@ def _ends(*_arguments: object) -> None:
 
 def main(folder: str, pictures: str = "") -> None:
     start.MEASURED_S = 0.7  # the force has faded in by the first trial, as in a real session
-    machines: list[Rig] = []
+    rigs: list[Rig] = []
     open_rig = live_session.open_rig
-    live_session.open_rig = lambda *a, **k: machines.append(open_rig(*a, **k)) or machines[-1]
-    scene = Scene(machines, Path(pictures) if pictures else None)
+    live_session.open_rig = lambda *a, **k: rigs.append(open_rig(*a, **k)) or rigs[-1]
+    scene = Scene(rigs, Path(pictures) if pictures else None)
     application_here()
     person = Person(scene)
     code = app.run(

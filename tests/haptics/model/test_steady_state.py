@@ -1,4 +1,4 @@
-"""The force foretold by arithmetic, held against the servo's own tick."""
+"""The force predicted by arithmetic, held against the servo's own tick."""
 
 import numpy as np
 import pytest
@@ -38,27 +38,27 @@ def sent(scene, hand_mps, lasting_s=1):
 @pytest.mark.parametrize("name", LIQUIDS)
 @pytest.mark.parametrize("scale", [1, 3, 10])
 @pytest.mark.parametrize("hand_mps", [0.02, 0.1, 0.25, 0.6])
-def test_what_is_foretold_is_what_the_servo_sends(name, scale, hand_mps):
+def test_the_predicted_force_is_what_the_servo_sends(name, scale, hand_mps):
     for law in ("constant", "schiller-naumann", "haider-levenspiel", "brown-lawler"):
-        foretold = steady(scene_of(name, scale, law), hand_mps)
+        predicted = steady(scene_of(name, scale, law), hand_mps)
         force_n, limiters = sent(scene_of(name, scale, law), hand_mps)
-        assert foretold.force_n == pytest.approx(force_n, rel=1e-6)
+        assert predicted.force_n == pytest.approx(force_n, rel=1e-6)
         acted = {LIMITER_NORM: "norm", LIMITER_SLOPE: "slope"}.get(limiters & (LIMITER_NORM | LIMITER_SLOPE))
         if limiters & LIMITER_NORM and limiters & LIMITER_SLOPE:
             acted = "norm"
-        assert foretold.limit == acted
+        assert predicted.limit == acted
 
 
 @pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 @pytest.mark.parametrize("name", ["gear_oil", "honey", "tar"])
-def test_of_unsteady_drag_what_is_foretold_comes_once_its_history_is_over(name):
+def test_unsteady_drag_reaches_the_predicted_force_once_its_history_is_over(name):
     liquid = Liquid(id=name, density_kg_m3=890, viscosity_pa_s={"gear_oil": 0.35, "honey": 10, "tar": 100}[name])
     scene = Scene(scale=3, liquids=(liquid.model_copy(update={"effects": ("unsteady_drag",)}),), format=2)
-    foretold = steady(scene)
+    predicted = steady(scene)
     force_n, limiters = sent(scene, 0.1, lasting_s=30)
-    assert foretold.force_n == pytest.approx(force_n, rel=0.01)
-    assert (foretold.limit == "slope") == bool(limiters & LIMITER_SLOPE)
-    assert (foretold.limit == "slope") == (name == "tar")
+    assert predicted.force_n == pytest.approx(force_n, rel=0.01)
+    assert (predicted.limit == "slope") == bool(limiters & LIMITER_SLOPE)
+    assert (predicted.limit == "slope") == (name == "tar")
 
 
 def test_the_limits_that_the_cases_above_meet():

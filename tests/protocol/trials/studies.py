@@ -82,16 +82,42 @@ stimulus = "viscosity"
 design = "2ifc"
 method = "few"
 """
+FIVE_POINTS = """
+[scales.thickness]
+labels.en = ["very thin", "thin", "medium", "thick", "very thick"]
+
+[designs.rated]
+kind = "rating"
+scale = "thickness"
+
+[stimuli.value]
+condition = "oil"
+vary = "viscosity_pa_s"
+level = "value"
+levels = [0.5, 8]
+"""
+SHORT = (
+    ("repetitions = 8", "repetitions = 2"),
+    ("min_s = 1", "min_s = 0.3"),
+    ("part = 1\n", ""),
+    ('code_prefix = "V"\n', ""),
+)
+"""Edits that make a rehearsal short, and let blocks follow one another without parts."""
 SECRET = bytes(range(32))
 
 
-def study(*edits: tuple[str, str], more: str = "") -> Protocol:
-    """Return the study with edits of its text and more tables."""
+def text_of(*edits: tuple[str, str], more: str = "") -> str:
+    """Return the study's text with edits and more tables."""
     text = HEAD + BLOCK + more
     for old, new in edits:
         assert old in text
         text = text.replace(old, new)
-    return parse(text.encode(), "levels.toml")
+    return text
+
+
+def study(*edits: tuple[str, str], more: str = "") -> Protocol:
+    """Return the study with edits of its text and more tables."""
+    return parse(text_of(*edits, more=more).encode(), "levels.toml")
 
 
 def key_of(protocol: Protocol, secret: bytes = SECRET) -> Key:

@@ -29,30 +29,17 @@ from study_app.viewmodels.operator import Session, operator_view
 from study_app.viewmodels.servo_health import Vitals
 from study_app.viewmodels.session.stages import stages
 from tests.compiled import needs_servo
-from tests.protocol.trials.studies import BLOCK, HEAD
+from tests.protocol.trials.studies import FIVE_POINTS, SHORT, text_of
 from tests.session.sealed.numbers_written import Trials, every_number, told
 
 pytestmark = [pytest.mark.slow, needs_servo]
 
 MORE = """
-[scales.thickness]
-labels.en = ["thin", "medium", "thick"]
-
-[stimuli.value]
-condition = "oil"
-vary = "viscosity_pa_s"
-level = "value"
-levels = [0.5, 8]
-
 [stimuli.delay]
 condition = "oil"
 vary = "delay_ms"
 spacing = "linear"
 levels = [20, 200]
-
-[designs.rated]
-kind = "rating"
-scale = "thickness"
 
 [methods.five]
 kind = "constant"
@@ -84,13 +71,7 @@ conditions = ["oil", "other", "late"]
 standard = "oil"
 repetitions = 2
 """
-EDITS = (
-    ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "pairs"]'),
-    ("repetitions = 8", "repetitions = 2"),
-    ("min_s = 1", "min_s = 0.3"),
-    ("part = 1\n", ""),
-    ('code_prefix = "V"\n', ""),
-)
+SEQUENCE = ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "pairs"]')
 SESSIONS = 12
 HIDDEN = {"sealed", "key_hash", "at", "previous", "fingerprint"}
 """What may differ: sealed fields, hashes, and the time of day."""
@@ -100,12 +81,8 @@ Said: TypeAlias = dict[str, Any]
 
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    text = HEAD + BLOCK + MORE
-    for old, new in EDITS:
-        assert old in text
-        text = text.replace(old, new)
     path = tmp_path_factory.mktemp("levels") / "levels.toml"
-    path.write_text(text)
+    path.write_text(text_of(SEQUENCE, *SHORT, more=FIVE_POINTS + MORE))
     return path
 
 
@@ -217,12 +194,9 @@ def test_the_operator_sees_the_same_under_two_keys(first: Path, second: Path, pr
 @pytest.fixture(scope="module")
 def sessions(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a study of one block of pairs, answered by what was felt."""
-    folder = tmp_path_factory.mktemp("told")
-    text = HEAD + BLOCK
-    for old, new in EDITS[2:]:
-        text = text.replace(old, new)
+    folder = tmp_path_factory.mktemp("pairs")
     path = folder / "pairs.toml"
-    path.write_text(text.replace("repetitions = 8", "repetitions = 4"))
+    path.write_text(text_of(("repetitions = 8", "repetitions = 4"), *SHORT[1:]))
     return rehearse(path, participants=SESSIONS, seed=6, results=folder / "study", recordings=False)
 
 

@@ -171,7 +171,7 @@ def test_a_device_that_is_lost_ends_the_rehearsal_with_a_word_why(
     look = RehearsedSession.look
 
     def pull_the_cable(self: Any, senses: Any) -> TankView | None:
-        self.machine.device.unplug()
+        self.rig.device.unplug()
         return look(self, senses)
 
     monkeypatch.setattr(RehearsedSession, "look", pull_the_cable)

@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from study_app.cli import commands
 from study_app.cli.evidence.accuracy import motion_along
 from study_app.errors import StudyError
-from study_app.evaluation.expected_error import expected, foretold, physical_n
+from study_app.evaluation.expected_error import error_report, expected, physical_n
 from study_app.evaluation.force_error import ROUNDING, Error, error_of
 from study_app.evaluation.hand_motions import stir, stroke
 from study_app.evaluation.reference_solutions import Case, Truth
@@ -330,11 +330,10 @@ def test_what_a_scene_leaves_out_is_expected_to_be_missing():
 
 
 @compiled
-def test_the_expected_error_is_told_in_a_line():
-    assert "of the force; none if velocities were known exactly; against the definition of drag and wake" in foretold(
-        TANK
-    )
-    assert "\n" not in foretold(TANK)
+def test_the_expected_error_is_reported_in_a_line():
+    line = error_report(TANK)
+    assert "of the force; none if velocities were known exactly; against the definition of drag and wake" in line
+    assert "\n" not in line
 
 
 def test_the_force_of_a_slow_stroke_is_that_of_creeping_flow():

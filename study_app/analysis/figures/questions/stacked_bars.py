@@ -15,7 +15,7 @@ from study_app.analysis.tables.asked_questions import AskedQuestion
 ROW_PT: Final = 26.0
 HALF: Final = 0.32
 SWATCH_PT: Final = 18.0
-NARROW: Final = 0.03  # share of a bar in which no number is written
+NARROW: Final = 0.03  # share of a bar in which the value is not printed
 
 
 def colours(points: int) -> list[str]:

@@ -87,7 +87,7 @@ class Opened:
 
     @property
     def told(self) -> list[Any]:
-        """What was told but for what was shown."""
+        """The events but for those that say what was shown."""
         return [event for event in self.events if not isinstance(event, ItemShown)]
 
     @property

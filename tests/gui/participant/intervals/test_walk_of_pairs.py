@@ -1,6 +1,6 @@
 """The smallest study of pairs in its real windows at 1366 × 768 on one screen: by keys alone and by the mouse alone.
 
-What comes next is told by the session's own machine, where it lies by the same widgets laid out off screen.
+The session's own transitions say what comes next; the same widgets, laid out off screen, say where it lies.
 """
 
 from __future__ import annotations
