@@ -58,6 +58,7 @@ def test_a_chosen_workspace_counts_from_every_start_folder(documents, tmp_path, 
     assert not documents.exists()
 
 
+@pytest.mark.slow
 def test_windows_show_the_same_sessions_and_suggest_the_same_id_from_two_start_folders(
     documents, tmp_path, monkeypatch, qtbot
 ):

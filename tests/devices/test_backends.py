@@ -98,6 +98,7 @@ def test_a_hidapi_that_does_not_load_is_told(monkeypatch):
     assert "pip install hidapi" in spacemouse.why
 
 
+@pytest.mark.slow
 def test_this_machine_can_be_asked_and_no_compiler_is_loaded():
     program = (
         "import sys; from study_app.devices.backends import backends; print(len(backends())); "

@@ -173,6 +173,7 @@ def copied(results: Path, to: Path) -> Path:
     return session(to)
 
 
+@pytest.mark.slow
 def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
     found = replay(session(rehearsed))
     assert (found.differences, found.uncompared) == ((), ())

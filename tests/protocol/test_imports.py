@@ -4,11 +4,14 @@ import pkgutil
 import subprocess
 import sys
 
+import pytest
+
 import study_app.protocol
 
 HEAVY = ("numba", "llvmlite", "PySide6", "pyqtgraph", "pandas", "scipy", "matplotlib", "numpy")
 
 
+@pytest.mark.slow
 def test_reading_a_protocol_loads_neither_compiler_nor_qt():
     modules = [
         module.name for module in pkgutil.walk_packages(study_app.protocol.__path__, prefix="study_app.protocol.")

@@ -55,6 +55,7 @@ def hashes(folder: StudyFolder) -> Iterator[tuple[str, str]]:
 @pytest.mark.parametrize(
     "name", ["demo", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rek2024", "physical_liquids"))]
 )
+@pytest.mark.slow
 def test_rehearsal_writes_the_bytes_recorded_for_format_1(name: str, tmp_path: Path) -> None:
     folder = rehearse(name, participants=2, seed=1, results=tmp_path / name)
     assert dict(hashes(StudyFolder(folder))) == RECORDED[name]

@@ -195,6 +195,7 @@ PROGRAM = """
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL], ids=["interrupted", "killed"])
+@pytest.mark.slow
 def test_a_worker_ends_with_its_program_and_prints_no_traceback(number: int) -> None:
     program = subprocess.Popen(
         [sys.executable, "-c", textwrap.dedent(PROGRAM)],

@@ -64,6 +64,7 @@ def test_leaving_while_a_device_is_being_opened_lets_go_of_it(make_lab: MakeLab,
     assert visit.live is None
 
 
+@pytest.mark.slow
 def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_opened(
     make_lab: MakeLab, qtbot: Any
 ) -> None:
@@ -126,6 +127,7 @@ def test_a_device_that_is_not_there_is_told(make_lab: MakeLab, qtbot: Any) -> No
     assert not view.device.ready
 
 
+@pytest.mark.slow
 def test_a_long_opening_without_a_word_is_explained_by_the_compilation(
     make_lab: MakeLab, qtbot: Any, monkeypatch: Any
 ) -> None:

@@ -42,6 +42,7 @@ def use(results: Path, participant: str, session: int = 1) -> None:
     (folder / "checksums.sha256").touch()  # something that comes after a session's beginning
 
 
+@pytest.mark.slow
 def test_a_key_in_a_field_reads_no_folder_in_the_windows_thread(dialog, qtbot, monkeypatch):
     threads, read = [], new_session_dialog.read_study_folder_state
 

@@ -149,6 +149,7 @@ print([(due.level, due.arrangement) for due in run(protocol, key_of(protocol))])
 """
 
 
+@pytest.mark.slow
 def test_another_process_finds_the_same():
     protocol = study()
     ours = [(due.level, due.arrangement) for due in run(protocol, key_of(protocol))]

@@ -68,6 +68,7 @@ method = "few"
 
 
 @pytest.mark.parametrize("tables", [DAMPERS, OILS, DELAYS], ids=["dampers", "oils", "delays"])
+@pytest.mark.slow
 def test_every_interval_is_delivered_as_requested(tmp_path: Path, tables: str) -> None:
     path = tmp_path / "limits.toml"
     path.write_text(HEAD + tables, encoding="utf-8")

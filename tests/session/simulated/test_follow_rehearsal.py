@@ -70,6 +70,7 @@ def results(study_file: Path) -> Path:
     return rehearse(study_file, participants=2, seed=1, results=study_file.parent / "results")
 
 
+@pytest.mark.slow
 def test_every_trial_is_followed_to_its_end_and_valid(results: Path) -> None:
     trials = [
         row
@@ -109,6 +110,7 @@ def test_replay_finds_no_difference(results: Path) -> None:
     assert {(one.differences, one.uncompared, one.recordings) for one in found} == {((), (), 4)}
 
 
+@pytest.mark.slow
 def test_the_report_is_written(results: Path, tmp_path: Path) -> None:
     assert report(results, tmp_path / "report")[0].name == "report.html"
 

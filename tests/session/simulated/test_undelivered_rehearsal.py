@@ -96,6 +96,7 @@ def answers(lines: list[dict[str, Any]]) -> list[tuple[int, Any]]:
     return [(line["trial"], line["items"][0]["value"]) for line in lines if line["event"] == "responses"]
 
 
+@pytest.mark.slow
 def test_clipped_intervals_are_invalid_and_their_trials_come_again_and_are_not_asked_about(session: Path) -> None:
     lines = lines_of(session)
     started, ended = by_trial(lines, "trial_started"), by_trial(lines, "trial_ended")
@@ -148,6 +149,7 @@ def test_a_delivered_value_that_is_not_the_recordings_is_found(session: Path) ->
     assert any("value_delivered differs" in one for one in replay(session).differences)
 
 
+@pytest.mark.slow
 def test_a_session_ended_between_two_attempts_goes_on_to_the_same_answers(session: Path, protocol: Path) -> None:
     whole = lines_of(session)
     invalid = [index for index, line in enumerate(whole) if line.get("outcome") == "invalid"]

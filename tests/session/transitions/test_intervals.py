@@ -189,6 +189,7 @@ def test_a_missed_criterion_goes_on_or_ends_the_session(missed: str, status: str
     assert finish is None or "training" in finish.reason
 
 
+@pytest.mark.slow
 def test_a_session_goes_on_at_any_line_as_one_that_was_not_interrupted() -> None:
     study = pairs.protocol()
     lines = [{"event": "session_started", "t_s": 0.0}, *pairs.whole(pairs.opened(study))]

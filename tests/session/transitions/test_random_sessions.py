@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -55,6 +56,7 @@ INCIDENTS = st.one_of(ANY_EVENT, st.sampled_from([event_of(Broke), event_of(EndA
 
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.one_of(st.none(), st.none(), ANY_EVENT), max_size=120), st.lists(INCIDENTS, max_size=5))
+@pytest.mark.slow
 def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events: list[Any], late: list[Any]) -> None:
     """None stands for going on as if nothing had happened."""
     state = small.opened()

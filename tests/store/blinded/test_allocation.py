@@ -112,6 +112,7 @@ for number in range(40):
 """
 
 
+@pytest.mark.slow
 def test_two_programs_at_once_never_share_an_entry(tmp_path: Path) -> None:
     open_or_draw_key(tmp_path, grouped())
     racers = [
@@ -144,6 +145,7 @@ begun(Path(sys.argv[1]), "P001")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is a signal of POSIX systems")
+@pytest.mark.slow
 def test_a_program_killed_between_claim_and_first_line_leaves_a_consistent_folder(tmp_path: Path) -> None:
     study = StudyFolder(tmp_path / "s")
     with begun(study.path, "P000"):

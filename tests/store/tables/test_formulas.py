@@ -8,6 +8,7 @@ from study_app.store.tables.formulas import guarded, unguarded
 
 
 @given(st.text(alphabet="'=+-@\t\r a1＝", max_size=6) | st.text())
+@pytest.mark.slow
 def test_every_text_reads_back_unchanged(text: str) -> None:
     assert unguarded(guarded(text)) == text
 

@@ -24,6 +24,7 @@ def test_a_rehearsed_session_is_reproduced(session) -> None:
     assert reproduced(session).differences == []
 
 
+@pytest.mark.slow
 def test_another_seed_in_the_receipt_is_seen(session) -> None:
     receipt = session / "receipt.json"
     kept = receipt.read_bytes()

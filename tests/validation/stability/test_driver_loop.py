@@ -40,6 +40,7 @@ def test_falcon_and_scripted_device_are_in_the_same_hand():
     assert np.abs(falcon.acting_n - scripted.acting_n)[held].max() < 0.25 * lengths_n.max()
 
 
+@pytest.mark.slow
 def test_force_acts_a_tick_after_it_is_sent():
     falcon, scripted = traces(dataclasses.replace(RELEASE, hand="middle"))
     for trace in (falcon, scripted):

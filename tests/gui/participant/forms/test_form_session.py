@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
@@ -48,6 +49,7 @@ class Session:
                 self.window.show_page(command.page)
 
 
+@pytest.mark.slow
 def test_session_with_forms_is_done_by_keys_alone(tmp_path: Path, qtbot: Any) -> None:
     study = load(mixed_file(tmp_path))
     window = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True)
