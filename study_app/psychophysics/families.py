@@ -1,0 +1,87 @@
+"""Psychometric functions: success over level, between guessing and lapsing.
+
+ψ(u) = γ + (1 − γ − λ) F(u), with the threshold α (F = ½), the width ω (F from 0.05 to 0.95), the guess rate γ and the
+lapse rate λ. The coordinate u of a level is log10 of it or the level itself, as the levels are spaced.
+"""
+
+from __future__ import annotations
+
+import math
+from statistics import NormalDist
+from typing import Final, Literal, TypeAlias, assert_never
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Family: TypeAlias = Literal["weibull", "normal", "logistic"]
+Floats: TypeAlias = NDArray[np.float64]
+
+KAPPA: Final = math.log10(math.log(20.0) / math.log(20.0 / 19.0))
+"""Width of a Weibull function of slope one: the distance in log10 from F = 0.05 to F = 0.95."""
+Z_95: Final = NormalDist().inv_cdf(0.95)
+LOGIT_95: Final = math.log(19.0)
+CLIP: Final = 1e-9
+"""ψ stays this far from 0 and 1, so that one answer cannot exclude a cell."""
+
+_erfc = np.vectorize(math.erfc, otypes=[float])
+
+
+def rise(family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike) -> Floats:
+    """Return F, the share of the way from the guess rate to one minus the lapse rate.
+
+    Parameters
+    ----------
+    family : {"weibull", "normal", "logistic"}
+        The shape.
+    u : array_like
+        Levels, in the coordinate of their spacing.
+    threshold : array_like
+        Where F is one half.
+    width : array_like
+        Distance from F = 0.05 to F = 0.95.
+
+    Returns
+    -------
+    ndarray
+        F, of the shape to which the arguments broadcast.
+    """
+    distance: Floats = (np.asarray(u, float) - threshold) / np.asarray(width, float)
+    match family:
+        case "weibull":
+            return np.negative(np.expm1(-math.log(2.0) * 10.0 ** np.minimum(KAPPA * distance, 300.0)))
+        case "normal":
+            return np.asarray(0.5 * _erfc(-math.sqrt(2.0) * Z_95 * distance), float)
+        case "logistic":
+            return np.asarray(1.0 / (1.0 + np.exp(np.minimum(-2.0 * LOGIT_95 * distance, 700.0))), float)
+    assert_never(family)
+
+
+def position(family: Family, share: float) -> float:
+    """Return how many widths above the threshold F reaches ``share``, which lies strictly between 0 and 1."""
+    match family:
+        case "weibull":
+            return math.log10(-math.log1p(-share) / math.log(2.0)) / KAPPA
+        case "normal":
+            return NormalDist().inv_cdf(share) / (2.0 * Z_95)
+        case "logistic":
+            return math.log(share / (1.0 - share)) / (2.0 * LOGIT_95)
+    assert_never(family)
+
+
+def success(
+    family: Family,
+    u: ArrayLike,
+    threshold: ArrayLike,
+    width: ArrayLike,
+    guess: ArrayLike,
+    lapse: ArrayLike,
+) -> Floats:
+    """Return ψ, the probability of success, of the shape to which the arguments broadcast."""
+    guess, lapse = np.asarray(guess, float), np.asarray(lapse, float)
+    return np.asarray(guess + (1.0 - guess - lapse) * rise(family, u, threshold, width), float)
+
+
+def level_at(family: Family, percent: float, threshold: float, width: float, guess: float, lapse: float) -> float:
+    """Return the level u at which ψ is so many percent; NaN where ψ never is."""
+    share = (percent / 100.0 - guess) / (1.0 - guess - lapse)
+    return threshold + width * position(family, share) if 0.0 < share < 1.0 else math.nan

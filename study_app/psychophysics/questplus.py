@@ -1,0 +1,86 @@
+"""QUEST+: the next level is the one after whose answer the least uncertainty is expected.
+
+Watson 2017 minimises the entropy of all parameters. Prins 2013 minimises that of the threshold's marginal alone, so
+that levels are not spent on the width or the lapse rate; that is the default here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Final, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from study_app.psychophysics.grid import Grid, Values, quantile
+
+Learn: TypeAlias = Literal["threshold", "all"]
+
+TIE_NATS: Final = 1e-9
+"""Expected entropies closer than this are equal: rounding on another processor shifts them by 1e-15."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """What QUEST+ chooses from.
+
+    Attributes
+    ----------
+    grid : Grid
+        The parameters, and their prior.
+    levels : tuple of float
+        The levels that may be presented, in the coordinate u, ascending.
+    learn : {"threshold", "all"}
+        Whose entropy is minimised.
+    """
+
+    grid: Grid
+    levels: Values
+    learn: Learn = "threshold"
+
+    @cached_property
+    def _psi(self) -> NDArray[np.float64]:
+        return self.grid.success(self.levels)
+
+    @cached_property
+    def _logarithms(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return np.log(self._psi), np.log1p(-self._psi)
+
+    def posterior(self, successes: ArrayLike, failures: ArrayLike) -> NDArray[np.float64]:
+        """Return the posterior of the grid's cells from counts per level, each of shape (levels,)."""
+        return self.grid.weighted(*self._logarithms, successes, failures)
+
+    def expected_entropy(self, posterior: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the entropy [nat] expected after an answer to each level, of shape (levels,)."""
+        if self.learn == "threshold":
+            succeeded = np.einsum("kabcd,abcd->ka", self._psi, posterior)
+            before = np.einsum("abcd->a", posterior)[None, :]
+        else:
+            before = posterior.reshape(1, -1)
+            succeeded = self._psi.reshape(len(self.levels), -1) * before
+        return _weighted_entropy(succeeded) + _weighted_entropy(before - succeeded)
+
+    def next(self, successes: ArrayLike, failures: ArrayLike) -> int:
+        """Return the index of the level to present next: of equal ones the lowest."""
+        entropy = self.expected_entropy(self.posterior(successes, failures))
+        return int(np.flatnonzero(entropy <= entropy.min() + TIE_NATS)[0])
+
+    def interval_width(self, successes: ArrayLike, failures: ArrayLike) -> float:
+        """Return the width of the threshold's equal-tailed 95 % interval, in the coordinate u."""
+        marginal = np.einsum("abcd->a", self.posterior(successes, failures))
+        ends = [quantile(self.grid.thresholds, marginal, share) for share in (0.025, 0.975)]
+        return ends[1] - ends[0]
+
+
+@lru_cache(maxsize=8)
+def search_of(grid: Grid, levels: Values, learn: Learn) -> Search:
+    """Return the search among levels; its tables are computed once and kept."""
+    return Search(grid, levels, learn)
+
+
+def _weighted_entropy(joint: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return p × the entropy of joint/p, for the sum p of each row of ``joint``."""
+    total = np.einsum("kc->k", joint)
+    kept = np.maximum(joint, 1e-300)
+    return np.asarray(total * np.log(total) - np.einsum("kc,kc->k", joint, np.log(kept)), float)
