@@ -1,1 +1,1 @@
-"""Psychophysics without a study: what was delivered to a hand. Numpy only."""
+"""Psychophysics without a study: delivered levels, psychometric functions, adaptive methods. Numpy only."""

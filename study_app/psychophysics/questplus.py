@@ -66,11 +66,11 @@ class Search:
         entropy = self.expected_entropy(self.posterior(successes, failures))
         return int(np.flatnonzero(entropy <= entropy.min() + TIE_NATS)[0])
 
-    def interval_width(self, successes: ArrayLike, failures: ArrayLike) -> float:
-        """Return the width of the threshold's equal-tailed 95 % interval, in the coordinate u."""
+    def interval(self, successes: ArrayLike, failures: ArrayLike) -> tuple[float, float]:
+        """Return the ends of the threshold's equal-tailed 95 % interval, in the coordinate u."""
         marginal = np.einsum("abcd->a", self.posterior(successes, failures))
-        ends = [quantile(self.grid.thresholds, marginal, share) for share in (0.025, 0.975)]
-        return ends[1] - ends[0]
+        low, high = (quantile(self.grid.thresholds, marginal, share) for share in (0.025, 0.975))
+        return low, high
 
 
 @lru_cache(maxsize=8)

@@ -129,6 +129,11 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
     """Check that every level of a block can be presented with each of its standards."""
     stimulus = protocol.stimuli[str(block.stimulus)]
     method = method_of(protocol, block)
+    place = ("methods", str(block.method))
+    faults = [Fault((*place, key), message, hint) for key, message, hint in method.faults(stimulus)]
+    if faults:
+        yield from faults
+        return
     least, most = stimulus.levels
     levels = sorted(method.asked(stimulus))
     if levels[0] < least * (1 - 1e-9) or levels[-1] > most * (1 + 1e-9):

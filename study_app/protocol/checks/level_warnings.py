@@ -10,7 +10,7 @@ from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.pace import ends, highest_damping
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.trials.tracks import design_of, tracks_of
+from study_app.protocol.trials.tracks import design_of, method_of, tracks_of
 
 UNPACED_MPS: Final = 0.3
 """A hand that is free moves as fast. [choice]"""
@@ -21,7 +21,12 @@ def level_warnings(protocol: Protocol) -> Iterator[str]:
     yielded: set[str] = set()
     for block in protocol.blocks_in_order:
         if block.design is not None:
-            for sentence in (*_unbalanced(protocol, block), *_seen(protocol, block), *_unpaced(protocol, block)):
+            for sentence in (
+                *_unbalanced(protocol, block),
+                *_converging(protocol, block),
+                *_seen(protocol, block),
+                *_unpaced(protocol, block),
+            ):
                 if sentence not in yielded:
                     yielded.add(sentence)
                     yield sentence
@@ -35,6 +40,13 @@ def _unbalanced(protocol: Protocol, block: Block) -> Iterator[str]:
         place = f"blocks.{block.id}.repetitions" if block.stimulus is None else f"methods.{block.method}"
         wanted = "an even number" if count == 2 else f"a multiple of {count}"
         yield f"{place}: {track.slots} trials cannot balance {count} arrangements: choose {wanted}"
+
+
+def _converging(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield what a block's method has to say of itself."""
+    if block.stimulus is not None:
+        for key, sentence in method_of(protocol, block).warnings():
+            yield f"methods.{block.method}.{key}: {sentence}"
 
 
 def _seen(protocol: Protocol, block: Block) -> Iterator[str]:

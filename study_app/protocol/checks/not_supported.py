@@ -13,9 +13,9 @@ KEYS: Final = (
     "blocks.*.catch",
     *(f"analysis.{name}" for name in ("participants", "precision", "published")),
 )
-METHODS: Final = ("questplus", "updown", "adjustment")
+METHODS: Final = ("adjustment",)
 DESIGNS: Final = ("adjustment",)
-CONSTANT: Final = 'method = "constant"'
+METHOD: Final = 'method = "questplus"'
 
 
 def not_supported(document: Mapping[str, Any]) -> Iterator[Fault]:
@@ -24,7 +24,7 @@ def not_supported(document: Mapping[str, Any]) -> Iterator[Fault]:
         for path, _ in entries(document, pattern):
             yield Fault(path, "is not supported yet", "omit it")
     for section, key, kinds in (("methods", "method", METHODS), ("designs", "design", DESIGNS)):
-        hint = CONSTANT if section == "methods" else "another design"
+        hint = METHOD if section == "methods" else "another design"
         tables = document.get(section, {})
         for path, kind in entries(document, f"{section}.*.kind"):
             if kind in kinds:

@@ -16,7 +16,7 @@ from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.protocol.streams import shuffle
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.keyed import Key, keyed_stream
-from study_app.protocol.trials.method import Heard
+from study_app.protocol.trials.method import Heard, TrackSetting
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tracks import (
     Track,
@@ -93,7 +93,8 @@ def next_level(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, h
     if slot in noise:
         return due_of(protocol, block, track, STANDARD_ALONE, 0.0)
     number = slot - sum(one < slot for one in noise)
-    level = draws.level(protocol, block, number, [one for one in earlier if one.code == trial.code])
+    answered = sorted((one for one in earlier if one.code == trial.code), key=lambda one: one.trial)
+    level = draws.level(protocol, block, track, number, answered)
     arrangement = 0 if noise else draws.arrangement(design, slot)
     return None if level is None else due_of(protocol, block, track, arrangement, level)
 
@@ -126,11 +127,14 @@ class _Draws:
         order = shuffle(range(slots), keyed_stream(self.secret, f"noise/{self.track}").random)
         return tuple(sorted(order[:count]))
 
-    def level(self, protocol: Protocol, block: Block, number: int, heard: Sequence[Heard]) -> float | None:
+    def level(
+        self, protocol: Protocol, block: Block, track: Track, number: int, heard: Sequence[Heard]
+    ) -> float | None:
         """Return the level of a track's comparison ``number``."""
         method, stimulus = method_of(protocol, block), stimulus_of(protocol, block)
         names = (f"round/{self.track}/{turn}" for turn in range(method.rounds(stimulus)))
-        return method.level(stimulus, number, heard, [keyed_stream(self.secret, name).random for name in names])
+        setting = TrackSetting(stimulus, design_of(protocol, block), track.number)
+        return method.level(setting, number, heard, [keyed_stream(self.secret, name).random for name in names])
 
 
 def due_of(

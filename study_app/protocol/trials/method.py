@@ -3,17 +3,37 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
 from study_app.protocol.streams import Draw
 from study_app.protocol.table import Table
+from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.stimuli import Stimulus
 
 TrackOrder: TypeAlias = Literal["interleaved", "blocked"]
+
+
+@dataclass(frozen=True, slots=True)
+class TrackSetting:
+    """What a method chooses levels for.
+
+    Attributes
+    ----------
+    stimulus : Stimulus
+        What is varied.
+    design : Design
+        How a trial is built.
+    number : int
+        Which of the tracks of its standard, from 1.
+    """
+
+    stimulus: Stimulus
+    design: Design
+    number: int
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -56,6 +76,8 @@ class Method(Table):
         description="Whether the tracks alternate in random order, or one follows another.",
     )
 
+    tracks: Annotated[int, Field(ge=1, le=4)] = Field(default=1, description="How many tracks each standard has.")
+
     adaptive: ClassVar[bool] = True
     """Whether answers choose the next level."""
 
@@ -66,24 +88,24 @@ class Method(Table):
 
     @abstractmethod
     def presentations(self, stimulus: Stimulus) -> int:
-        """Return how many comparisons one track presents."""
+        """Return how many comparisons one track presents at most."""
 
     @abstractmethod
     def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
-        """Return the levels among which it chooses."""
+        """Return levels that include the smallest and the largest that it can present."""
 
     @abstractmethod
-    def level(self, stimulus: Stimulus, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float | None:
+    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float | None:
         """Return the level of a track's comparison ``number`` (from 0).
 
         Parameters
         ----------
-        stimulus : Stimulus
-            What is varied.
+        track : TrackSetting
+            What is varied, and how it is asked.
         number : int
             Which comparison of the track.
         heard : sequence of Heard
-            The track's earlier answers, in any order.
+            The track's earlier answers, in the order of presentation.
         draws : sequence of callable
             Secret uniform numbers in [0, 1), one source per round of levels.
 
@@ -92,6 +114,18 @@ class Method(Table):
         float or None
             The level; None where the track has ended.
         """
+
+    def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
+        """Yield what is wrong with it for a stimulus: the key, a message and a hint."""
+        return iter(())
+
+    def warnings(self) -> Iterator[tuple[str, str]]:
+        """Yield what is permitted and may still be a mistake: the key and a sentence."""
+        return iter(())
+
+    def target(self, design: Design) -> str | None:
+        """Return in words which share of successes its levels aim at; None: at none."""
+        return None
 
     def rounds(self, stimulus: Stimulus) -> int:
         """Return how many rounds of drawn levels a track has."""

@@ -70,6 +70,19 @@ class Stimulus(Table):
         distance = standard * level if self.level_kind == "weber" else level
         return standard + distance if self.direction == "up" else standard - distance
 
+    def coordinate(self, level: float) -> float:
+        """Return u of a level: log10 of it, or the level itself, as levels are spaced."""
+        return math.log10(level) if self.spacing == "log" else level
+
+    def level_of(self, u: float) -> float:
+        """Return the level at u."""
+        return 10.0**u if self.spacing == "log" else u
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """The smallest and the largest level, in u."""
+        return self.coordinate(self.levels[0]), self.coordinate(self.levels[1])
+
     def spaced(self, count: int) -> tuple[float, ...]:
         """Return ``count`` levels, evenly spaced over the range, smallest first."""
         low, high = self.levels

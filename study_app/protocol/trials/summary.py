@@ -39,7 +39,13 @@ def design_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
     name = LEVELS[stimulus.level_kind]
     of_each = " per standard" if standards else ""
     slots = [track.slots for track in tracks_of(protocol, block)]
-    yield "Levels", f"{name} {levels[0]:.3g} to {levels[-1]:.3g} ({method.name}), {slots[0]} trials{of_each}"
+    aimed = "" if (target := method.target(design)) is None else f": {target}"
+    trials = slots[0] * method.tracks
+    tracks = "" if method.tracks == 1 else f" in {method.tracks} tracks"
+    yield (
+        "Levels",
+        f"{name} {levels[0]:.3g} to {levels[-1]:.3g} ({method.name}{aimed}), {trials} trials{of_each}{tracks}",
+    )
     pairs = product(standards_of(protocol, block), levels)
     compared = [stimulus.comparison(standard, level) for standard, level in pairs]
     yield "Comparisons", f"{stimulus.vary} from {min(compared):.4g} to {max(compared):.4g} {stimulus.unit}".rstrip()

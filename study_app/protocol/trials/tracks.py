@@ -27,12 +27,15 @@ class Track:
         The condition that is compared with the block's standard; None where a number is varied.
     slots : int
         How many trials it has at most.
+    number : int
+        Which of the tracks of its standard, from 1.
     """
 
     name: str
     standard: float | None
     comparison: str | None
     slots: int
+    number: int = 1
 
 
 def tracks_of(protocol: Protocol, block: Block) -> tuple[Track, ...]:
@@ -45,8 +48,9 @@ def tracks_of(protocol: Protocol, block: Block) -> tuple[Track, ...]:
     comparisons = method.presentations(stimulus)
     slots = comparisons + design.noise(comparisons) + (design.first is not None)
     return tuple(
-        Track(f"{'' if standard is None else f'{standard:.17g}'}/1", standard, None, slots)
+        Track(f"{'' if standard is None else f'{standard:.17g}'}/{number}", standard, None, slots, number)
         for standard in standards_of(protocol, block)
+        for number in range(1, method.tracks + 1)
     )
 
 

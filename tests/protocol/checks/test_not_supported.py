@@ -24,8 +24,7 @@ STIMULUS = 'stimulus = "viscosity"'
             )
             for name in METHODS
         ),
-        ('method = "few"', 'method = "updown"', "blocks.viscosity.method"),
-        ('method = "few"\n', "", "blocks.viscosity.method"),
+        ('method = "few"', 'method = "adjustment"', "blocks.viscosity.method"),
         ('design = "2ifc"', 'design = "adjustment"', "blocks.viscosity.design"),
     ],
 )

@@ -18,7 +18,7 @@ def test_every_kind_of_the_folder_is_known():
     assert set(DESIGN_KINDS) == {
         "2ifc", "3ifc", "4ifc", "abx", "oddity", "samedifferent", "yesno", "rating", "estimation",
     }  # fmt: skip
-    assert set(METHOD_KINDS) == {"constant"}
+    assert set(METHOD_KINDS) == {"constant", "questplus", "updown"}
 
 
 @pytest.mark.parametrize(

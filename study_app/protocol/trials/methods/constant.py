@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from study_app.protocol.streams import Draw, shuffle
-from study_app.protocol.trials.method import Heard, Method
+from study_app.protocol.trials.method import Heard, Method, TrackSetting
 from study_app.protocol.trials.stimuli import CONSTANT_LEVELS, LEVELS_MOST, Stimulus
 
 Count = Annotated[int, Field(ge=1, le=LEVELS_MOST)]
@@ -39,7 +39,7 @@ class Constant(Method):
         """Return the repetitions."""
         return self.repetitions
 
-    def level(self, stimulus: Stimulus, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
+    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
         """Return the level of comparison ``number``: answers change nothing."""
-        levels = self.asked(stimulus)
+        levels = self.asked(track.stimulus)
         return shuffle(levels, draws[number // len(levels)])[number % len(levels)]

@@ -1,0 +1,94 @@
+"""Weighted up–down: the level falls after successes in a row and rises after each failure (García-Pérez 1998)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from study_app.protocol.table import Table
+from study_app.protocol.trials.adaptive import Adaptive
+from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.method import Heard, TrackSetting
+from study_app.protocol.trials.stimuli import Stimulus
+from study_app.psychophysics.updown import RATIOS, Staircase, converges_to
+
+
+class Reversals(Table):
+    """When a track ends early: after so many changes of direction."""
+
+    reversals: Annotated[int, Field(ge=1)] = Field(description="How many reversals, at least.")
+    after: Annotated[int, Field(ge=1)] = Field(default=1, description="After how many answers at the earliest.")
+
+
+class UpDown(Adaptive):
+    """A step down after successes in a row, a step up after each failure."""
+
+    kind: Literal["updown"] = "updown"
+    rule: Literal["1down1up", "2down1up", "3down1up", "4down1up"] = Field(
+        default="2down1up", description="How many successes in a row a step down takes."
+    )
+    step_up: Annotated[float, Field(gt=0)] | None = Field(
+        default=None,
+        description="Step after a failure: a factor on log spacing, else a difference; default: a tenth of the span.",
+    )
+    ratio: Annotated[float, Field(gt=0, le=10)] | None = Field(
+        default=None, description="Step down over step up; default: that of García-Pérez for the rule."
+    )
+    average: Annotated[int, Field(ge=2, le=100)] = Field(
+        default=8, description="How many of the last reversals are averaged at most."
+    )
+    stop: Reversals | None = Field(default=None, description="When a track ends early; left out: never.")
+
+    def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
+        """Yield what is wrong with its keys, too."""
+        yield from super().faults(stimulus)
+        if stimulus.spacing == "log" and self.step_up is not None and self.step_up <= 1:
+            yield "step_up", f"is {self.step_up:g}; on log spacing a step is a factor above 1", "such as 1.4"
+
+    def warnings(self) -> Iterator[tuple[str, str]]:
+        """Yield that a ratio converges for small steps alone, and that one track can be predicted."""
+        if self.ratio is not None and self.ratio != self._published_ratio:
+            reached, published = (
+                100 * converges_to(int(self.rule[0]), ratio) for ratio in (self.ratio, self._published_ratio)
+            )
+            yield (
+                "ratio",
+                f"{self.rule} with ratio {self.ratio:g} converges to {reached:.1f} % for small steps alone: "
+                f"omit ratio: {published:.1f} % for any step",
+            )
+        if self.tracks == 1:
+            yield "tracks", "participants can predict a single up–down track: choose tracks = 2"
+
+    def target(self, design: Design) -> str | None:
+        """Return the percentage to which it converges."""
+        ratio = self._published_ratio if self.ratio is None else self.ratio
+        return f"converges to {100 * converges_to(int(self.rule[0]), ratio):.1f} % {design.success_name}"
+
+    @property
+    def _published_ratio(self) -> float:
+        return RATIOS[int(self.rule[0])]
+
+    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float | None:
+        """Return the level after these answers: a step from the last one, or that one again."""
+        stimulus, staircase = track.stimulus, self.staircase(track.stimulus, track.number)
+        answers = [(stimulus.coordinate(one.level), bool(one.success)) for one in heard]
+        stop = self.stop
+        if stop and len(answers) >= stop.after and len(staircase.reversals(answers)) >= stop.reversals:
+            return None
+        low, high = stimulus.levels
+        return min(max(stimulus.level_of(staircase.next(answers)), low), high)
+
+    def staircase(self, stimulus: Stimulus, track: int) -> Staircase:
+        """Return the rule for a stimulus, in the coordinate u; ``track`` counts from 1."""
+        low, high = stimulus.domain
+        first = self.first(track)
+        return Staircase(
+            down_after=int(self.rule[0]),
+            step_up=(high - low) / 10 if self.step_up is None else stimulus.coordinate(self.step_up),
+            ratio=self._published_ratio if self.ratio is None else self.ratio,
+            low=low,
+            high=high,
+            begin=high if first is None else stimulus.coordinate(first),
+        )

@@ -1,0 +1,89 @@
+"""The psychometric function of a block: its family, its guess rate, and the grid over which its parameters are known.
+
+The prior is flat in the threshold, log-normal in the width and listed for the lapse rate.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
+
+from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.stimuli import Stimulus
+
+if TYPE_CHECKING:
+    from study_app.psychophysics.grid import Grid
+
+Family: TypeAlias = Literal["weibull", "normal", "logistic"]
+
+RUNNING_THRESHOLDS: Final = 41
+RUNNING_WIDTHS: Final = 9
+WIDTHS: Final = (0.5, 4.0)
+"""The smallest and the largest width, in decades."""
+LINEAR_OBSERVER: Final = (1.4, 1.5)
+"""Median and factor of the widths [decades] of observers whose d′ is proportional to the level."""
+LAPSES: Final = (0.0, 0.02, 0.04)
+LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
+
+
+def is_distance(stimulus: Stimulus) -> bool:
+    """Return whether a level is a distance from a standard."""
+    return stimulus.level_kind != "value"
+
+
+def family_of(stimulus: Stimulus, design: Design) -> Family:
+    """Return the default family: Weibull where a distance of zero must mean chance, else normal."""
+    by_chance = is_distance(stimulus) and stimulus.spacing == "log" and design.guess_rate is not None
+    return "weibull" if by_chance else "normal"
+
+
+def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:
+    """Return the guess rates of a design; None where no answer is correct: the guess rate is the lapse rate."""
+    from study_app.psychophysics.grid import FREE_GUESSES  # noqa: PLC0415 - loads numpy, where levels are chosen
+
+    if design.has_standard and not is_distance(stimulus):
+        return None
+    return FREE_GUESSES if design.guess_rate is None else (design.guess_rate,)
+
+
+def widths_of(stimulus: Stimulus) -> tuple[float, float]:
+    """Return the smallest and the largest width, in u."""
+    if stimulus.spacing == "log":
+        return WIDTHS
+    span = stimulus.domain[1] - stimulus.domain[0]
+    return span / 8, 2 * span
+
+
+def width_prior_of(stimulus: Stimulus) -> tuple[float, float]:
+    """Return median and factor of the prior on the width, in u."""
+    if stimulus.spacing == "log" and is_distance(stimulus):
+        return LINEAR_OBSERVER
+    return (stimulus.domain[1] - stimulus.domain[0]) / 2, 2.0
+
+
+def running_grid(
+    stimulus: Stimulus,
+    design: Design,
+    family: Family,
+    widths: tuple[float, float],
+    width_prior: tuple[float, float] | None,
+    lapses: tuple[float, ...],
+) -> Grid:
+    """Return the grid over which levels are chosen during a session."""
+    from study_app.psychophysics.grid import Grid, evenly, geometric  # noqa: PLC0415 - loads numpy
+
+    return Grid(
+        family=family,
+        thresholds=evenly(*stimulus.domain, RUNNING_THRESHOLDS),
+        widths=geometric(*widths, RUNNING_WIDTHS),
+        width_prior=width_prior,
+        lapses=lapses,
+        lapse_prior=LAPSE_PRIOR if lapses == LAPSES else (1.0 / len(lapses),) * len(lapses),
+        guesses=guesses_of(stimulus, design),
+    )
+
+
+def ratio_in_u(stimulus: Stimulus, low: float, high: float) -> float:
+    """Return the ratio of two levels that are given in u; infinite where the lower is not above zero."""
+    least = stimulus.level_of(low)
+    return stimulus.level_of(high) / least if least > 0 else math.inf

@@ -1,0 +1,201 @@
+"""Adaptive methods in a study: the next level is a pure function of the answers, in any order, at presented levels."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+import pytest
+
+from study_app.errors import ProtocolError
+from study_app.protocol.checks.level_warnings import level_warnings
+from study_app.protocol.describe import describe
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.trials.due import next_level
+from study_app.protocol.trials.method import Heard
+from study_app.protocol.trials.tracks import tracks_of
+from tests.protocol.trials.studies import answered, key_of, study
+
+CONSTANT = 'kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 8'
+ONE_STANDARD = ("standards = [1, 2]\n", "standards = [2]\n")
+
+
+def adaptive(method: str, *edits: tuple[str, str]) -> Protocol:
+    return study((CONSTANT, method), *edits)
+
+
+def answers_of(protocol: Protocol, threshold: float, seed: int = 1) -> list[Heard]:
+    """Return the answers of one session of an observer who is right above the threshold, and half of the time below."""
+    key, schedule = key_of(protocol), build_schedule(protocol, "P001", seed)
+    draw, heard = np.random.default_rng(seed), []
+    for trial in schedule.trials:
+        due = next_level(protocol, key, schedule, trial, heard)
+        if due is not None:
+            assert due.level is not None
+            right = draw.random() < (0.98 if due.level > threshold else 0.5)
+            heard.append(Heard(trial.number, trial.code, due.level, right, right))
+    return heard
+
+
+@pytest.mark.parametrize("kind", ["questplus", "updown"])
+def test_levels_move_towards_the_threshold(kind: str) -> None:
+    protocol = adaptive(f'kind = "{kind}"\ntrials = 40', ONE_STANDARD)
+    heard = answers_of(protocol, threshold=0.4)
+    assert len(heard) == 40
+    late = [one.level for one in heard[20:]]
+    assert 0.25 <= float(np.median(late)) <= 0.65
+    assert all(0.1 <= one.level <= 0.8 for one in heard)
+
+
+def test_each_standard_has_its_tracks_and_the_trials_are_divided_among_them() -> None:
+    protocol = adaptive('kind = "updown"\ntrials = 24\ntracks = 2\nbegin = [0.8, 0.2]')
+    block = protocol.blocks["viscosity"]
+    tracks = tracks_of(protocol, block)
+    assert [(one.name, one.standard, one.number, one.slots) for one in tracks] == [
+        ("1/1", 1.0, 1, 12),
+        ("1/2", 1.0, 2, 12),
+        ("2/1", 2.0, 1, 12),
+        ("2/2", 2.0, 2, 12),
+    ]
+    key = key_of(protocol)
+    first: dict[str, float] = {}
+    for due, one in answered(protocol, key, build_schedule(protocol, "P001", 1)):
+        assert due.level is not None
+        first.setdefault(key.codes["viscosity"][one.code], due.level)
+    assert first == pytest.approx({"1/1": 0.8, "1/2": 0.2, "2/1": 0.8, "2/2": 0.2})
+
+
+def test_questplus_begins_at_the_nearest_level_of_the_grid() -> None:
+    protocol = adaptive('kind = "questplus"\ntrials = 4\nbegin = 0.41', ONE_STANDARD)
+    grid = protocol.stimuli["viscosity"].grid
+    assert answers_of(protocol, 0.4)[0].level == min(grid, key=lambda one: abs(math.log(one / 0.41)))
+
+
+@pytest.mark.parametrize("kind", ["questplus", "updown"])
+def test_the_next_level_depends_on_the_levels_presented_and_not_on_how_answers_are_listed(kind: str) -> None:
+    protocol = adaptive(f'kind = "{kind}"\ntrials = 20', ONE_STANDARD)
+    key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
+    heard = answers_of(protocol, 0.4)
+    for number in (5, 12, 19):
+        earlier = heard[:number]
+        due = next_level(protocol, key, schedule, schedule.trials[number], heard[::-1])
+        again = next_level(protocol, key, schedule, schedule.trials[number], earlier)
+        assert due is not None
+        assert due == again
+        assert due.level == heard[number].level
+    # Answers at another level than would be chosen count at that level.
+    other = [Heard(one.trial, one.code, 0.8, True, True) for one in heard[:10]]
+    moved = next_level(protocol, key, schedule, schedule.trials[10], other)
+    assert moved is not None
+    assert moved.level != heard[10].level
+
+
+def test_a_track_ends_once_its_interval_is_narrow() -> None:
+    whole = answers_of(adaptive('kind = "questplus"\ntrials = 200', ONE_STANDARD), 0.4)
+    ended = answers_of(
+        adaptive('kind = "questplus"\ntrials = 200\nstop = { ratio = 2, after = 20 }', ONE_STANDARD), 0.4
+    )
+    assert 20 <= len(ended) < len(whole)
+    assert ended == whole[: len(ended)]
+
+
+def test_a_staircase_ends_after_so_many_reversals() -> None:
+    ended = answers_of(adaptive('kind = "updown"\ntrials = 200\nstop = { reversals = 6 }', ONE_STANDARD), 0.4)
+    assert 8 <= len(ended) < 120
+
+
+@pytest.mark.parametrize(
+    ("method", "edits", "place", "message", "hint"),
+    [
+        (
+            'kind = "updown"\nbegin = [0.2, 0.3, 0.4]\ntracks = 2',
+            (),
+            "methods.few.begin",
+            "3 levels for 2 tracks",
+            "one for each track, 0.1 to 0.8",
+        ),
+        (
+            'kind = "questplus"\nbegin = 0.9',
+            (),
+            "methods.few.begin",
+            "0.9 is not within levels",
+            "one for each track, 0.1 to 0.8",
+        ),
+        (
+            'kind = "updown"\nstep_up = 0.9',
+            (),
+            "methods.few.step_up",
+            "is 0.9; on log spacing a step is a factor above 1",
+            "such as 1.4",
+        ),
+        (
+            'kind = "questplus"\ntrials = 61\ntracks = 2',
+            (),
+            "methods.few.trials",
+            "61 trials cannot be divided among 2 tracks",
+            "a multiple of 2",
+        ),
+        (
+            'kind = "questplus"\nwidths = [4, 0.5]',
+            (),
+            "methods.few.widths",
+            "4 and 0.5: the first width must be the smaller",
+            "",
+        ),
+        (
+            'kind = "questplus"\nfamily = "weibull"',
+            (("levels = [0.1, 0.8]", 'levels = [0.1, 0.8]\nspacing = "linear"'),),
+            "methods.few.family",
+            '"weibull" is a function of the logarithm of a level',
+            'spacing = "log", or "normal"',
+        ),
+        (
+            'kind = "questplus"',
+            (('design = "2ifc"', 'design = "samedifferent"'),),
+            "blocks.viscosity.method",
+            '"samedifferent" has no track: correct answers determine no level',
+            'method = "constant"',
+        ),
+    ],
+)
+def test_each_mistake_in_a_method_is_one_fault(
+    method: str, edits: tuple[tuple[str, str], ...], place: str, message: str, hint: str
+) -> None:
+    with pytest.raises(ProtocolError) as refused:
+        adaptive(method, *edits)
+    (problem,) = refused.value.problems
+    assert (problem.place, problem.message, problem.hint) == (place, message, hint)
+    assert problem.line is not None
+
+
+def test_check_warns_of_a_ratio_that_converges_for_small_steps_alone_and_of_a_single_track() -> None:
+    found = list(level_warnings(adaptive('kind = "updown"\nratio = 1')))
+    assert (
+        "methods.few.ratio: 2down1up with ratio 1 converges to 70.7 % for small steps alone: "
+        "omit ratio: 80.4 % for any step" in found
+    )
+    assert "methods.few.tracks: participants can predict a single up–down track: choose tracks = 2" in found
+    assert not [one for one in level_warnings(adaptive('kind = "updown"\ntracks = 2')) if "methods." in one]
+
+
+def test_check_says_at_what_percentage_a_method_aims() -> None:
+    assert "(updown: converges to 80.4 % correct), 120 trials" not in describe(adaptive('kind = "updown"'))
+    assert "(updown: converges to 80.4 % correct), 60 trials per standard" in describe(adaptive('kind = "updown"'))
+    shown = describe(adaptive('kind = "questplus"\ntracks = 2'))
+    assert "(questplus: threshold at 75 % correct), 60 trials per standard in 2 tracks" in shown
+
+
+@pytest.mark.slow
+def test_choosing_a_level_takes_at_most_two_milliseconds() -> None:
+    """Processor time at the 99th percentile, whatever the number of answers; the tables are made before."""
+    protocol = adaptive('kind = "questplus"\ntrials = 200', ONE_STANDARD)
+    key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
+    heard = answers_of(protocol, 0.4)
+    taken = []
+    for trial in schedule.trials * 3:
+        began = time.thread_time_ns()
+        next_level(protocol, key, schedule, trial, heard)
+        taken.append(time.thread_time_ns() - began)
+    assert np.percentile(taken, 99) <= 2e6
