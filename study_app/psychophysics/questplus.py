@@ -33,11 +33,14 @@ class Search:
         The levels that may be presented, in the coordinate u, ascending.
     learn : {"threshold", "all"}
         Whose entropy is minimised.
+    noise : bool
+        Whether the first of the levels is that of noise trials, which is never chosen.
     """
 
     grid: Grid
     levels: Values
     learn: Learn = "threshold"
+    noise: bool = False
 
     @cached_property
     def _psi(self) -> NDArray[np.float64]:
@@ -63,8 +66,9 @@ class Search:
 
     def next(self, successes: ArrayLike, failures: ArrayLike) -> int:
         """Return the index of the level to present next: of equal ones the lowest."""
-        entropy = self.expected_entropy(self.posterior(successes, failures))
-        return int(np.flatnonzero(entropy <= entropy.min() + TIE_NATS)[0])
+        first = int(self.noise)
+        entropy = self.expected_entropy(self.posterior(successes, failures))[first:]
+        return first + int(np.flatnonzero(entropy <= entropy.min() + TIE_NATS)[0])
 
     def interval(self, successes: ArrayLike, failures: ArrayLike) -> tuple[float, float]:
         """Return the ends of the threshold's equal-tailed 95 % interval, in the coordinate u."""
@@ -74,9 +78,9 @@ class Search:
 
 
 @lru_cache(maxsize=8)
-def search_of(grid: Grid, levels: Values, learn: Learn) -> Search:
+def search_of(grid: Grid, levels: Values, learn: Learn, noise: bool = False) -> Search:
     """Return the search among levels; its tables are computed once and kept."""
-    return Search(grid, levels, learn)
+    return Search(grid, levels, learn, noise)
 
 
 def _weighted_entropy(joint: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -70,9 +70,18 @@ class Stimulus(Table):
         distance = standard * level if self.level_kind == "weber" else level
         return standard + distance if self.direction == "up" else standard - distance
 
+    def level_between(self, standard: float | None, comparison: float) -> float:
+        """Return the level at which a comparison lies; `comparison` inverted."""
+        if standard is None or self.level_kind == "value":
+            return comparison
+        distance = comparison - standard if self.direction == "up" else standard - comparison
+        return distance / standard if self.level_kind == "weber" else distance
+
     def coordinate(self, level: float) -> float:
-        """Return u of a level: log10 of it, or the level itself, as levels are spaced."""
-        return math.log10(level) if self.spacing == "log" else level
+        """Return u of a level: log10 of it (−∞ of 0), or the level itself, as levels are spaced."""
+        if self.spacing == "linear":
+            return level
+        return math.log10(level) if level > 0 else -math.inf
 
     def level_of(self, u: float) -> float:
         """Return the level at u."""

@@ -199,3 +199,17 @@ def test_choosing_a_level_takes_at_most_two_milliseconds() -> None:
         next_level(protocol, key, schedule, trial, heard)
         taken.append(time.thread_time_ns() - began)
     assert np.percentile(taken, 99) <= 2e6
+
+
+@pytest.mark.parametrize("kind", ["questplus", "updown"])
+def test_noise_trials_of_yes_no_have_no_level_of_their_own(kind: str) -> None:
+    protocol = adaptive(
+        f'kind = "{kind}"\ntrials = 40\nbegin = 0.4', ONE_STANDARD, ('design = "2ifc"', 'design = "yesno"')
+    )
+    heard = answers_of(protocol, 0.4)
+    noise = [one for one in heard if one.level == 0]
+    assert 10 <= len(noise) <= 20
+    comparisons = [one.level for one in heard if one.level > 0]
+    assert len(comparisons) == 40
+    assert comparisons[0] == pytest.approx(0.4, rel=0.05)
+    assert min(comparisons) >= 0.1

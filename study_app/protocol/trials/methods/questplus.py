@@ -73,9 +73,11 @@ class QuestPlus(Adaptive):
         from study_app.psychophysics.questplus import search_of  # noqa: PLC0415 - loads numpy
 
         stimulus = track.stimulus
-        levels = stimulus.grid
+        noise = track.design.noise(1000) > 0
+        levels = (0.0, *stimulus.grid) if noise else stimulus.grid
         coordinates = tuple(stimulus.coordinate(level) for level in levels)
-        if not heard and (first := self.first(track.number)) is not None:
+        presented = [one for one in heard if not noise or one.level > 0]
+        if not presented and (first := self.first(track.number)) is not None:
             return levels[_nearest(coordinates, stimulus.coordinate(first))]
         grid = running_grid(
             stimulus,
@@ -85,11 +87,12 @@ class QuestPlus(Adaptive):
             self.width_prior or width_prior_of(stimulus),
             self.lapses,
         )
-        search = search_of(grid, coordinates, self.learn)
+        search = search_of(grid, coordinates, self.learn, noise)
         counts = ([0] * len(levels), [0] * len(levels))
         for one in heard:
-            counts[0 if one.success else 1][_nearest(coordinates, stimulus.coordinate(one.level))] += 1
-        if self.stop is not None and len(heard) >= self.stop.after:
+            at = 0 if noise and one.level == 0 else _nearest(coordinates, stimulus.coordinate(one.level))
+            counts[0 if one.success else 1][at] += 1
+        if self.stop is not None and len(presented) >= self.stop.after:
             low, high = search.interval(*counts)
             if ratio_in_u(stimulus, low, high) <= self.stop.ratio:
                 return None

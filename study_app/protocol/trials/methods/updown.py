@@ -73,7 +73,7 @@ class UpDown(Adaptive):
     def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float | None:
         """Return the level after these answers: a step from the last one, or that one again."""
         stimulus, staircase = track.stimulus, self.staircase(track.stimulus, track.number)
-        answers = [(stimulus.coordinate(one.level), bool(one.success)) for one in heard]
+        answers = [(stimulus.coordinate(one.level), bool(one.success)) for one in heard if one.level > 0]
         stop = self.stop
         if stop and len(answers) >= stop.after and len(staircase.reversals(answers)) >= stop.reversals:
             return None
