@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
+from study_app.analysis.designs.thresholds import family, thresholds
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound, Summary
 from study_app.analysis.results.question_answers import GroupAnswers
 from study_app.analysis.statistics.outcome import Array, clopper_pearson
@@ -58,6 +59,8 @@ def _block(
         guess_rate=block.design.guess_rate if block.has_correct_answer else None,
         bounds=bounds,
         answers=() if opened is None else tuple(_answers(block, opened, bounds)),
+        thresholds=() if opened is None else tuple(thresholds(block, opened)),
+        family=family(block),
     )
 
 

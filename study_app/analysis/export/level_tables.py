@@ -29,6 +29,13 @@ TRACKS: Final = (
     _BY_NAME["standard"],
     replace(_BY_NAME["level"], name="level_asked"),
     Column(
+        "level_delivered",
+        "number",
+        "The level at which the hand met the comparison: from the delivered values, and for a delay from the mean "
+        "errors of the frames; n/a where it was not measured.",
+        may_miss=True,
+    ),
+    Column(
         "comparison",
         "number",
         "The comparison at this level, in the unit of the varied number; n/a where conditions are compared.",

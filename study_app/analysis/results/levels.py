@@ -33,13 +33,37 @@ class LevelAnswers:
 
 
 @dataclass(frozen=True, slots=True)
+class ThresholdFound:
+    """A participant's threshold at one standard or, where ``participant`` is None, the group's.
+
+    ``threshold`` with the ends of its 95 % interval and ``flat_width`` (the threshold under a flat prior on the width)
+    are levels. ``width`` reaches from 5 to 95 % of the function's rise, in decades on log spacing.
+    ``beyond`` says that the threshold lies above or below the levels presented; ``reversal_mean`` is the up–down
+    track's classical estimate. Of the group only ``n`` (participants), threshold and interval are known.
+    """
+
+    participant: str | None
+    standard: float | None
+    n: int
+    threshold: float
+    low: float | None
+    high: float | None
+    width: float | None = None
+    lapse: float | None = None
+    guess: float | None = None
+    flat_width: float | None = None
+    beyond: str | None = None
+    reversal_mean: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class LevelsFound:
     """A block of levels.
 
     ``summary`` says how the answers at a level are summarised, ``counts`` what a share is of ("correct"); ``vary`` is
     the varied number, ``level_kind`` what a level is (weber, difference, value), both None where conditions are
-    compared; ``guess_rate`` is the share at chance, ``bounds`` are the ends of a scale. Without the key only ``times``
-    are known.
+    compared; ``family`` is the psychometric function of the thresholds; ``guess_rate`` is the share at chance,
+    ``bounds`` are the ends of a scale. Without the key only ``times`` are known.
     """
 
     block: str
@@ -55,6 +79,8 @@ class LevelsFound:
     guess_rate: float | None = None
     bounds: tuple[float, float] | None = None
     answers: tuple[LevelAnswers, ...] = ()
+    thresholds: tuple[ThresholdFound, ...] = ()
+    family: str | None = None
 
     @property
     def of_group(self) -> tuple[LevelAnswers, ...]:

@@ -10,10 +10,13 @@ import pandas as pd
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study import Study
 from study_app.protocol.trials.presentation import arrangement_of
+from study_app.protocol.trials.stimuli import DELAY, Stimulus
 
 PRESENTATION: Final = ["participant", "session", "trial", "attempt"]
 OF_INTERVALS: Final = ("force_mean_n", "mean_speed_mps")
 """What a trial's row repeats of each of its intervals."""
+_DELIVERED: Final = tuple(f"{what}_{letter}" for what in ("value", "delay_error_ms") for letter in "CS")
+"""Means over the intervals of a trial that presented the comparison, and over those that presented the standard."""
 _TYPES: Final = {
     "track": "string",
     "comparison": "Float64",
@@ -21,9 +24,10 @@ _TYPES: Final = {
     "right": "boolean",
     "success": "boolean",
     "analysed": "boolean",
+    "level_delivered": "Float64",
 }
 """What follows from a trial's arrangement, level and answer."""
-_READ: Final = ("block", "code", "index", "counted", "arrangement", "standard", "level", "response")
+_READ: Final = ("block", "code", "index", "counted", "arrangement", "standard", "level", "response", *_DELIVERED)
 
 
 def answers_timed(study: Study) -> pd.DataFrame:
@@ -49,6 +53,7 @@ def tracks(study: Study) -> pd.DataFrame:
     found = found.merge(answers, on=PRESENTATION, how="left")
     found["slot"] = found.groupby(["participant", "session", "block", "code"]).cumcount() + 1
     track_rows = [_track_row(by_id[row["block"]], row) for row in found[list(_READ)].to_dict("records")]
+    found = found.drop(columns=list(_DELIVERED))
     return found.join(pd.DataFrame(track_rows, index=found.index, columns=list(_TYPES)).astype(_TYPES))
 
 
@@ -64,6 +69,7 @@ def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:
     if block.stimulus is not None and not pd.isna(row["level"]):
         standard = None if pd.isna(row["standard"]) else float(row["standard"])
         found["comparison"] = block.stimulus.comparison(standard, float(row["level"]))
+        found["level_delivered"] = _level_delivered(block.stimulus, standard, found["comparison"], row)
     if not pd.isna(row["response"]):
         arrangement, answer = arrangement_of(block.design, letters), str(row["response"])
         correct, success = block.design.is_correct(arrangement, answer), block.design.success(arrangement, answer)
@@ -73,6 +79,22 @@ def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:
     return found
 
 
+def _level_delivered(stimulus: Stimulus, standard: float | None, comparison: float, row: Mapping[Any, Any]) -> Any:
+    """Return the level at which the comparison was delivered; missing where it was not measured, or not presented.
+
+    Of a delay it is the requested one and how much more late the comparison's frames were than the standard's.
+    """
+    value, of_standard, error_ms, of_standard_ms = (row[name] for name in _DELIVERED)
+    if stimulus.vary == DELAY:
+        if pd.isna(error_ms):
+            return pd.NA
+        late_ms = float(error_ms) - (0.0 if pd.isna(of_standard_ms) else float(of_standard_ms))
+        return stimulus.level_between(standard, comparison + late_ms)
+    if pd.isna(value):
+        return pd.NA
+    return stimulus.level_between(standard if pd.isna(of_standard) else float(of_standard), float(value))
+
+
 def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
     """Return a row per presentation: standard, level, arrangement, and of each interval force and speed."""
     ordered = intervals.sort_values([*PRESENTATION, "interval"])
@@ -80,6 +102,10 @@ def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
     groups = ordered.assign(letter=letters).groupby(PRESENTATION, sort=False)
     found = groups[["standard", "level"]].first()
     found["arrangement"] = groups["letter"].agg("".join).astype("string")
+    for name, what in (("value_delivered", "value"), ("delay_error_mean_ms", "delay_error_ms")):
+        means = ordered.assign(letter=letters).groupby([*PRESENTATION, "letter"])[name].mean().unstack("letter")
+        for letter in "CS":
+            found[f"{what}_{letter}"] = means.get(letter, pd.NA)
     for name in OF_INTERVALS:
         wide = ordered.pivot(index=PRESENTATION, columns="interval", values=name)
         found = found.join(wide.rename(columns={number: f"{name}_{number}" for number in wide.columns}))

@@ -24,6 +24,10 @@ LINEAR_OBSERVER: Final = (1.4, 1.5)
 """Median and factor of the widths [decades] of observers whose d′ is proportional to the level."""
 LAPSES: Final = (0.0, 0.02, 0.04)
 LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
+ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.05)
+ANALYSIS_LAPSE_PRIOR: Final = (0.25, 0.3, 0.2, 0.15, 0.1)
+BEYOND_DECADES: Final = 0.2
+"""How far beyond the ends of the levels a threshold is looked for."""
 
 
 def is_distance(stimulus: Stimulus) -> bool:
@@ -79,6 +83,28 @@ def running_grid(
         width_prior=width_prior,
         lapses=lapses,
         lapse_prior=LAPSE_PRIOR if lapses == LAPSES else (1.0 / len(lapses),) * len(lapses),
+        guesses=guesses_of(stimulus, design),
+    )
+
+
+def analysis_grid(stimulus: Stimulus, design: Design, family: Family, width_prior: tuple[float, float] | None) -> Grid:
+    """Return the grid over which thresholds are estimated: finer, and beyond both ends of the levels.
+
+    ``width_prior`` is median and factor of the width, None: flat.
+    """
+    from study_app.psychophysics.grid import Grid, evenly, geometric  # noqa: PLC0415 - loads numpy
+
+    low, high = stimulus.domain
+    log = stimulus.spacing == "log"
+    beyond = BEYOND_DECADES if log else (high - low) / 10
+    least, most = widths_of(stimulus)
+    return Grid(
+        family=family,
+        thresholds=evenly(low - beyond, high + beyond, 81),
+        widths=geometric(0.8 * least, most, 15),
+        width_prior=width_prior,
+        lapses=ANALYSIS_LAPSES,
+        lapse_prior=ANALYSIS_LAPSE_PRIOR,
         guesses=guesses_of(stimulus, design),
     )
 
