@@ -61,6 +61,7 @@ def _block(
         answers=() if opened is None else tuple(_answers(block, opened, bounds)),
         thresholds=() if opened is None else tuple(thresholds(block, opened)),
         family=family(block),
+        adaptive=block.method is not None and block.method.adaptive,
     )
 
 

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, cast
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
 from study_app.analysis.figures.picture import Picture
-from study_app.analysis.results.levels import LevelAnswers, LevelsFound
+from study_app.analysis.results.levels import LevelAnswers, LevelsFound, ThresholdFound
 from study_app.analysis.results.section_failures import Failure, Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study import Study
+from study_app.psychophysics.families import Family, success
 
 MOST_PEOPLE: Final = 23
 """Participants with a panel of their own; the others are in the first panel and in the table."""
@@ -28,6 +30,8 @@ HEAD_PT: Final = 42.0
 ROW_GAP_PT: Final = 36.0
 FOOT_PT: Final = 26.0
 MOST_TICKS: Final = 5
+SIZE_PT2: Final = 2.0
+"""Area of a circle for each answer at a level."""
 ASIDE: Final = 0.025
 """How far the points of one standard are from those of the next, as a share of the axis."""
 COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
@@ -63,11 +67,22 @@ def _picture(study: Study, found: LevelsFound, name: str, forms: Sequence[str]) 
     own = len(found.people) - MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} in the table alone." if own > 0 else ""
     caption = (
-        f"{found.title}: {summary_words(found)} at each level. First panel: {mean_words(found)} over the participants, "
-        f"bars: its 95 % interval (Student's t); thin: participants. Other panels: each participant with the 95 % "
-        f"interval of the answers.{_chance(found)}{left_out} {simulated}{counted(len(found.people), 'participant')}."
+        f"{found.title}: {summary_words(found)} at each level. {_panels(found)}{_chance(found)}{left_out} "
+        f"{simulated}{counted(len(found.people), 'participant')}."
     )
     return Picture(found.block, name, caption, files)
+
+
+def _panels(found: LevelsFound) -> str:
+    if found.own_thresholds:
+        return (
+            "Curves: psychometric functions at the posterior medians, with the 95 % interval of the threshold; "
+            "circles: answers at each level, area by their number. First panel: all participants."
+        )
+    return (
+        f"First panel: {mean_words(found)} over the participants, bars: its 95 % interval (Student's t); thin: "
+        f"participants. Other panels: each participant with the 95 % interval of the answers."
+    )
 
 
 def summary_words(found: LevelsFound) -> str:
@@ -132,9 +147,15 @@ def _panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -
     _frame(axes, found, places, first=first)
     groups: Sequence[float | None] = _standards(found) or [None]
     for number, (standard, colour) in enumerate(zip(groups, COLOURS, strict=False)):
-        aside = ASIDE * (number - (len(groups) - 1) / 2) * (max(places.values()) - min(places.values()))
+        for one in found.own_thresholds:
+            if one.standard == standard and person in {None, one.participant}:
+                _curve(axes, found, one, colour if person else style.PARTICIPANT if len(groups) == 1 else colour)
+        if person is None and found.adaptive:
+            continue
+        span = 0.0 if found.own_thresholds else max(places.values()) - min(places.values())
+        aside = ASIDE * (number - (len(groups) - 1) / 2) * span
         shown = [one for one in found.answers if one.standard == standard]
-        if person is None and len(groups) == 1:
+        if person is None and len(groups) == 1 and not found.own_thresholds:
             for somebody in found.people:
                 _line(axes, [one for one in shown if one.participant == somebody], places, found)
         shifted = {level: place + aside for level, place in places.items()}
@@ -151,10 +172,33 @@ def _line(axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float
     )
 
 
+def _curve(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str) -> None:
+    """Draw a participant's psychometric function, with the interval of the threshold at its height."""
+    low, high = axes.get_xlim()
+    u = np.linspace(low, high, 120)
+    middle = _coordinate(found, one.threshold)
+    shape = cast("Family", found.family)
+    psi = success(shape, u, middle, one.width or 1.0, one.guess or 0.0, one.lapse or 0.0)
+    axes.plot(u, psi, color=colour, linewidth=0.9, zorder=2)
+    if one.low is not None and one.high is not None and colour != style.PARTICIPANT:
+        half = float(success(shape, middle, middle, one.width or 1.0, one.guess or 0.0, one.lapse or 0.0))
+        axes.plot(
+            [_coordinate(found, one.low), _coordinate(found, one.high)], [half, half], color=colour, linewidth=1.8
+        )
+
+
+def _coordinate(found: LevelsFound, level: float) -> float:
+    return math.log10(level) if found.spacing == "log" else level
+
+
 def _points(
     axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsFound, colour: str
 ) -> None:
     xs, ys = [places[_where(one)] for one in points], [_height(found, one.value) for one in points]
+    if found.own_thresholds:
+        sizes = [SIZE_PT2 * one.n for one in points]
+        axes.scatter(xs, ys, s=sizes, facecolors="none", edgecolors=colour, linewidths=0.7, zorder=3)
+        return
     joined = "none" if found.vary is None else "-"
     axes.plot(xs, ys, marker="o", markersize=3, color=colour, linewidth=0.9, linestyle=joined)
     for x, one in zip(xs, points, strict=True):

@@ -62,8 +62,8 @@ class LevelsFound:
 
     ``summary`` says how the answers at a level are summarised, ``counts`` what a share is of ("correct"); ``vary`` is
     the varied number, ``level_kind`` what a level is (weber, difference, value), both None where conditions are
-    compared; ``family`` is the psychometric function of the thresholds; ``guess_rate`` is the share at chance,
-    ``bounds`` are the ends of a scale. Without the key only ``times`` are known.
+    compared; ``family`` is the psychometric function of the thresholds; ``adaptive``: answers chose the levels;
+    ``guess_rate`` is the share at chance, ``bounds`` are the ends of a scale. Without the key only ``times`` are known.
     """
 
     block: str
@@ -81,11 +81,17 @@ class LevelsFound:
     answers: tuple[LevelAnswers, ...] = ()
     thresholds: tuple[ThresholdFound, ...] = ()
     family: str | None = None
+    adaptive: bool = False
 
     @property
     def of_group(self) -> tuple[LevelAnswers, ...]:
         """The answers of all participants together, in order of standard and level."""
         return tuple(one for one in self.answers if one.participant is None)
+
+    @property
+    def own_thresholds(self) -> tuple[ThresholdFound, ...]:
+        """The participants' thresholds."""
+        return tuple(one for one in self.thresholds if one.participant is not None)
 
     @property
     def people(self) -> tuple[str, ...]:

@@ -12,8 +12,9 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import every_step_of
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
+from study_app.protocol.trials.method import Method
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.trials.tracks import design_of, has_correct_answer, stimulus_of
+from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of
 from study_app.store.blinded.blinding import Key
 from study_app.store.blinded.whole_protocol import whole_protocol
 
@@ -22,7 +23,8 @@ from study_app.store.blinded.whole_protocol import whole_protocol
 class LevelBlock:
     """A block with a design.
 
-    ``stimulus`` is what it varies: None where it compares conditions, and while the key is sealed.
+    ``stimulus`` is what it varies, ``method`` how its levels were chosen: None where it compares conditions, and while
+    the key is sealed.
     """
 
     id: str
@@ -31,6 +33,7 @@ class LevelBlock:
     design: Design
     stimulus: Stimulus | None
     settings: tuple[Setting, ...]
+    method: Method | None = None
 
     @property
     def has_correct_answer(self) -> bool:
@@ -72,13 +75,15 @@ def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlo
 def _block(protocol: Mapping[str, Any], step: str, key: Key | None, whole: Protocol | None) -> LevelBlock:
     table = protocol["blocks"][step]
     stimulus: Stimulus | None = None
+    method: Method | None = None
     if whole is not None:
         block = whole.blocks[step]
         design = design_of(whole, block)
-        stimulus = None if block.stimulus is None else stimulus_of(whole, block)
+        if block.stimulus is not None:
+            stimulus, method = stimulus_of(whole, block), method_of(whole, block)
     elif (written := protocol.get("designs", {}).get(table["design"])) is not None:
         design = DESIGN_KINDS[written["kind"]].model_validate(written)
     else:
         design = default_design(table["design"])
     title = text_in(table["title"], spoken(protocol))
-    return LevelBlock(step, title, table["phase"], design, stimulus, settings_in(protocol, step, key))
+    return LevelBlock(step, title, table["phase"], design, stimulus, settings_in(protocol, step, key), method)

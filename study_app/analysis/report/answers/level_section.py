@@ -15,6 +15,7 @@ SEALED = (
     "Not yet revealed: standards, levels, what each interval presented, and which answers were correct. They appear "
     "here after unblinding."
 )
+BEYOND = {None: "", "above": "above ", "below": "below "}
 EXPLAINED = (
     "{mean} over the participants, with the 95 % interval by Student's t where at least two participants differ. "
     "Below: each participant, with the number of answers."
@@ -28,18 +29,59 @@ def section(found: LevelsFound, pictures: Sequence[Picture]) -> Iterator[str]:
         ("Code", "n", "median [s]", "quartiles [s]"),
         [[one.name, *_time_cells(one.numbers)] for one in found.times],
     )
-    yield heading(3, "Answers at each level" if found.vary is not None or not found.revealed else "Answers")
+    at_each = "Answers at each level" if found.vary is not None or not found.revealed else "Answers"
+    yield heading(3, "Answers over levels" if found.adaptive else at_each)
     if not found.revealed:
         yield paragraph(SEALED)
         return
     if not found.answers:
-        yield paragraph("Nobody's answers count yet.")
+        yield paragraph("No answer counts yet.")
         return
-    yield _of_group(found)
-    yield paragraph(EXPLAINED.format(mean=mean_words(found).capitalize()), "soft")
+    if not found.adaptive:
+        yield _of_group(found)
+        yield paragraph(EXPLAINED.format(mean=mean_words(found).capitalize()), "soft")
     yield from drawn({one.name: one for one in pictures}, f"levels-{found.block}")
-    for standard in sorted({one.standard for one in found.answers}, key=lambda one: one or 0.0):
-        yield _of_people(found, standard)
+    if not found.adaptive:
+        for standard in sorted({one.standard for one in found.answers}, key=lambda one: one or 0.0):
+            yield _of_people(found, standard)
+    if found.thresholds:
+        yield heading(3, "Thresholds")
+        yield _thresholds(found)
+        yield paragraph(_threshold_words(found), "soft")
+
+
+def _thresholds(found: LevelsFound) -> str:
+    """Return a row per standard and participant, the group first."""
+    standards = len({one.standard for one in found.thresholds}) > 1
+    return table(
+        (*(("Standard",) if standards else ()), "Participant", "n", "threshold", "95 % interval", "width",
+         "flat width prior"),
+        [
+            [
+                *((_plain(one.standard),) if standards else ()),
+                one.participant or f"group of {one.n}",
+                "–" if one.participant is None else str(one.n),
+                f"{BEYOND[one.beyond]}{one.threshold:.3g}",
+                "–" if one.low is None or one.high is None else f"{one.low:.3g} – {one.high:.3g}",
+                "–" if one.width is None else f"{one.width:.2g}",
+                "–" if one.flat_width is None else f"{one.flat_width:.3g}",
+            ]
+            for one in found.thresholds
+        ],
+        words=int(not standards),
+    )  # fmt: skip
+
+
+def _threshold_words(found: LevelsFound) -> str:
+    at = "" if found.guess_rate is None else f" ({50 * (1 + found.guess_rate):.3g} % {found.counts})"
+    width = "decades" if found.spacing == "log" else "units of the level"
+    return (
+        f"A threshold is the level at which the {found.family} function is half-way between guesses and lapses{at}: "
+        f"posterior median with an equal-tailed 95 % interval, from all counted answers, at the levels delivered to "
+        f"the hand. The width, from 5 to 95 % of the rise [{width}], has a log-normal prior; the last column is the "
+        f"threshold under a flat one. “Above” and “below” mark thresholds beyond the levels presented. The group is "
+        f"the random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from three participants on."
+    )
 
 
 def _time_cells(numbers: Mapping[str, Any]) -> list[str]:
