@@ -31,18 +31,18 @@ def rise(family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike) -
 
     Parameters
     ----------
-    family : {"weibull", "normal", "logistic"}
+    family : "weibull" | "normal" | "logistic"
         The shape.
-    u : array_like
+    u : array
         Levels, in the coordinate of their spacing.
-    threshold : array_like
+    threshold : array
         Where F is one half.
-    width : array_like
+    width : array
         Distance from F = 0.05 to F = 0.95.
 
     Returns
     -------
-    ndarray
+    array
         F, of the shape to which the arguments broadcast.
     """
     distance: Floats = (np.asarray(u, float) - threshold) / np.asarray(width, float)

@@ -28,7 +28,7 @@ class Grid:
 
     Attributes
     ----------
-    family : {"weibull", "normal", "logistic"}
+    family : "weibull" | "normal" | "logistic"
         The psychometric function.
     thresholds : tuple of float
         In the coordinate u, evenly spaced, ascending; their prior is flat.
@@ -81,9 +81,9 @@ class Grid:
 
         Parameters
         ----------
-        levels : array_like, shape (k,)
+        levels : (k,) array
             The levels, in the coordinate u.
-        successes, failures : array_like, shape (k,)
+        successes, failures : (k,) array
             How often each was answered with success and without.
         """
         psi = self.success(levels)
@@ -108,9 +108,9 @@ def quantile(centres: ArrayLike, weights: ArrayLike, share: float) -> float:
 
     Parameters
     ----------
-    centres : array_like, shape (n,)
+    centres : (n,) array
         The centres of the cells, evenly spaced, ascending.
-    weights : array_like, shape (n,)
+    weights : (n,) array
         Their weights, which sum to one.
     share : float
         Between 0 and 1; 0.5 gives the median.

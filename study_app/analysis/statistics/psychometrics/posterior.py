@@ -38,9 +38,9 @@ def fitted(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: G
 
     Parameters
     ----------
-    levels : array_like, shape (k,)
+    levels : (k,) array
         The levels, in u; −∞ for a level of zero on log spacing.
-    successes, failures : array_like, shape (k,)
+    successes, failures : (k,) array
         Counts.
     grid : Grid
         The cells and their prior.

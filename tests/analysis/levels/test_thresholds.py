@@ -1,0 +1,120 @@
+"""Thresholds of a block of levels, from rows of tracks: planted ones are found at the levels delivered."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from study_app.analysis.designs.thresholds import counts_of, family, thresholds
+from study_app.analysis.results.levels import ThresholdFound
+from study_app.analysis.statistics.psychometrics.posterior import band, fitted
+from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.psychometric import analysis_grid, width_prior_of
+from study_app.protocol.trials.stimuli import Stimulus
+from study_app.psychophysics.families import success
+
+STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
+LEVELS = STIMULUS.spaced(9)
+
+
+def block(design: str = "2ifc", stimulus: Stimulus = STIMULUS) -> LevelBlock:
+    return LevelBlock("b", "Block", "main", default_design(design), stimulus, ())
+
+
+def rows(
+    people: dict[str, float], trials: int = 400, delivered: float = 1.0, levels: tuple[float, ...] = LEVELS
+) -> pd.DataFrame:
+    """Return rows of tracks of people with planted thresholds; each level is delivered so many times too high."""
+    draw, found = np.random.default_rng(4), []
+    for person, threshold in people.items():
+        for number in range(trials):
+            level = levels[number % len(levels)]
+            u = math.log10(level * delivered) if level > 0 else -math.inf
+            right = bool(draw.random() < success("weibull", u, math.log10(threshold), 1.4, 0.5, 0.01))
+            found.append((person, "b", 8.0, level, level * delivered, True, right))
+    names = ["participant", "block", "standard", "level", "level_delivered", "analysed", "success"]
+    return pd.DataFrame(found, columns=names).astype({"level_delivered": "Float64", "success": "boolean"})
+
+
+def test_planted_thresholds_are_found_per_participant_and_for_the_group() -> None:
+    people = {"P001": 0.1, "P002": 0.14, "P003": 0.2, "P004": 0.28}
+    group, *own = thresholds(block(), rows(people))
+    assert [one.participant for one in own] == list(people)
+    for one, planted in zip(own, people.values(), strict=True):
+        assert one.n == 400
+        assert one.low is not None
+        assert one.high is not None
+        assert one.low < planted < one.high
+        assert one.threshold == pytest.approx(planted, rel=0.25)
+        assert one.guess == 0.5
+        assert one.beyond is None
+    assert (group.participant, group.n, group.standard) == (None, 4, 8.0)
+    assert group.threshold == pytest.approx(math.prod(people.values()) ** 0.25, rel=0.15)
+    assert group.low is not None
+    assert group.high is not None
+    assert group.low < group.threshold < group.high
+
+
+def test_thresholds_are_at_the_levels_delivered_not_at_those_requested() -> None:
+    asked = rows({"P001": 0.2})
+    moved = asked.assign(level_delivered=asked["level"] * 1.1)
+    (_, plain), (_, found) = thresholds(block(), asked), thresholds(block(), moved)
+    assert found.threshold == pytest.approx(1.1 * plain.threshold, rel=0.01)
+
+
+def test_a_level_that_was_not_measured_counts_as_requested() -> None:
+    one = rows({"P001": 0.2}).assign(level_delivered=pd.NA).astype({"level_delivered": "Float64"})
+    assert counts_of(STIMULUS, one).levels == pytest.approx([math.log10(level) for level in LEVELS])
+
+
+@pytest.mark.parametrize(("planted", "beyond"), [(0.009, "below"), (1.2, "above")])
+def test_a_threshold_beyond_the_levels_presented_is_said_to_be(planted: float, beyond: str) -> None:
+    _, found = thresholds(block(), rows({"P001": planted}))
+    assert found.beyond == beyond
+
+
+def test_noise_trials_determine_the_guess_rate_of_yes_no() -> None:
+    stimulus = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
+    draw, found = np.random.default_rng(2), []
+    for number in range(600):
+        level = (0.0, *LEVELS)[number % 10] if number % 3 else 0.0
+        u = stimulus.coordinate(level)
+        found.append(
+            ("P001", "b", 8.0, level, level, True, bool(draw.random() < success("normal", u, -0.7, 1, 0.2, 0)))
+        )
+    names = ["participant", "block", "standard", "level", "level_delivered", "analysed", "success"]
+    frame = pd.DataFrame(found, columns=names).astype({"level_delivered": "Float64", "success": "boolean"})
+    _, one = thresholds(block("yesno"), frame)
+    assert one.guess == pytest.approx(0.2, abs=0.06)
+    assert one.threshold == pytest.approx(0.2, rel=0.25)
+
+
+def test_answers_that_enter_no_psychometric_function_have_no_threshold() -> None:
+    for design in ("samedifferent", "estimation"):
+        assert family(block(design)) is None
+        assert list(thresholds(block(design), rows({"P001": 0.2}))) == []
+
+
+def test_the_band_holds_the_function_and_is_narrow_with_many_answers() -> None:
+    grid = analysis_grid(STIMULUS, default_design("2ifc"), "weibull", width_prior_of(STIMULUS))
+    u = [math.log10(level) for level in LEVELS]
+    psi = success("weibull", u, -0.7, 1.4, 0.5, 0.02)
+    for n, widest in ((20, 0.5), (2000, 0.05)):
+        middle, low, high = band(u, n * psi, n * (1 - psi), grid, u)
+        assert (low <= middle).all()
+        assert (middle <= high).all()
+        assert (low - 0.01 <= psi).all()
+        assert (psi <= high + 0.01).all()
+        assert (high - low).max() <= widest
+    many = fitted(u, 1e4 * psi, 1e4 * (1 - psi), grid)
+    assert many.threshold == pytest.approx(-0.7, abs=0.03)  # widths are few
+    assert many.flat == pytest.approx(many.threshold, abs=0.03)
+
+
+def test_found_thresholds_of_the_group_know_n_and_interval_alone() -> None:
+    group, *_ = thresholds(block(), rows({"P001": 0.2}))
+    assert group == ThresholdFound(None, 8.0, 1, group.threshold, None, None)
