@@ -59,6 +59,7 @@ def plot(results: Path, to: Path) -> None:
 def unblind(results: Path, by: str, reason: str) -> None:
     """Open the sealed key of a study and write the sealed columns; name, time and reason are recorded."""
     from study_app.store.blinded.unblinding import unblind as unblind_study
+    from study_app.store.exclusions import named
 
     found = unblind_study(results, by=by, reason=reason)
     for block, codes in found.codes.items():
@@ -66,6 +67,8 @@ def unblind(results: Path, by: str, reason: str) -> None:
             standard, of_track, _ = condition.partition("/")
             shown = f"standard {standard}" if standard else "all levels"
             click.echo(f"{block}  {code}  {shown if of_track else condition}")
+    for row in found.excluded:
+        click.echo(f"excluded  {named(row)}: {row.reason}")
     for sentence in found.left:
         click.echo(f"warning: {sentence}", err=True)
 

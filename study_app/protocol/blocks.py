@@ -8,6 +8,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, StringConstraints, mo
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.liquid import MAX_ID
+from study_app.haptics.model.ranges import within
 from study_app.protocol.order_constraint import Constraint
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id, Localised
@@ -18,8 +19,9 @@ Compared: TypeAlias = Literal["liquids", "delays"]
 Kind: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_]*$", max_length=MAX_ID)]
 
 
-LATER: Final = frozenset({"standard", "stimulus", "standards", "design", "method", "until"})
+LATER: Final = frozenset({"standard", "stimulus", "standards", "design", "method", "until", "catch"})
 """Keys of a block that format 1 does not have."""
+ROUNDING: Final = 1e-9
 
 
 class Criterion(Table):
@@ -40,6 +42,26 @@ class Criterion(Table):
                 {"right": self.right, "of": self.of, "place": "right"},
             )
         return self
+
+
+class Catch(Table):
+    """Easy trials among the others: whoever answers too many of them incorrectly did not attend to the task."""
+
+    share: Annotated[float, within(0.01, 0.5, "a catch trial in 100 to one in 2 others")] = Field(
+        default=0.1, description="Catch trials per other trial of a track: one in every stretch of 1/share trials."
+    )
+    wrong_most: Annotated[float, within(0, 1, "a share of the catch trials")] = Field(
+        default=0.25, description="Share of incorrect answers to them above which the session is excluded."
+    )
+
+    def count(self, trials: int) -> int:
+        """Return how many catch trials there are among so many others."""
+        return int(trials * self.share + ROUNDING)
+
+    def stretch(self, number: int) -> range:
+        """Return the slots among which catch trial ``number`` (from 0) is drawn; none is a track's first slot."""
+        begin, end = (number + int(at / self.share + ROUNDING) for at in (number, number + 1))
+        return range(max(begin, 1), end + 1)
 
 
 class Block(Table):
@@ -70,6 +92,7 @@ class Block(Table):
         default=None, description="How levels are chosen: a table of [methods], or a kind with all its defaults."
     )
     until: Criterion | None = Field(default=None, description="When the block ends early; left out: never.")
+    catch: Catch | None = Field(default=None, description="Easy trials, and the rule that excludes; left out: none.")
     compares: Compared | None = Field(
         default=None,
         description="What the conditions of a main block differ in; left out: delays if all have one liquid and their "
@@ -120,7 +143,7 @@ class Block(Table):
         if self.stimulus is not None:
             self._refuse("a stimulus", "standard", "repetitions", "order", "compares")
         elif self.design is not None:
-            self._refuse("conditions", "standards", "method", "order", "compares")
+            self._refuse("conditions", "standards", "method", "catch", "order", "compares")
             if self.standard not in self.conditions or len(self.conditions) < 2:
                 raise PydanticCustomError(
                     "standard",
@@ -128,7 +151,7 @@ class Block(Table):
                     _at("standard"),
                 )
         else:
-            self._refuse("conditions and no design", "standard", "standards", "method", "until")
+            self._refuse("conditions and no design", "standard", "standards", "method", "until", "catch")
         return self
 
     def _refuse(self, what: str, *names: str) -> None:

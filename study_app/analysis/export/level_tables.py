@@ -26,6 +26,7 @@ TRACKS: Final = (
     ),
     Column("track", "text", "What the code stands for: standard and number of the track (8/1), or the condition."),
     Column("slot", "integer", "Position of the trial among those of its code in the session, from 1.", minimum=1),
+    _BY_NAME["catch"],
     _BY_NAME["standard"],
     replace(_BY_NAME["level"], name="level_asked"),
     Column(

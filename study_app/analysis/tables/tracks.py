@@ -100,7 +100,7 @@ def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
     ordered = intervals.sort_values([*PRESENTATION, "interval"])
     letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")
     groups = ordered.assign(letter=letters).groupby(PRESENTATION, sort=False)
-    found = groups[["standard", "level"]].first()
+    found = groups[["standard", "level", "catch"]].first()
     found["arrangement"] = groups["letter"].agg("".join).astype("string")
     for name, what in (("value_delivered", "value"), ("delay_error_mean_ms", "delay_error_ms")):
         means = ordered.assign(letter=letters).groupby([*PRESENTATION, "letter"])[name].mean().unstack("letter")

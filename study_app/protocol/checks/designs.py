@@ -63,9 +63,10 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     if block.questionnaire is not None:
         yield Fault((*place, "questionnaire"), "a block with a design asks the design's question", "ask more in a form")
     correct = has_correct_answer(design, None if block.stimulus is None else protocol.stimuli[block.stimulus])
-    if not correct and block.until is not None:
-        what = "a level that is a value" if design.has_correct_answer else f'a design "{block.design}"'
-        yield Fault((*place, "until"), f"{what} has no correct answer", "omit the key")
+    for key in ("until", "catch"):
+        if not correct and getattr(block, key) is not None:
+            what = "a level that is a value" if design.has_correct_answer else f'a design "{block.design}"'
+            yield Fault((*place, key), f"{what} has no correct answer", "omit the key")
     if not correct and design.feedback not in {None, "never"}:
         yield Fault(
             ("designs", str(block.design), "feedback"),
@@ -135,7 +136,7 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
         yield from faults
         return
     least, most = stimulus.levels
-    levels = sorted(method.asked(stimulus))
+    levels = sorted((*method.asked(stimulus), *([most] if block.catch else [])))
     if levels[0] < least * (1 - 1e-9) or levels[-1] > most * (1 + 1e-9):
         beyond = levels[0] if levels[0] < least * (1 - 1e-9) else levels[-1]
         yield Fault(

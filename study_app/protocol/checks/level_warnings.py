@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Final
 
@@ -24,6 +25,7 @@ def level_warnings(protocol: Protocol) -> Iterator[str]:
             for sentence in (
                 *_unbalanced(protocol, block),
                 *_converging(protocol, block),
+                *_without_catch(protocol, block),
                 *_seen(protocol, block),
                 *_unpaced(protocol, block),
             ):
@@ -36,10 +38,11 @@ def _unbalanced(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield that the trials of a track cannot present every arrangement equally often."""
     count = len(design_of(protocol, block).arrangements)
     track = tracks_of(protocol, block)[0]
-    if design_of(protocol, block).noise(track.slots) == 0 and track.slots % count:
+    trials = track.slots - len(track.catch)
+    if not design_of(protocol, block).has_noise and trials % count:
         place = f"blocks.{block.id}.repetitions" if block.stimulus is None else f"methods.{block.method}"
         wanted = "an even number" if count == 2 else f"a multiple of {count}"
-        yield f"{place}: {track.slots} trials cannot balance {count} arrangements: choose {wanted}"
+        yield f"{place}: {trials} trials cannot balance {count} arrangements: choose {wanted}"
 
 
 def _converging(protocol: Protocol, block: Block) -> Iterator[str]:
@@ -47,6 +50,17 @@ def _converging(protocol: Protocol, block: Block) -> Iterator[str]:
     if block.stimulus is not None:
         for key, sentence in method_of(protocol, block).warnings():
             yield f"methods.{block.method}.{key}: {sentence}"
+
+
+def _without_catch(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield that a track is too short for the share of catch trials."""
+    track = tracks_of(protocol, block)[0]
+    if block.catch is not None and not track.catch:
+        share = math.ceil(100 / track.slots) / 100
+        yield (
+            f"blocks.{block.id}.catch.share: {block.catch.share:g} of {track.slots} trials gives no catch trial: "
+            f"choose {share:g}"
+        )
 
 
 def _seen(protocol: Protocol, block: Block) -> Iterator[str]:

@@ -10,7 +10,6 @@ from study_app.protocol.source.problems import Fault
 
 KEYS: Final = (
     *(f"conditions.*.force_{name}" for name in ("delay_ms", "jitter_ms", "loss")),
-    "blocks.*.catch",
     *(f"analysis.{name}" for name in ("participants", "precision", "published")),
 )
 METHODS: Final = ("adjustment",)

@@ -54,10 +54,10 @@ class Adaptive(Method):
         """Return the first level of a track (from 1) as it is written; None: the method's own."""
         return self.begin[track - 1] if isinstance(self.begin, tuple) else self.begin
 
-    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float | None:
+    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
         """Return the level of comparison ``number``: that after the answers so far."""
-        return self.after(track, [one for one in heard if one.success is not None])
+        return self.after(track, heard)
 
     @abstractmethod
-    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float | None:
-        """Return the level after these answers, each of which counts; None where the track has ended."""
+    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
+        """Return the level after these answers."""

@@ -30,17 +30,25 @@ def presented_by(protocol: Protocol, codes: Mapping[str, Mapping[str, str]], sta
     track = track_of(protocol, block, codes[block.id][started["code"]])
     modulus = design.first is not None and started["index"] == 1
     arrangement = arrangement_of(design, started["arrangement"])
-    return due_of(protocol, block, track, arrangement, started["level"], analysed=not modulus)
+    return due_of(protocol, block, track, arrangement, started["level"], analysed=not modulus, catch=started["catch"])
 
 
 def heard_of(
-    protocol: Protocol, block: Block, trial: int, code: str, level: float | None, arrangement: int, answer: str
+    protocol: Protocol,
+    block: Block,
+    trial: int,
+    code: str,
+    level: float | None,
+    arrangement: int,
+    answer: str,
+    *,
+    catch: bool = False,
 ) -> Heard:
     """Return the answer to a trial of a block with a design, at the level (None: conditions are compared)."""
     design = design_of(protocol, block)
     stimulus = None if block.stimulus is None else stimulus_of(protocol, block)
     correct = design.is_correct(arrangement, answer) if has_correct_answer(design, stimulus) else None
-    return Heard(trial, code, level or 0.0, design.success(arrangement, answer), correct)
+    return Heard(trial, code, level or 0.0, design.success(arrangement, answer), correct, catch)
 
 
 def heard_in(protocol: Protocol, lines: Iterable[Mapping[str, Any]]) -> tuple[Heard, ...]:
@@ -66,6 +74,13 @@ def heard_in(protocol: Protocol, lines: Iterable[Mapping[str, Any]]) -> tuple[He
             arrangement = arrangement_of(design_of(protocol, block), start["arrangement"])
             answer = line["items"][0]["value"]
             found[line["trial"]] = heard_of(
-                protocol, block, line["trial"], start["code"], start["level"], arrangement, answer
+                protocol,
+                block,
+                line["trial"],
+                start["code"],
+                start["level"],
+                arrangement,
+                answer,
+                catch=start["catch"],
             )
     return tuple(found[number] for number in sorted(found))

@@ -70,6 +70,8 @@ class Design(Table):
     has_standard: ClassVar[bool] = True
     """Whether intervals are compared with a standard; otherwise there is one interval, the level itself."""
     has_correct_answer: ClassVar[bool] = True
+    has_noise: ClassVar[bool] = False
+    """Whether some slots present the standard alone."""
     success_name: ClassVar[str] = "correct"
     """What `success` counts."""
     adaptive: ClassVar[bool] = True

@@ -13,7 +13,7 @@ from typing import Final
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.streams import shuffle
+from study_app.protocol.streams import Draw, shuffle
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.keyed import Key, keyed_stream
 from study_app.protocol.trials.method import Heard, TrackSetting
@@ -47,6 +47,8 @@ class Due:
         What each interval presents, in order.
     analysed : bool
         False for the trial that presents the modulus of a magnitude estimation.
+    catch : bool
+        True for a catch trial, which presents the largest level.
     """
 
     level: float | None
@@ -54,6 +56,7 @@ class Due:
     arrangement: int
     intervals: tuple[Stimulated, ...]
     analysed: bool = True
+    catch: bool = False
 
 
 def next_level(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, heard: Sequence[Heard]) -> Due | None:
@@ -88,15 +91,22 @@ def next_level(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, h
         slot -= 1
     if track.comparison is not None:  # conditions are compared
         return due_of(protocol, block, track, draws.arrangement(design, slot), None)
-    comparisons = method_of(protocol, block).presentations(stimulus_of(protocol, block))
-    noise = draws.noise(design.noise(comparisons), track.slots)
+    method, stimulus = method_of(protocol, block), stimulus_of(protocol, block)
+    setting = TrackSetting(stimulus, design, track.number)
+    answered = sorted((one for one in earlier if one.code == trial.code and not one.catch), key=lambda one: one.trial)
+    if method.ended(setting, answered):
+        return None
+    catch = draws.catch(track.catch)
+    if slot in catch:
+        arrangement = draws.arrangement(design, catch.index(slot), "catch")
+        return due_of(protocol, block, track, arrangement, stimulus.levels[1], catch=True)
+    slot -= sum(one < slot for one in catch)
+    noise = draws.noise(design.noise(method.presentations(stimulus)), track.slots - len(catch))
     if slot in noise:
         return due_of(protocol, block, track, STANDARD_ALONE, 0.0)
-    number = slot - sum(one < slot for one in noise)
-    answered = sorted((one for one in earlier if one.code == trial.code), key=lambda one: one.trial)
-    level = draws.level(protocol, block, track, number, answered)
-    arrangement = 0 if noise else draws.arrangement(design, slot)
-    return None if level is None else due_of(protocol, block, track, arrangement, level)
+    rounds = draws.rounds(method.rounds(stimulus))
+    level = method.level(setting, slot - sum(one < slot for one in noise), answered, rounds)
+    return due_of(protocol, block, track, draws.arrangement(design, slot), level)
 
 
 def criterion_met(block: Block, schedule: Schedule, heard: Sequence[Heard]) -> bool:
@@ -115,35 +125,44 @@ class _Draws:
     secret: bytes
     track: str
 
-    def arrangement(self, design: Design, slot: int) -> int:
-        """Return the arrangement of a slot: each comes twice in every 2 × arrangements slots."""
+    def arrangement(self, design: Design, slot: int, among: str = "arrangement") -> int:
+        """Return the arrangement of a slot: each comes twice in every 2 × arrangements slots of its own stream."""
+        if design.has_noise:
+            return 0  # the other arrangement is the standard alone
         count = len(design.arrangements)
         run, place = divmod(slot, 2 * count)
         twice: tuple[int, ...] = (*range(count), *range(count))
-        return shuffle(twice, keyed_stream(self.secret, f"arrangement/{self.track}/{run}").random)[place]
+        return shuffle(twice, keyed_stream(self.secret, f"{among}/{self.track}/{run}").random)[place]
+
+    def catch(self, stretches: Sequence[range]) -> tuple[int, ...]:
+        """Return the slots of the catch trials, ascending: one of each stretch."""
+        draw = keyed_stream(self.secret, f"catch/{self.track}").random
+        return tuple(stretch[int(draw() * len(stretch))] for stretch in stretches)
 
     def noise(self, count: int, slots: int) -> tuple[int, ...]:
         """Return the slots that present the standard alone, ascending."""
         order = shuffle(range(slots), keyed_stream(self.secret, f"noise/{self.track}").random)
         return tuple(sorted(order[:count]))
 
-    def level(
-        self, protocol: Protocol, block: Block, track: Track, number: int, heard: Sequence[Heard]
-    ) -> float | None:
-        """Return the level of a track's comparison ``number``."""
-        method, stimulus = method_of(protocol, block), stimulus_of(protocol, block)
-        names = (f"round/{self.track}/{turn}" for turn in range(method.rounds(stimulus)))
-        setting = TrackSetting(stimulus, design_of(protocol, block), track.number)
-        return method.level(setting, number, heard, [keyed_stream(self.secret, name).random for name in names])
+    def rounds(self, count: int) -> list[Draw]:
+        """Return the source of each round of levels."""
+        return [keyed_stream(self.secret, f"round/{self.track}/{number}").random for number in range(count)]
 
 
 def due_of(
-    protocol: Protocol, block: Block, track: Track, arrangement: int, level: float | None, analysed: bool = True
+    protocol: Protocol,
+    block: Block,
+    track: Track,
+    arrangement: int,
+    level: float | None,
+    *,
+    analysed: bool = True,
+    catch: bool = False,
 ) -> Due:
     """Return what a trial of a track presents at a level (None: conditions are compared), in an arrangement."""
     presented = design_of(protocol, block).arrangements[arrangement]
     intervals = tuple(_interval(protocol, block, track, level if holds else None, holds) for holds in presented)
-    return Due(level, track.standard, arrangement, intervals, analysed)
+    return Due(level, track.standard, arrangement, intervals, analysed, catch)
 
 
 def _interval(protocol: Protocol, block: Block, track: Track, level: float | None, comparison: bool) -> Stimulated:

@@ -53,6 +53,8 @@ class Heard:
         None where the answer enters no psychometric function.
     correct : bool or None
         Whether the answer was correct; None where no answer is.
+    catch : bool
+        Whether it was a catch trial: no level follows from its answer.
     """
 
     trial: int
@@ -60,6 +62,7 @@ class Heard:
     level: float
     success: bool | None
     correct: bool | None
+    catch: bool = False
 
 
 class Method(Table):
@@ -95,8 +98,8 @@ class Method(Table):
         """Return levels that include the smallest and the largest that it can present."""
 
     @abstractmethod
-    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float | None:
-        """Return the level of a track's comparison ``number`` (from 0).
+    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
+        """Return the level of a track's comparison ``number`` (from 0), where the track has not ended.
 
         Parameters
         ----------
@@ -108,12 +111,11 @@ class Method(Table):
             The track's earlier answers, in the order of presentation.
         draws : sequence of callable
             Secret uniform numbers in [0, 1), one source per round of levels.
-
-        Returns
-        -------
-        float or None
-            The level; None where the track has ended.
         """
+
+    def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
+        """Return whether a track has ended with these answers, before its last trial."""
+        return False
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         """Yield what is wrong with it for a stimulus: the key, a message and a hint."""

@@ -29,6 +29,8 @@ class Track:
         How many trials it has at most.
     number : int
         Which of the tracks of its standard, from 1.
+    catch : tuple of range
+        Of each catch trial the slots, from 0, among which its own is drawn.
     """
 
     name: str
@@ -36,19 +38,21 @@ class Track:
     comparison: str | None
     slots: int
     number: int = 1
+    catch: tuple[range, ...] = ()
 
 
 def tracks_of(protocol: Protocol, block: Block) -> tuple[Track, ...]:
     """Return the tracks of a block with a design, in the order in which they are written."""
     design = design_of(protocol, block)
     if block.stimulus is None:
-        others = (name for name in block.conditions if name != block.standard)
-        return tuple(Track(name, None, name, block.repetitions) for name in others)
+        return tuple(Track(name, None, name, block.repetitions) for name in block.conditions if name != block.standard)
     stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
     comparisons = method.presentations(stimulus)
-    slots = comparisons + design.noise(comparisons) + (design.first is not None)
+    others = comparisons + design.noise(comparisons) + (design.first is not None)
+    catch = () if (rule := block.catch) is None else tuple(rule.stretch(one) for one in range(rule.count(others)))
+    slots = others + len(catch)
     return tuple(
-        Track(f"{'' if standard is None else f'{standard:.17g}'}/{number}", standard, None, slots, number)
+        Track(f"{'' if standard is None else f'{standard:.17g}'}/{number}", standard, None, slots, number, catch)
         for standard in standards_of(protocol, block)
         for number in range(1, method.tracks + 1)
     )

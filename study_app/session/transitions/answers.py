@@ -64,7 +64,7 @@ def _heard(state: SessionState, written: Write, at_s: float) -> Result:
     assert due is not None and design is not None  # noqa: S101, PT018 - the caller has looked
     protocol, answer = state.plan.protocol, str(state.answers[design.name].value)
     block = protocol.blocks[trial.block]
-    heard = heard_of(protocol, block, trial.number, trial.code, due.level, due.arrangement, answer)
+    heard = heard_of(protocol, block, trial.number, trial.code, due.level, due.arrangement, answer, catch=due.catch)
     state = replace(state, heard=(*state.heard, heard))
     if heard.correct is None or not design.shows_feedback(trial.phase == "practice"):
         return enter(state, state.index + 1, (written,), at_s=at_s)

@@ -98,6 +98,7 @@ def start_trial(state: SessionState, done: Commands, *, rest_until_s: float | No
             "level": state.due.level,
             "standard": state.due.standard,
             "arrangement": arrangement_text(state.design, state.due.arrangement),
+            "catch": state.due.catch,
         }
     begun = (*done, Write("trial_started", {**which(state), **fields}), WriteTables())
     return start_interval(state, begun) if rest_until_s is None else rest(state, begun, rest_until_s)

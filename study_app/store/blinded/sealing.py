@@ -26,7 +26,7 @@ from study_app.store.journals.parsing import parse_json
 from study_app.store.tables.columns import SEALED
 
 _SEALED_IN: Final[Mapping[str, frozenset[str]]] = {
-    "trial_started": frozenset({"level", "standard", "arrangement"}),
+    "trial_started": frozenset({"level", "standard", "arrangement", "catch"}),
     "interval_ended": SEALED,
     "allocated": frozenset({"group"}),
     "trial_ended": SEALED,

@@ -14,7 +14,9 @@ from study_app.protocol.model import StudyHead
 from study_app.store import receipt
 from study_app.store.atomic import is_there, write_file
 from study_app.store.blinded.blinding import Codes, Key, read_key, reveal
+from study_app.store.blinded.catch_trials import exclude_inattentive
 from study_app.store.checksums import replace_checksums
+from study_app.store.exclusions import Exclusion
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
@@ -29,10 +31,21 @@ from study_app.store.tables.study_description import described_study, has_interv
 
 @dataclass(frozen=True, slots=True)
 class Unblinded:
-    """``codes`` is block → code → condition id; ``left`` says of each table left as it was why, and what to do."""
+    """What was opened.
+
+    Attributes
+    ----------
+    codes : mapping
+        Block → code → condition id.
+    left : tuple of str
+        Of each table left as it was why, and what to do.
+    excluded : tuple of Exclusion
+        Sessions that the rule `catch` excluded.
+    """
 
     codes: Codes
     left: tuple[str, ...]
+    excluded: tuple[Exclusion, ...] = ()
 
 
 def unblind(folder: Path, by: str, reason: str) -> Unblinded:
@@ -57,7 +70,12 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
         _open_study(study)
     except StoreError as error:
         left.append(f"{error}; then unblind again")
-    return Unblinded(codes, tuple(left))
+    excluded: tuple[Exclusion, ...] = ()
+    try:
+        excluded = exclude_inattentive(folder)
+    except (StoreError, ValueError, KeyError, TypeError) as error:
+        left.append(f"the rule catch was not applied: {error}; then unblind again")
+    return Unblinded(codes, tuple(left), excluded)
 
 
 def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[str]:

@@ -51,7 +51,7 @@ EVENTS: tuple[Event, ...] = (
     Event("language_chosen", "The participant chose another language of the study.", ("language",)),
     Event(
         "trial_started",
-        "A trial was presented; with a design `sealed` contains level, standard and arrangement, encrypted.",
+        "A trial was presented; with a design `sealed` contains level, standard, arrangement and catch, encrypted.",
         (*_WHICH, "block", "phase", "part", "index", "of", "code"),
     ),
     Event("interval_started", "An interval of a trial was presented.", (*_WHICH, "interval")),

@@ -229,6 +229,7 @@ INTERVALS: tuple[Column, ...] = (
     ),
     Column("standard", "number", "The trial's standard, in the unit of the varied number.", may_miss=True, sealed=True),
     Column("level", "number", f"The trial's level: {_LEVEL}.", may_miss=True, sealed=True),
+    Column("catch", "flag", "true in a catch trial, which presents the largest level.", may_miss=True, sealed=True),
     Column(
         "invalid_reasons",
         "text",

@@ -52,6 +52,7 @@ def interval_row(trial: Row, started: Mapping[str, Any], line: Mapping[str, Any]
         "presented": None if arrangement is None else _PRESENTED[arrangement[number - 1]],
         "standard": started.get("standard"),
         "level": started.get("level"),
+        "catch": started.get("catch"),
     }
 
 

@@ -131,11 +131,12 @@ class _Compared:
             if due is not None:
                 self.differences.append(f"trial {trial.number}: passed over, though it was due by the answers")
             return
-        presented = (line["level"], line["standard"], line["arrangement"])
+        presented = (line["level"], line["standard"], line["arrangement"], line["catch"])
         follows = due is not None and presented == (
             due.level,
             due.standard,
             arrangement_text(design_of(self._protocol, block), due.arrangement),
+            due.catch,
         )
         if not follows:
             what = (

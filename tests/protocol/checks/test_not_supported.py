@@ -14,7 +14,6 @@ STIMULUS = 'stimulus = "viscosity"'
     ("old", "new", "place"),
     [
         ("[conditions.oil]", "[conditions.oil]\nforce_delay_ms = 10", "conditions.oil.force_delay_ms"),
-        (STIMULUS, STIMULUS + "\ncatch = { share = 0.1, wrong_most = 0.2 }", "blocks.viscosity.catch"),
         ("[tasks.stir]", "[analysis]\nparticipants = 20\n[tasks.stir]", "analysis.participants"),
         *(
             (

@@ -19,6 +19,7 @@ class YesNo(Design):
         default=0.3, description="Share of slots that present the standard."
     )
 
+    has_noise: ClassVar[bool] = True
     success_name: ClassVar[str] = "yes"
 
     @property

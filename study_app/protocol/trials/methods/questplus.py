@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
@@ -21,6 +21,9 @@ from study_app.protocol.trials.psychometric import (
     widths_of,
 )
 from study_app.protocol.trials.stimuli import Stimulus
+
+if TYPE_CHECKING:
+    from study_app.psychophysics.questplus import Search
 
 Positive = Annotated[float, Field(gt=0)]
 Lapse = Annotated[float, Field(ge=0, lt=0.5)]
@@ -68,37 +71,54 @@ class QuestPlus(Adaptive):
         guess = design.guess_rate
         return None if guess is None else f"threshold at {50 * (1 + guess):.3g} % {design.success_name}"
 
-    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float | None:
+    def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
+        """Return whether the threshold's interval is narrow enough."""
+        if self.stop is None or sum(one.level > 0 for one in heard) < self.stop.after:
+            return False
+        search, counts = self._search(track), self._counts(track, heard)
+        return ratio_in_u(track.stimulus, *search.interval(*counts)) <= self.stop.ratio
+
+    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
         """Return the level after these answers: their order does not matter."""
+        levels = _levels(track)
+        if not any(one.level > 0 for one in heard) and (first := self.first(track.number)) is not None:
+            return levels[_nearest(_coordinates(track), track.stimulus.coordinate(first))]
+        return levels[self._search(track).next(*self._counts(track, heard))]
+
+    def _search(self, track: TrackSetting) -> Search:
         from study_app.psychophysics.questplus import search_of  # noqa: PLC0415 - loads numpy
 
-        stimulus = track.stimulus
-        noise = track.design.noise(1000) > 0
-        levels = (0.0, *stimulus.grid) if noise else stimulus.grid
-        coordinates = tuple(stimulus.coordinate(level) for level in levels)
-        presented = [one for one in heard if not noise or one.level > 0]
-        if not presented and (first := self.first(track.number)) is not None:
-            return levels[_nearest(coordinates, stimulus.coordinate(first))]
+        stimulus, design = track.stimulus, track.design
         grid = running_grid(
             stimulus,
-            track.design,
-            self.family or family_of(stimulus, track.design),
+            design,
+            self.family or family_of(stimulus, design),
             self.widths or widths_of(stimulus),
             self.width_prior or width_prior_of(stimulus),
             self.lapses,
         )
-        search = search_of(grid, coordinates, self.learn, noise)
-        counts = ([0] * len(levels), [0] * len(levels))
+        return search_of(grid, _coordinates(track), self.learn, design.has_noise)
+
+    def _counts(self, track: TrackSetting, heard: Sequence[Heard]) -> tuple[list[int], list[int]]:
+        """Return successes and failures at each level."""
+        coordinates = _coordinates(track)
+        counts = ([0] * len(coordinates), [0] * len(coordinates))
         for one in heard:
-            at = 0 if noise and one.level == 0 else _nearest(coordinates, stimulus.coordinate(one.level))
-            counts[0 if one.success else 1][at] += 1
-        if self.stop is not None and len(presented) >= self.stop.after:
-            low, high = search.interval(*counts)
-            if ratio_in_u(stimulus, low, high) <= self.stop.ratio:
-                return None
-        return levels[search.next(*counts)]
+            counts[0 if one.success else 1][_nearest(coordinates, track.stimulus.coordinate(one.level))] += 1
+        return counts
+
+
+def _levels(track: TrackSetting) -> tuple[float, ...]:
+    """Return the levels of a track's trials, ascending: the grid, after 0 where there are noise trials."""
+    return (0.0, *track.stimulus.grid) if track.design.has_noise else track.stimulus.grid
+
+
+def _coordinates(track: TrackSetting) -> tuple[float, ...]:
+    return tuple(track.stimulus.coordinate(level) for level in _levels(track))
 
 
 def _nearest(coordinates: Sequence[float], u: float) -> int:
     """Return the index of the coordinate that is nearest to ``u``; of two the lower."""
+    if u == coordinates[0]:
+        return 0  # also −∞, that of noise trials
     return min(range(len(coordinates)), key=lambda index: abs(coordinates[index] - u))

@@ -70,15 +70,19 @@ class UpDown(Adaptive):
     def _published_ratio(self) -> float:
         return RATIOS[int(self.rule[0])]
 
-    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float | None:
+    def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
+        """Return whether there are as many reversals as asked for."""
+        if self.stop is None:
+            return False
+        answers = _answers(track, heard)
+        reversals = self.staircase(track.stimulus, track.number).reversals(answers)
+        return len(answers) >= self.stop.after and len(reversals) >= self.stop.reversals
+
+    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
         """Return the level after these answers: a step from the last one, or that one again."""
-        stimulus, staircase = track.stimulus, self.staircase(track.stimulus, track.number)
-        answers = [(stimulus.coordinate(one.level), bool(one.success)) for one in heard if one.level > 0]
-        stop = self.stop
-        if stop and len(answers) >= stop.after and len(staircase.reversals(answers)) >= stop.reversals:
-            return None
-        low, high = stimulus.levels
-        return min(max(stimulus.level_of(staircase.next(answers)), low), high)
+        low, high = track.stimulus.levels
+        u = self.staircase(track.stimulus, track.number).next(_answers(track, heard))
+        return min(max(track.stimulus.level_of(u), low), high)
 
     def staircase(self, stimulus: Stimulus, track: int) -> Staircase:
         """Return the rule for a stimulus, in the coordinate u; ``track`` counts from 1."""
@@ -92,3 +96,8 @@ class UpDown(Adaptive):
             high=high,
             begin=high if first is None else stimulus.coordinate(first),
         )
+
+
+def _answers(track: TrackSetting, heard: Sequence[Heard]) -> list[tuple[float, bool]]:
+    """Return the coordinates of the comparisons presented, with their successes."""
+    return [(track.stimulus.coordinate(one.level), bool(one.success)) for one in heard if one.level > 0]

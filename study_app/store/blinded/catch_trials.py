@@ -1,0 +1,73 @@
+"""The rule `catch`: sessions with too many incorrect answers to catch trials are excluded, once the key is open.
+
+Any earlier, the count would reveal which answers were correct.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from study_app.errors import StoreError
+from study_app.protocol.trials.answered import heard_in
+from study_app.store import receipt
+from study_app.store.atomic import is_there, read_regular
+from study_app.store.blinded.blinding import Key, read_key
+from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.exclusions import Exclusion, exclude, exclusions
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal
+
+RULE: Final = "catch"
+
+
+def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
+    """Exclude the sessions that answered too many catch trials incorrectly; return what was added.
+
+    A session that is excluded already, or was included again by a person, keeps that decision. The study's key must be
+    open.
+
+    Raises
+    ------
+    StoreError
+        The list of exclusions cannot be read or written.
+    """
+    study, key = StudyFolder(folder), read_key(folder)
+    decided = {row.what[:2] for row in exclusions(folder) if row.trial is None} | _included_again(study)
+    added: list[Exclusion] = []
+    for session in study.sessions():
+        if (session.participant, session.number) in decided:
+            continue
+        with contextlib.suppress(StoreError, KeyError, TypeError, ValueError, AttributeError):  # `verify` names damage
+            if reasons := list(_missed(session, key)):
+                added.append(exclude(folder, session.participant, session.number, by=RULE, reason="; ".join(reasons)))
+    return tuple(added)
+
+
+def _missed(session: SessionFolder, key: Key) -> Iterator[str]:
+    """Yield of each block with too many incorrect answers to catch trials how many there were."""
+    published = receipt.read(session.receipt)["protocol"]
+    if not any("catch" in block for block in published["blocks"].values()):
+        return
+    protocol = whole_protocol(published, key)
+    heard = heard_in(protocol, opened(journal.read(session.journal), key))
+    for block in protocol.blocks.values():
+        answered = [one for one in heard if one.catch and one.code in key.codes.get(block.id, {})]
+        wrong = sum(not one.correct for one in answered)
+        if block.catch is not None and answered and wrong / len(answered) > block.catch.wrong_most:
+            yield (
+                f'block "{block.id}": {wrong} of {len(answered)} catch trials answered incorrectly, '
+                f"at most {100 * block.catch.wrong_most:g} % are permitted"
+            )
+
+
+def _included_again(study: StudyFolder) -> set[tuple[str, int]]:
+    if not is_there(study.reversed_exclusions):
+        return set()
+    lines = read_regular(study.reversed_exclusions).decode("utf-8").splitlines()
+    rows = [json.loads(line)["exclusion"] for line in lines if line.strip()]
+    return {(row["participant"], row["session"]) for row in rows if row["rule_or_person"] == RULE}

@@ -1,0 +1,84 @@
+"""Whoever answers too many catch trials incorrectly is excluded when the key is opened, and not before."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import exclusions, include
+from study_app.store.folders import StudyFolder
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+from tests.protocol.trials.studies import SHORT, text_of
+
+pytestmark = pytest.mark.slow
+
+ADAPTIVE = ('kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 2', 'kind = "updown"\ntrials = 20')
+CATCH = ("method =", "catch = { share = 0.5, wrong_most = 0.2 }\nmethod =")
+UNNOTICED = ("levels = [0.1, 0.8]", "levels = [0.0001, 0.0002]")
+
+
+def rehearsed(folder: Path, *edits: tuple[str, str]) -> Path:
+    (folder / "levels.toml").write_text(text_of(*SHORT, ADAPTIVE, CATCH, *edits))
+    return rehearse(folder / "levels.toml", participants=2, seed=2, results=folder / "study", recordings=False)
+
+
+@pytest.fixture(scope="module")
+def inattentive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rehearsed(tmp_path_factory.mktemp("inattentive"), UNNOTICED)
+
+
+@pytest.fixture
+def study(inattentive: Path, tmp_path: Path) -> Path:
+    shutil.copytree(inattentive, tmp_path / "study")
+    return tmp_path / "study"
+
+
+def test_nothing_is_excluded_before_unblinding_and_both_are_after(study: Path) -> None:
+    assert exclusions(study) == ()
+    ran = CliRunner().invoke(commands, ["unblind", str(study), "--by", "AB", "--reason", "to analyse"])
+    assert ran.exit_code == 0
+    rows = exclusions(study)
+    assert {(row.participant, row.session, row.trial) for row in rows} == {("P001", 1, None), ("P002", 1, None)}
+    assert {row.rule_or_person for row in rows} == {"catch"}
+    wrong, of = (int(rows[0].reason.split()[at]) for at in (2, 4))
+    assert of == 20
+    assert 4 < wrong <= 20
+    assert rows[0].reason.endswith("catch trials answered incorrectly, at most 20 % are permitted")
+    assert f"excluded  participant P001, session 1: {rows[0].reason}" in ran.output
+    found = verify(study)
+    assert [str(one) for one in found.errors] == []
+
+
+def test_unblinding_again_repeats_nothing_and_keeps_what_a_person_decided(study: Path) -> None:
+    assert len(unblind(study, "AB", "to analyse").excluded) == 2
+    assert unblind(study, "AB", "once more").excluded == ()
+    include(study, "P001", 1, by="AB", reason="the task was understood late")
+    assert unblind(study, "AB", "and again").excluded == ()
+    assert [row.participant for row in exclusions(study)] == ["P002"]
+
+
+def test_levels_of_a_study_with_catch_trials_follow_and_the_tables_name_them(study: Path) -> None:
+    for session in StudyFolder(study).sessions():
+        assert reproduced(session.path).followed == ["viscosity: 60 of 60 levels follow from the answers"]
+        with next(session.path.rglob("*intervals*.csv")).open(encoding="utf-8") as file:
+            assert "catch" not in next(csv.reader(file))
+    unblind(study, "AB", "to analyse")
+    session = StudyFolder(study).sessions()[0]
+    with next(session.path.rglob("*intervals*.csv")).open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert sum(row["catch"] == "true" for row in rows) == 2 * 20
+    assert {row["level"] for row in rows if row["catch"] == "true"} == {"0.0002"}
+
+
+def test_a_share_that_is_permitted_excludes_nobody(tmp_path: Path) -> None:
+    study = rehearsed(tmp_path, UNNOTICED, ("wrong_most = 0.2", "wrong_most = 1"))
+    assert unblind(study, "AB", "to analyse").excluded == ()
+    assert exclusions(study) == ()
