@@ -5,10 +5,10 @@ Nothing here changes what a participant meets. It stands in every receipt, so th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from study_app.haptics.model.ranges import within
 from study_app.protocol.source.document import Path, entries
@@ -16,7 +16,35 @@ from study_app.protocol.source.problems import Fault, did_you_mean
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id
 
+LATER: Final = frozenset({"participants", "precision", "published"})
+"""Keys that format 1 does not have."""
 LISTS = ("primary", "names", "rising", "falling")
+
+
+class Published(Table):
+    """A value of another study, which figures show beside the study's own."""
+
+    block: Id = Field(description="The block whose results it is comparable with.")
+    measure: Literal["weber", "threshold", "exponent", "pse"] = Field(description="What was measured.")
+    value: float = Field(description="The value; a threshold in the unit of the varied number.")
+    standard: float | None = Field(default=None, description="Its standard, in that unit; left out: of all.")
+    low: float | None = Field(default=None, description="Lower end of its interval or range.")
+    high: float | None = Field(default=None, description="Upper end of its interval or range.")
+    percent: Annotated[float, within(0, 100, "a share of answers")] | None = Field(
+        default=None, description="Percentage of correct answers at the value; left out: unknown."
+    )
+    n: Annotated[int, Field(ge=1)] | None = Field(default=None, description="Number of its participants.")
+    source: str = Field(default="", description="Where it was published.")
+
+    def described(self) -> str:
+        """Return it in words."""
+        about = (
+            "" if self.standard is None else f", standard {self.standard:g}",
+            "" if self.percent is None else f", at {self.percent:g} % correct",
+            "" if self.n is None else f", n = {self.n}",
+            f", {self.source}" if self.source else "",
+        )
+        return f"{self.block}: {self.measure} {self.value:g}{''.join(about)}"
 
 
 class Analysis(Table):
@@ -44,6 +72,41 @@ class Analysis(Table):
     noticed: Id | None = Field(
         default=None, description="Item of which agreement (5 to 7) means that a delay was noticed."
     )
+    participants: Annotated[int, Field(ge=1, le=100_000)] | None = Field(
+        default=None, description="How many participants are planned."
+    )
+    precision: Annotated[float, within(0.001, 10, "a share of the group's mean")] | None = Field(
+        default=None, description="Half the 95 % interval of the group's mean that is planned, as a share of the mean."
+    )
+    published: tuple[Published, ...] = Field(default=(), description="Published values to compare with.")
+
+    @model_serializer(mode="wrap")
+    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Omit the keys of format 2 that are not used: receipts and keys of format 1 keep their bytes."""
+        return {name: value for name, value in plain(self).items() if name not in LATER or value}
+
+    def described(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
+        """Yield a row in words for each decision; ``named_by`` says which item names each condition."""
+        bound = self.equivalence_bound
+        yield "Significant", f"p of at most {self.alpha:g}"
+        yield "Equivalent", "not tested" if bound is None else f"answers as without delay, to within {_points(bound)}"
+        yield "Primary", ", ".join(self.primary) or "all statements"
+        yield "Names", ", ".join(self.names) or "none"
+        if named_by:
+            yield "Recognised", ", ".join(named_by)
+        yield "Rise with delay", ", ".join(self.rising) or "none"
+        yield "Fall with delay", ", ".join(self.falling) or "none"
+        yield "Noticed", "not asked" if self.noticed is None else f"{self.noticed} from 5 on"
+        if self.participants is not None:
+            yield "Participants", f"{self.participants} planned"
+        if self.precision is not None:
+            yield "Precision", f"group mean ±{100 * self.precision:g} % (half its 95 % interval)"
+        for one in self.published:
+            yield "Published", one.described()
+
+
+def _points(points: float) -> str:
+    return f"{points:g} point of the scale" if points == 1 else f"{points:g} points of the scale"
 
 
 def decisions(document: Mapping[str, Any]) -> Iterator[Fault]:

@@ -318,22 +318,7 @@ def _analysis(protocol: Protocol) -> list[tuple[str, str]]:
     decided = protocol.analysis
     if decided is None:
         return [("nothing", "there is no table [analysis]: the report will call all it finds exploratory")]
-    bound = decided.equivalence_bound
-    named_by = [f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label]
-    return [
-        ("Significant", f"p of at most {decided.alpha:g}"),
-        ("Equivalent", "not tested" if bound is None else f"answers as without delay, to within {_points(bound)}"),
-        ("Primary", ", ".join(decided.primary) or "all statements"),
-        ("Names", ", ".join(decided.names) or "none"),
-        *([("Recognised", ", ".join(named_by))] if named_by else []),
-        ("Rise with delay", ", ".join(decided.rising) or "none"),
-        ("Fall with delay", ", ".join(decided.falling) or "none"),
-        ("Noticed", "not asked" if decided.noticed is None else f"{decided.noticed} from 5 on"),
-    ]
-
-
-def _points(points: float) -> str:
-    return f"{points:g} point of the scale" if points == 1 else f"{points:g} points of the scale"
+    return list(decided.described([f"{name} by {one.label}" for name, one in protocol.conditions.items() if one.label]))
 
 
 def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:

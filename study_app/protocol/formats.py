@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from study_app.haptics.model.scene import FADE_S, Scene
+from study_app.protocol.analysis_plan import LATER as OF_ANALYSIS
 from study_app.protocol.blocks import LATER
 from study_app.protocol.forms.scale import POINTS
 from study_app.protocol.source.document import entries, names
@@ -31,6 +32,7 @@ NEW_KEYS: Final = (
     *TABLES,
     *(f"limits.{key}" for key in LEVEL_LIMITS),
     *(f"blocks.*.{key}" for key in sorted(LATER)),
+    *(f"analysis.{key}" for key in sorted(OF_ANALYSIS)),
 )
 """Keys that belong to format 2, as patterns of places in the file."""
 NEW_VALUES: Final = {

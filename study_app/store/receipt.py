@@ -71,6 +71,7 @@ def without_conditions(protocol: Protocol) -> dict[str, Any]:
         exclude={
             **dict.fromkeys(("liquids", "conditions", "stimuli", "methods"), True),
             "designs": {"__all__": {"modulus"}},
+            "analysis": {"published"},
         },
     )
     for name, block in protocol.blocks.items():

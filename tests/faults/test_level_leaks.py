@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,11 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import load
 from study_app.session import start
-from study_app.store.verification.leaks import leaks, presented_numbers, telltales
+from study_app.store.blinded.blinding import read_key
+from study_app.store.blinded.sealing import opened
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.verification.leaks import find_leaks, presented_numbers, recorded_numbers, telltales
 from tests.compiled import needs_servo
 from tests.faults.support.windows import Person, traces_of, words_of
 from tests.protocol.trials.studies import BLOCK, HEAD
@@ -28,6 +33,7 @@ EDITS = (
     ("density_kg_m3 = 1260\n", "density_kg_m3 = 1261.9\n"),
     ("delay_ms = 100", "delay_ms = 137.31"),
     ("standards = [1, 2]", "standards = [1.3717, 2.1193]"),
+    ("levels = [0.1, 0.8]", "levels = [0.1131, 0.8173]"),
     ("levels = [0.2, 0.4, 0.8]\nrepetitions = 8", "levels = [0.2371, 0.7793]\nrepetitions = 1"),
     ("min_s = 1\nmax_s = 3", "min_s = 0.2\nmax_s = 0.5"),
     ("liquids.thin", "liquids.quagmire"),
@@ -41,13 +47,32 @@ EDITS = (
 )
 
 
+STAIRCASE = (
+    'kind = "constant"\nlevels = [0.2371, 0.7793]\nrepetitions = 1',
+    'kind = "updown"\ntrials = 4\nbegin = 0.6917\nstep_up = 1.2131',
+)
+CATCH = ('method = "few"', 'method = "few"\ncatch = { share = 0.25 }')
+KNOWN = {0.2371, 2.1193, 1.3717 + 1.3717 * 0.2371}
+
+
+@pytest.mark.parametrize(
+    ("edits", "known"),
+    [
+        pytest.param((), KNOWN, id="constant"),
+        pytest.param((STAIRCASE, CATCH), {0.6917, 2.1193, 1.3717 + 1.3717 * 0.6917}, id="staircase"),
+    ],
+)
 def test_nothing_seen_written_or_logged_tells_a_level(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    edits: Sequence[tuple[str, str]],
+    known: set[float],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     monkeypatch.setattr(start, "MEASURED_S", 0.1)
     caplog.set_level(logging.DEBUG)
     text = HEAD + BLOCK
-    for old, new in EDITS:
+    for old, new in (*EDITS, *edits):
         assert old in text, old
         text = text.replace(old, new)
     path = tmp_path / "levels.toml"
@@ -76,13 +101,16 @@ def test_nothing_seen_written_or_logged_tells_a_level(
     person.leave()
     assert code == 0
     protocol = load(str(path))
-    assert {0.2371, 2.1193, 1.3717 + 1.3717 * 0.2371} <= presented_numbers(protocol)
-    words = telltales(protocol)
+    (place,) = StudyFolder(tmp_path / "results").sessions()
+    recorded = recorded_numbers(protocol, opened(journal.read(place.journal), read_key(tmp_path / "results")))
+    assert known <= presented_numbers(protocol) | recorded
+    words = telltales(protocol, recorded)
     for line in (*said, *told, *(record.getMessage() for record in caplog.records)):
         assert words.in_text(line) == [], line
-    assert leaks(tmp_path / "results", protocol) == []
+    assert find_leaks(tmp_path / "results", words) == []
     assert any("answered" in line for line in said), "the operator saw how the track is doing"
 
     planted = QLabel("Pair 1")
-    planted.setAccessibleName("Pair 1, level 0.2371")
-    assert [word for line in words_of(planted) for word in words.in_text(line)] == ["0.2371"]
+    level = min(known)
+    planted.setAccessibleName(f"Pair 1, level {level}")
+    assert [word for line in words_of(planted) for word in words.in_text(line)] == [str(level)]

@@ -10,10 +10,11 @@ from typing import Any
 
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override
+from study_app.protocol.analysis_plan import Published
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.source.document import entries, names
+from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, did_you_mean
 from study_app.protocol.table import Table
 from study_app.protocol.trials.kinds import DESIGN_KINDS, METHOD_KINDS
@@ -56,6 +57,8 @@ def designs(protocol: Protocol) -> Iterator[Fault]:
     for block in protocol.blocks.values():
         if block.design is not None:
             yield from _block(protocol, block)
+    for number, one in enumerate(protocol.analysis.published if protocol.analysis is not None else ()):
+        yield from _published(protocol, one, ("analysis", "published", number))
 
 
 def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
@@ -92,6 +95,22 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     if design.first is not None and len(tracks_of(protocol, block)) > 1:
         yield Fault((*place, "design"), "a modulus needs a single standard", "omit it, or use one block per standard")
     yield from _levels(protocol, block)
+
+
+def _published(protocol: Protocol, one: Published, place: Path) -> Iterator[Fault]:
+    """Check that a published value belongs to a block of levels, and its standard to the block."""
+    of_levels = [block.id for block in protocol.blocks.values() if block.stimulus is not None]
+    if one.block not in of_levels:
+        known = did_you_mean(one.block, set(of_levels)) if of_levels else "omit it"
+        yield Fault((*place, "block"), f'there is no block of levels "{one.block}"', known)
+        return
+    standards = [standard for standard in standards_of(protocol, protocol.blocks[one.block]) if standard is not None]
+    if one.standard is not None and one.standard not in standards:
+        listed = f"these: {', '.join(f'{standard:g}' for standard in standards)}" if standards else "omit it"
+        yield Fault((*place, "standard"), f"the block has no standard {one.standard:g}", listed)
+    ends = (one.value if one.low is None else one.low, one.value, one.value if one.high is None else one.high)
+    if list(ends) != sorted(ends):
+        yield Fault((*place, "low"), "low, value and high must ascend", "order them")
 
 
 def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault]:

@@ -8,10 +8,7 @@ from typing import Any, Final
 from study_app.protocol.source.document import entries
 from study_app.protocol.source.problems import Fault
 
-KEYS: Final = (
-    *(f"conditions.*.force_{name}" for name in ("delay_ms", "jitter_ms", "loss")),
-    *(f"analysis.{name}" for name in ("participants", "precision", "published")),
-)
+KEYS: Final = (*(f"conditions.*.force_{name}" for name in ("delay_ms", "jitter_ms", "loss")),)
 METHODS: Final = ("adjustment",)
 DESIGNS: Final = ("adjustment",)
 METHOD: Final = 'method = "questplus"'

@@ -31,4 +31,6 @@ def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
         else:
             block["conditions"] = [key.condition(name, code) for code in block.pop("codes")]
     tables = {name: table for name, table in key.tables.items() if name != "blocks"}
+    if "analysis" in tables:
+        tables["analysis"] = {**published["analysis"], **tables["analysis"]}
     return Protocol.model_validate({**published, **tables, "questionnaires": questionnaires, "blocks": blocks})

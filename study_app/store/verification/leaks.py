@@ -55,10 +55,13 @@ class Telltales:
         return self._pattern.findall(text)
 
 
-def telltales(protocol: Protocol) -> Telltales:
-    """Return all that reveals a condition or level of ``protocol``: ids, and numbers in every unit they are used in."""
+def telltales(protocol: Protocol, recorded: Iterable[float] = ()) -> Telltales:
+    """Return all that reveals a condition or level of ``protocol``: ids, and numbers in every unit they are used in.
+
+    ``recorded`` are `recorded_numbers`.
+    """
     words = _words(protocol.model_dump(mode="json", include={"liquids", "conditions"}, exclude_unset=True))
-    return Telltales(words | _all_spelled(presented_numbers(protocol)))
+    return Telltales(words | _all_spelled({*presented_numbers(protocol), *recorded}))
 
 
 def presented_numbers(protocol: Protocol) -> frozenset[float]:
@@ -70,10 +73,21 @@ def presented_numbers(protocol: Protocol) -> frozenset[float]:
         stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
         levels = {*method.asked(stimulus)}
         first = design_of(protocol, block).first
+        levels |= {stimulus.levels[1]} if block.catch is not None else set()
         levels |= set() if first is None else {first.level}
         standards = standards_of(protocol, block)
         found |= levels | {one for one in standards if one is not None}
         found |= {stimulus.comparison(standard, level) for standard in standards for level in levels}
+    return frozenset(found - {0.0})
+
+
+def recorded_numbers(protocol: Protocol, opened: Iterable[Mapping[str, Any]]) -> frozenset[float]:
+    """Return every level and comparison that the opened lines of a journal presented: methods may choose any level."""
+    found: set[float] = set()
+    for line in opened:
+        if line["event"] == "trial_started" and line.get("level"):
+            block = protocol.blocks[line["block"]]
+            found |= {line["level"], stimulus_of(protocol, block).comparison(line["standard"], line["level"])}
     return frozenset(found - {0.0})
 
 

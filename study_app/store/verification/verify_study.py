@@ -20,8 +20,10 @@ from study_app.store import exclusions, receipt
 from study_app.store.atomic import is_there, read_own, read_regular, temporaries
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
+from study_app.store.blinded.sealing import opened
 from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place
 from study_app.store.tables import csv_files
@@ -36,7 +38,7 @@ from study_app.store.tables.study_description import (
 )
 from study_app.store.verification import psychds, table_checks
 from study_app.store.verification.fingerprints import listed, place_of, read_copy, unreadable
-from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers
+from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
 from study_app.store.verification.table_comparison import check_table
 from study_app.store.verification.verify_allocation import check_allocation
 from study_app.store.verification.verify_session import BETWEEN_S, LOOKS, Checked, check_session
@@ -266,6 +268,10 @@ def _blinding(study: StudyFolder, key: Key | None, found: Gathered) -> None:
         return
     levels: frozenset[float] = frozenset()
     with contextlib.suppress(KeyError, TypeError, AttributeError, ValueError):  # a receipt without what it must hold
-        levels = presented_numbers(whole_protocol(published, key))
+        protocol = whole_protocol(published, key)
+        levels = presented_numbers(protocol)
+        for session in study.sessions():
+            with contextlib.suppress(StoreError):  # said of the journal already
+                levels |= recorded_numbers(protocol, opened(journal.read(session.journal), key))
     for leak in find_leaks(study.path, certain_telltales(key.tables, published, levels)):
         found.warning(study.path, f"{leak.place} reveals a condition, although the key is sealed")

@@ -70,8 +70,36 @@ design = "2ifc"
 conditions = ["oil", "other", "late"]
 standard = "oil"
 repetitions = 2
+
+[methods.staircase]
+kind = "updown"
+trials = 12
+
+[methods.quest]
+kind = "questplus"
+trials = 12
+tracks = 2
+
+[blocks.chosen]
+task = "stir"
+stimulus = "viscosity"
+standards = [1]
+design = "3ifc"
+method = "staircase"
+catch = { share = 0.25 }
+
+[blocks.expected]
+task = "stir"
+stimulus = "viscosity"
+standards = [2]
+design = "yesno"
+method = "quest"
+catch = { share = 0.2 }
 """
-SEQUENCE = ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "pairs"]')
+SEQUENCE = (
+    'sequence = ["viscosity"]',
+    'sequence = ["viscosity", "detect", "rate", "number", "pairs", "chosen", "expected"]',
+)
 SESSIONS = 12
 HIDDEN = {"sealed", "key_hash", "at", "previous", "fingerprint"}
 """What may differ: sealed fields, hashes, and the time of day."""
