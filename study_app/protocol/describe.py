@@ -21,8 +21,9 @@ from study_app.protocol.trials.tracks import design_of
 READING_WORDS_PER_S = 3.0
 PAGE_S = 5.0
 ANSWER_S = 6.0
+CHOICE_S = 2.0
 """How long people take, for the expected duration [choice]: read (180 words a minute) and turn a page, answer one
-statement."""
+statement, choose an interval."""
 
 
 BLINDINGS = {
@@ -95,7 +96,8 @@ def _block_s(protocol: Protocol, block: Block, language: str) -> float:
     task_s = protocol.tasks[block.task].expected_s
     if block.design is not None:
         design = design_of(protocol, block)
-        answering = ANSWER_S + design.between_s + design.feedback_s * design.shows_feedback(block.phase == "practice")
+        answer_s = CHOICE_S if design.reply == "choice" else ANSWER_S
+        answering = answer_s + design.between_s + design.feedback_s * design.shows_feedback(block.phase == "practice")
         task_s = design.intervals * task_s + (design.intervals - 1) * design.pause_s
     return order.trials * (task_s + answering) + resting
 

@@ -87,7 +87,7 @@ def test_a_name_is_looked_up_in_the_working_folder_first(tmp_path: Path, monkeyp
     ("name", "words"),
     [
         ("rek2042", 'did you mean "rek2024"?'),
-        ("elsewhere", "known: demo, "),
+        ("elsewhere", "known: delaydetect, "),
         ("folder/rek2024.toml", "no such file"),
         ("rek2024.toml", "no such file"),
         (".", "is a folder"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, Final
 
 from pydantic import BaseModel
 
@@ -11,6 +11,11 @@ from study_app.protocol.formats import relax
 from study_app.protocol.model import Protocol
 
 LIQUID_FILE = "A liquid file with one liquid, in place of the keys of this table: its path, relative to this file."
+
+
+LINEAR_DRAG: Final = {"properties": {"law": {"const": "linear"}}, "required": ["law"]}
+NEED_NO_DENSITY: Final = [{"required": ["file"]}, {"properties": {"drag": LINEAR_DRAG}, "required": ["drag"]}]
+"""Liquids without a density: those of a file, and in format 2 dampers."""
 
 
 @cache
@@ -27,7 +32,7 @@ def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
                 part["required"].remove("id")
                 if "body" in part["properties"]:  # a liquid of a study may be that of a file instead
                     part["properties"]["file"] = {"type": "string", "description": LIQUID_FILE}
-                    part["if"], part["then"] = {"not": {"required": ["file"]}}, {"required": part.pop("required")}
+                    part["if"], part["then"] = {"not": {"anyOf": NEED_NO_DENSITY}}, {"required": part.pop("required")}
     if of is Protocol:
         relax(described)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}

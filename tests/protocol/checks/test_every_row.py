@@ -326,7 +326,7 @@ def test_the_summary_of_a_block_of_levels_names_design_unit_force_and_duration()
     assert "Levels Weber fraction 0.02 to 0.6 (constant), 14 trials per standard" in said
     assert "Comparisons damping_nspm from 8.16 to 12.8 N·s/m" in said
     assert "Force at the pace 1.0 to 1.6 N at 0.126 m/s" in said
-    assert "Duration about 4 min" in said
+    assert "Duration about 3 min" in said
     assert "2 % error of an interval's delivered level" in said
 
 

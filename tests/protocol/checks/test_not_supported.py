@@ -14,7 +14,6 @@ STIMULUS = 'stimulus = "viscosity"'
     ("old", "new", "place"),
     [
         ("[conditions.oil]", "[conditions.oil]\nforce_delay_ms = 10", "conditions.oil.force_delay_ms"),
-        ("[tasks.stir]", "[analysis]\nparticipants = 20\n[tasks.stir]", "analysis.participants"),
         *(
             (
                 'kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 8',
