@@ -15,7 +15,7 @@ import click
 from study_app import __version__
 from study_app.cli import data, identify, listing, model, power, report, screenshots, study, validate
 from study_app.cli.devices import devices, emulate_falcon
-from study_app.cli.evidence import accuracy, cfd, soak, stability, timing
+from study_app.cli.evidence import accuracy, cfd, soak, stability, thresholds, timing
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands
 from study_app.errors import StudyError
 
@@ -50,6 +50,7 @@ MODULES = (
     cfd,
     soak,
     timing,
+    thresholds,
     screenshots,
 )
 

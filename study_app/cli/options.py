@@ -16,7 +16,7 @@ GROUPS: Final = {
     "Study": "check design power run resume rehearse studies sessions workspace",
     "Data": "export plot report unblind exclude include verify rebuild reproduce replay",
     "Model": "scene simulate identify figures",
-    "Evidence": "accuracy stability timing soak cfd validate-report screenshots",
+    "Evidence": "accuracy stability timing soak cfd validate validate-report screenshots",
     "Devices": "devices emulate-falcon",
 }
 

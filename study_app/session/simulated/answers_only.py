@@ -23,7 +23,7 @@ from study_app.protocol.trials.stimuli import DELAY, Stimulated
 from study_app.protocol.trials.task import AnyTask
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
-from study_app.session.simulated.design_observer import Comparison
+from study_app.session.simulated.design_observer import OBSERVER, Comparison
 from study_app.session.simulated.observers import reading_s
 from study_app.session.simulated.participant import SimulatedParticipant
 from study_app.session.simulated.trial_features import FEELING, Feelings, feelings
@@ -105,7 +105,7 @@ class _Answering(SimulatedParticipant):
         self._store: SimulatedSession = kept.begin(who, clock)
         own = self._store.protocol
         schedule = build_schedule(own, who, seed)
-        super().__init__(study, schedule)
+        super().__init__(study, schedule, OBSERVER)
         self._state = open_session(own, schedule, kept.key.codes, study.study.languages[0], secret=kept.key.nonce)
 
     def run(self) -> None:
@@ -143,7 +143,7 @@ class _Answering(SimulatedParticipant):
         felt = self._feelings[block, presented.condition]
         self._feels = felt[int(len(felt) * self._stream(f"{trial}/felt")())]
         if self._state.due is not None:
-            attended = Comparison.of(self._study, self._study.blocks[block])
+            attended = Comparison.of(self._study, self._study.blocks[block], self.observer)
             self._sensed_in.setdefault(trial, []).append(attended.sensed(self._feels))
 
     def _seconds(self) -> float:

@@ -1,9 +1,9 @@
 """SIMULATED answers to trials of intervals: an observer who compares what was felt or seen, never a level.
 
 What reaches the observer is a resistance (mean force over speed) or a delay, with Gaussian noise: in proportion to the
-resistance (Weber's law), of constant spread for a delay. Estimates follow a power law with exponent 1/2 (Stevens 1957,
-Psychological Review 64, 153). The observer's numbers are plausible, not measured **[choice]**. Only sums, products,
-quotients and square roots are used, so that answers are the same on every machine.
+resistance (Weber's law), of constant spread for a delay; `Observer` plants both thresholds. Estimates follow a power
+law with exponent 1/2 (Stevens 1957, Psychological Review 64, 153). The observer's numbers are plausible, not measured
+**[choice]**. Only sums, products, quotients and square roots are used, so that answers are the same on every machine.
 """
 
 from __future__ import annotations
@@ -20,21 +20,48 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.question import ItemView, plain_number
 from study_app.protocol.questions.rating import RatingView
+from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.stimuli import DELAY
 from study_app.protocol.trials.tracks import design_of, stimulus_of
 
 Draw = Callable[[], float]
 
-WEBER_FRACTION: Final = 0.24
-"""Of resistance, at 75 % correct in two intervals."""
-DELAY_JND_S: Final = 0.025
-"""Of a delay, at 75 % correct in two intervals [s]."""
 _Z_75: Final = 0.6745
-LAPSES: Final = 0.02
-"""So often an answer is given at random."""
 LEAST_SPEED_MPS: Final = 0.01
 MODULUS: Final = 10.0
 """The number that the first stimulus is given."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observer:
+    """What a simulated participant can tell apart.
+
+    Attributes
+    ----------
+    weber_fraction : float
+        Of resistance, at 75 % correct in two intervals without lapses.
+    delay_jnd_s : float
+        Of a delay, likewise [s].
+    lapses : float
+        So often an answer is given at random.
+    """
+
+    weber_fraction: float = 0.24
+    delay_jnd_s: float = 0.025
+    lapses: float = 0.02
+
+    @property
+    def resistance_noise(self) -> float:
+        """The standard deviation of what a resistance is taken for, as a share of it."""
+        return self.weber_fraction / (_Z_75 * math.sqrt(1 + (1 + self.weber_fraction) ** 2))
+
+    @property
+    def delay_noise_s(self) -> float:
+        """The standard deviation of what a delay is taken for [s]."""
+        return self.delay_jnd_s / (math.sqrt(2) * _Z_75)
+
+
+OBSERVER: Final = Observer()
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,15 +70,16 @@ class Comparison:
 
     delays: bool
     smallest: bool
+    observer: Observer
 
     @classmethod
-    def of(cls, protocol: Protocol, block: Block) -> Comparison:
+    def of(cls, protocol: Protocol, block: Block, observer: Observer) -> Comparison:
         """Return what the question of a block is about."""
         if block.stimulus is not None:
             stimulus = stimulus_of(protocol, block)
-            return cls(stimulus.vary == DELAY, stimulus.direction == "down")
+            return cls(stimulus.vary == DELAY, stimulus.direction == "down", observer)
         delays = {protocol.conditions[name].delay_ms for name in block.conditions}
-        return cls(len(delays) > 1, smallest=False)
+        return cls(len(delays) > 1, smallest=False, observer=observer)
 
     def sensed(self, felt: Felt) -> float:
         """Return what is attended to: a delay [s], or a resistance [N·s/m]."""
@@ -59,12 +87,23 @@ class Comparison:
 
     def noisy(self, sensed: float, draw: Draw) -> float:
         """Return what the observer takes it for."""
-        noise = (sum(draw() for _ in range(12)) - 6) / (math.sqrt(2) * _Z_75)  # nearly normal
-        return sensed + DELAY_JND_S * noise if self.delays else sensed * (1 + WEBER_FRACTION * noise)
+        noise = sum(draw() for _ in range(12)) - 6  # nearly normal
+        observer = self.observer
+        return (
+            sensed + observer.delay_noise_s * noise if self.delays else sensed * (1 + observer.resistance_noise * noise)
+        )
 
     def distinct(self, difference: float, about: float) -> bool:
         """Return whether a difference is taken for one."""
-        return abs(difference) > (DELAY_JND_S if self.delays else WEBER_FRACTION * abs(about))
+        observer = self.observer
+        return abs(difference) > (observer.delay_jnd_s if self.delays else observer.weber_fraction * abs(about))
+
+    def choose(self, design: Design, sensed: Sequence[float], mean: float, draw: Draw) -> str:
+        """Return the answer of a design with choices to what was sensed; ``mean`` is that of the block so far."""
+        taken = [self.noisy(one, draw) for one in sensed]
+        if draw() < self.observer.lapses:
+            return design.answers[int(len(design.answers) * draw())]
+        return design.simulated(taken, mean, self)
 
 
 def answer(
@@ -74,6 +113,7 @@ def answer(
     sensed: Sequence[float],
     before: Sequence[float],
     draw: Draw,
+    observer: Observer,
 ) -> Value:
     """Return the answer to a trial of intervals.
 
@@ -91,16 +131,15 @@ def answer(
         What was sensed in the block's earlier intervals, in order.
     draw : callable
         Uniform numbers in [0, 1).
+    observer : Observer
+        Who answers.
     """
-    attended = Comparison.of(protocol, block)
-    taken = [attended.noisy(one, draw) for one in sensed]
+    attended = Comparison.of(protocol, block, observer)
     known = [*before, *sensed]
     mean, first = sum(known) / len(known), known[0]
     if isinstance(item, ChoiceView):
-        options = [option for option, _ in item.options]
-        if draw() < LAPSES:
-            return options[int(len(options) * draw())]
-        return design_of(protocol, block).simulated(taken, mean, attended)
+        return attended.choose(design_of(protocol, block), sensed, mean, draw)
+    taken = [attended.noisy(one, draw) for one in sensed]
     ratio = taken[-1] / (first if not isinstance(item, RatingView) else mean) if mean > 0 and first > 0 else 1.0
     if isinstance(item, RatingView):
         points = len(item.labels)

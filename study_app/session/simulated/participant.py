@@ -11,7 +11,7 @@ from study_app.protocol.forms.simulated_observer import Felt, rater
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, stream
 from study_app.session.pages import ChoicePage, DesignPage, Page, QuestionnairePage
-from study_app.session.simulated.design_observer import answer
+from study_app.session.simulated.design_observer import Observer, answer
 from study_app.session.simulated.observers import Choice, Draw, choices, filled_in, newly_shown
 from study_app.session.transitions.events import Chosen, Event, ItemShown, Submitted
 
@@ -25,14 +25,17 @@ class SimulatedParticipant(ABC):
         What is run.
     schedule : Schedule
         In what order.
+    observer : Observer
+        What is told apart in trials of intervals.
     """
 
-    def __init__(self, study: Protocol, schedule: Schedule) -> None:
+    def __init__(self, study: Protocol, schedule: Schedule, observer: Observer) -> None:
         self.answers = 0
         self.page: Page | None = None
         self._study = study
         self._seed, self._who = schedule.seed, schedule.participant
         self._trials = {trial.number: trial for trial in schedule.trials}
+        self.observer = observer
         self._person = rater(self._stream("person"))
 
     @abstractmethod
@@ -81,7 +84,7 @@ class SimulatedParticipant(ABC):
         if trial is not None and block is not None and block.design is not None:
             sensed = self._sensed(block)
             before = [one for number in sorted(sensed) if number < trial for one in sensed[number]]
-            given = answer(self._study, block, page.items[0], sensed[trial], before, draw)
+            given = answer(self._study, block, page.items[0], sensed[trial], before, draw, self.observer)
             return choices(page.items, {page.items[0].id: given}, draw, changes_mind=not isinstance(page, ChoicePage))
         assert isinstance(page, QuestionnairePage)  # noqa: S101 - only designs have other pages
         return filled_in(page, self._felt(trial), self._person, draw)

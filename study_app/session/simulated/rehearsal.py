@@ -24,6 +24,7 @@ from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule
 from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at, source_to_resume
+from study_app.session.simulated.design_observer import OBSERVER, Observer
 from study_app.session.simulated.rehearsed_session import RehearsedSession, rehearsal_rig
 from study_app.session.unkept import Unkept
 from study_app.store.blinded.allocation import session_protocol
@@ -48,6 +49,7 @@ def rehearse(
     results: Path | None = None,
     recordings: bool = True,
     progress: Callable[[str], object] | None = None,
+    observer: Observer = OBSERVER,
 ) -> Path:
     """Run a session each of P001, P002 … and return the study folder.
 
@@ -67,6 +69,8 @@ def rehearse(
         Whether every tick of the servo and every frame of a trial is kept.
     progress : callable, optional
         Called with a line after each session.
+    observer : Observer, optional
+        What participants tell apart in trials of intervals.
 
     Raises
     ------
@@ -105,7 +109,7 @@ def rehearse(
             )
             store = begin(folder, study, source, start, clock=SessionClock(rig.servo.now_ns))
             own = session_protocol(StudyFolder(folder), study, person, 1)
-            lasted_s, answers = _run(own, build_schedule(own, person, seed), rig, store, FIRST)
+            lasted_s, answers = _run(own, build_schedule(own, person, seed), rig, store, FIRST, observer)
             proof = store.fingerprint
         if progress is not None:
             took_s = time.perf_counter() - began
@@ -151,10 +155,12 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
         )
         own = session_protocol(locate(session_folder)[0], study, person, begun["session"])
         schedule = build_schedule(own, person, seed)
-        _run(own, schedule, rig, store, resume_at(own, schedule, lines, store.key))
+        _run(own, schedule, rig, store, resume_at(own, schedule, lines, store.key), OBSERVER)
 
 
-def _run(study: Protocol, schedule: Schedule, rig: Rig, store: SessionStore, start: Start) -> tuple[float, int]:
+def _run(
+    study: Protocol, schedule: Schedule, rig: Rig, store: SessionStore, start: Start, observer: Observer
+) -> tuple[float, int]:
     """Run an open session to its end; return how long it lasted in its own time [s], and its answers."""
     with store:
         known = (
@@ -162,7 +168,7 @@ def _run(study: Protocol, schedule: Schedule, rig: Rig, store: SessionStore, sta
             if start is FIRST
             else _felt_in_whole_session(study, schedule, rig.device.name, store.key.codes, store.key.nonce)
         )
-        rehearsal = RehearsedSession(study, schedule, rig, store, start, known=known)
+        rehearsal = RehearsedSession(study, schedule, rig, store, start, known=known, observer=observer)
         rehearsal.run()
     return store.clock.seconds(), rehearsal.answers
 

@@ -30,7 +30,7 @@ from study_app.session.pages import (
 from study_app.session.ports import KeptSession, Ports
 from study_app.session.resume import FIRST, Start
 from study_app.session.runner import Runner
-from study_app.session.simulated.design_observer import Comparison
+from study_app.session.simulated.design_observer import OBSERVER, Comparison, Observer
 from study_app.session.simulated.observers import Draw, Senses, hand_for, reading_s, rest
 from study_app.session.simulated.participant import SimulatedParticipant
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeAsked
@@ -71,6 +71,8 @@ class RehearsedSession(SimulatedParticipant):
         Called after every trial or interval with the trial's number and what was felt in it until then, by interval.
     known : mapping of int to tuple of Felt, optional
         What is answered by instead, by trial number.
+    observer : Observer, optional
+        What is told apart in trials of intervals.
     """
 
     def __init__(
@@ -82,8 +84,9 @@ class RehearsedSession(SimulatedParticipant):
         start: Start = FIRST,
         felt: Callable[[int, tuple[Felt, ...]], object] | None = None,
         known: Mapping[int, tuple[Felt, ...]] | None = None,
+        observer: Observer = OBSERVER,
     ) -> None:
-        super().__init__(study, schedule)
+        super().__init__(study, schedule, observer)
         self._known = known or {}
         self._tell_felt = felt
         self.rig = rig
@@ -193,7 +196,7 @@ class RehearsedSession(SimulatedParticipant):
         return NOTHING_FELT if trial is None else {**self._felt_in, **self._known}[trial][-1]
 
     def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
-        sensed = Comparison.of(self._study, block).sensed
+        sensed = Comparison.of(self._study, block, self.observer).sensed
         felt_in = {**self._felt_in, **self._known}
         return {
             number: [*map(sensed, felt)] for number, felt in felt_in.items() if self._trials[number].block == block.id

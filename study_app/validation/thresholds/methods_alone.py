@@ -1,0 +1,146 @@
+"""Studies of equal observers through the choice of levels and the analysis alone: no servo, no store.
+
+What is presented is what was requested, so that errors are those of methods and estimates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis.designs.thresholds import thresholds
+from study_app.analysis.results.levels import ThresholdFound
+from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.protocol.orders.schedule import build_schedule, draw_key
+from study_app.protocol.streams import stream
+from study_app.protocol.trials.answered import heard_of
+from study_app.protocol.trials.due import Due, next_level
+from study_app.protocol.trials.keyed import Key, draw_secret
+from study_app.protocol.trials.method import Heard
+from study_app.protocol.trials.stimuli import DELAY
+from study_app.protocol.trials.tracks import design_of, method_of, stimulus_of
+from study_app.session.simulated.design_observer import Comparison
+from study_app.validation.thresholds.planted import Planted
+
+PEOPLE: Final = 10
+COLUMNS: Final = ("participant", "block", "standard", "level", "level_delivered", "analysed", "success")
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFound:
+    """What the analysis of one simulated study found, in the order of the standards.
+
+    Attributes
+    ----------
+    group : tuple of tuple of float
+        Of each standard threshold, low and high of the group.
+    own : tuple of tuple of tuple of float
+        Likewise of each participant.
+    """
+
+    group: tuple[tuple[float, float, float], ...]
+    own: tuple[tuple[tuple[float, float, float], ...], ...]
+
+    @property
+    def mean(self) -> float:
+        """The geometric mean of the group's thresholds over the standards."""
+        return math.exp(sum(math.log(one[0]) for one in self.group) / len(self.group))
+
+    def mean_of(self, people: int) -> float:
+        """Return the geometric mean over standards and the first participants."""
+        values = [math.log(one[0]) for person in self.own[:people] for one in person]
+        return math.exp(sum(values) / len(values))
+
+
+def simulate(one: Planted, number: int, seed: int, people: int = PEOPLE) -> StudyFound:
+    """Return what a study of equal observers finds; ``number`` names its draws.
+
+    Parameters
+    ----------
+    one : Planted
+        What is planted.
+    number : int
+        Number of the study.
+    seed : int
+        Of all randomness.
+    people : int
+        Number of participants.
+    """
+    random = stream(seed, f"validate/{one.name}/{number}").random
+    key = Key(draw_key(one.protocol, random), draw_secret(random))
+    names = [f"P{person:03d}" for person in range(1, people + 1)]
+    rows = [row for name in names for row in _rows(one, key, name, seed)]
+    frame = pd.DataFrame(rows, columns=list(COLUMNS)).astype({"level_delivered": "Float64", "success": "boolean"})
+    found = list(thresholds(_level_block(one), frame))
+    group = tuple(_ends(row) for row in found if row.participant is None)
+    own = tuple(tuple(_ends(row) for row in found if row.participant == name) for name in names)
+    return StudyFound(group, own)
+
+
+def slopes(one: Planted, found: StudyFound) -> list[float]:
+    """Return each participant's slope of ln JND over ln standard."""
+    logarithms = np.log(one.standards)
+    weber = stimulus_of(one.protocol, one.block).level_kind == "weber"
+    jnds = [
+        [math.log(row[0] * (standard if weber else 1.0)) for row, standard in zip(person, one.standards, strict=True)]
+        for person in found.own
+    ]
+    return [float(np.polyfit(logarithms, values, 1)[0]) for values in jnds]
+
+
+def _ends(row: ThresholdFound) -> tuple[float, float, float]:
+    assert row.low is not None and row.high is not None  # noqa: S101, PT018 - ten participants have an interval
+    return row.threshold, row.low, row.high
+
+
+def _level_block(one: Planted) -> LevelBlock:
+    block, protocol = one.block, one.protocol
+    return LevelBlock(
+        id=block.id,
+        title=block.id,
+        phase=block.phase,
+        design=design_of(protocol, block),
+        stimulus=stimulus_of(protocol, block),
+        settings=(),
+        method=method_of(protocol, block),
+    )
+
+
+def _rows(one: Planted, key: Key, person: str, seed: int) -> Iterator[tuple[Any, ...]]:
+    """Yield a row of `COLUMNS` for each trial of one participant."""
+    protocol, block = one.protocol, one.block
+    schedule = build_schedule(protocol, person, seed)
+    design, attended = design_of(protocol, block), Comparison.of(protocol, block, one.observer)
+    heard: list[Heard] = []
+    total, count = 0.0, 0
+    for trial in schedule.trials:
+        if trial.block != block.id:
+            continue
+        due = next_level(protocol, key, schedule, trial, heard)
+        if due is None:
+            continue
+        sensed = list(_sensed(due))
+        total, count = total + sum(sensed), count + len(sensed)
+        draw = keyed_draw(key, person, trial.number)
+        answer = attended.choose(design, sensed, total / count, draw)
+        answered = heard_of(protocol, block, trial.number, trial.code, due.level, due.arrangement, answer)
+        heard.append(
+            Heard(answered.trial, answered.code, answered.level, answered.success, answered.correct, due.catch)
+        )
+        yield person, block.id, due.standard, due.level, due.level, due.analysed, answered.success
+
+
+def keyed_draw(key: Key, person: str, trial: int) -> Any:
+    """Return the source of a participant's draws in one trial."""
+    return stream(int.from_bytes(key.secret[:4], "big"), f"observer/{person}/{trial}").random
+
+
+def _sensed(due: Due) -> Iterator[float]:
+    """Yield what is presented in each interval: a delay [s], or a number of the liquid."""
+    for interval in due.intervals:
+        yield interval.value / 1000 if interval.vary == DELAY else interval.value

@@ -1,0 +1,153 @@
+"""Planted thresholds are recovered, and a method, an interval or an observer that is wrong is found."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.protocol.load import load, parse
+from study_app.protocol.streams import stream
+from study_app.protocol.trials.kinds import default_design
+from study_app.session.simulated.design_observer import OBSERVER, Comparison, Observer
+from study_app.validation.thresholds.methods_alone import StudyFound, simulate, slopes
+from study_app.validation.thresholds.planted import SHIPPED, Planted, planted
+from study_app.validation.thresholds.verdicts import Verdict, markdown, spread, table, verdicts
+from study_app.validation.thresholds.whole_pipeline import run
+from tests.compiled import needs_servo
+
+SMALL = """\
+format = 2
+study.name = "small"
+[liquids.damper]
+drag = { law = "linear", damping_nspm = 8 }
+[tasks.stir]
+kind = "follow"
+cycles = 1
+[stimuli.damping]
+vary = "damping_nspm"
+levels = [0.02, 0.6]
+[methods.short]
+kind = "questplus"
+trials = 20
+[blocks.thicker]
+stimulus = "damping"
+design = "2ifc"
+method = "short"
+"""
+
+
+@pytest.fixture(scope="module")
+def one() -> Planted:
+    return planted("small", parse(SMALL.encode(), "small.toml"))
+
+
+@pytest.fixture(scope="module")
+def studies(one: Planted) -> list[StudyFound]:
+    return [simulate(one, number, seed=1) for number in range(20)]
+
+
+@pytest.mark.parametrize(
+    ("delays", "standard", "threshold"),
+    [(False, 8.0, 0.24), (False, 32.0, 0.24), (True, 0.0, 0.025), (True, 0.2, 0.025)],
+)
+def test_an_observer_is_correct_in_75_percent_at_the_planted_threshold(
+    delays: bool, standard: float, threshold: float
+) -> None:
+    attended = Comparison(delays, smallest=False, observer=replace(OBSERVER, lapses=0.0))
+    comparison = standard + threshold if delays else standard * (1 + threshold)
+    draw, design = stream(3, "observer").random, default_design("2ifc")
+    n = 20_000
+    correct = sum(attended.choose(design, [standard, comparison], 0.0, draw) == "second" for _ in range(n))
+    assert correct / n == pytest.approx(0.75, abs=0.01)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_shipped_studies_have_a_planted_threshold_within_their_levels(name: str) -> None:
+    shipped = planted(name, load(name))
+    stimulus = shipped.protocol.stimuli[str(shipped.block.stimulus)]
+    low, high = stimulus.levels
+    assert low < shipped.threshold < high
+    assert (shipped.exponent is None) == (len(shipped.standards) == 1)
+
+
+def test_what_has_no_threshold_is_refused() -> None:
+    with pytest.raises(ValueError, match="thickness has no main block"):
+        planted("thickness", load("thickness"))
+    ran = CliRunner().invoke(commands, ["validate", "thickness"])
+    assert ran.exit_code == 2
+    assert "nothing can be planted in it" in ran.output
+
+
+def test_studies_are_the_same_in_any_order_and_on_any_number_of_workers(
+    one: Planted, studies: list[StudyFound]
+) -> None:
+    with ThreadPoolExecutor(2) as executor:
+        again = list(executor.map(partial(simulate, one, seed=1), reversed(range(4))))
+    assert again[::-1] == studies[:4]
+    assert simulate(one, 0, seed=2) != studies[0]
+    assert simulate(one, 1, seed=1) != studies[0]
+
+
+def test_the_threshold_is_recovered(one: Planted, studies: list[StudyFound]) -> None:
+    judged = {row.what: row for row in verdicts(one, studies)}
+    assert {what for what, row in judged.items() if not row.holds} <= {
+        "studies of 10 within ±15 %"
+    }  # 20 trials are few
+    assert one.threshold == 0.24
+    assert 0.1 < spread(studies, 3) < 0.6
+    assert spread(studies, 10) < spread(studies, 3)
+
+
+def scaled(found: StudyFound, factor: float, width: float = 1.0) -> StudyFound:
+    def moved(row: tuple[float, float, float]) -> tuple[float, float, float]:
+        value, low, high = (factor * end for end in row)
+        return value, value * (low / value) ** width, value * (high / value) ** width
+
+    return StudyFound(tuple(map(moved, found.group)), tuple(tuple(map(moved, own)) for own in found.own))
+
+
+def test_a_biased_estimate_and_intervals_that_are_too_narrow_are_found(one: Planted, studies: list[StudyFound]) -> None:
+    biased = {row.what: row.holds for row in verdicts(one, [scaled(found, 1.2) for found in studies])}
+    assert not biased["mean error of the threshold"]
+    narrow = {row.what: row.holds for row in verdicts(one, [scaled(found, 1.0, 0.5) for found in studies])}
+    assert narrow["mean error of the threshold"]
+    assert not narrow["coverage of participants' 95 % intervals"]
+
+
+def test_slopes_tell_a_constant_jnd_from_webers_law() -> None:
+    protocol = parse(SMALL.replace("levels =", "standards = [4, 8, 16]\nlevels =").encode(), "small.toml")
+    three = planted("three", protocol)
+    assert three.exponent == 1
+    rows = tuple((0.24, 0.2, 0.3) for _ in range(3))
+    assert slopes(three, StudyFound(rows, (rows, rows))) == pytest.approx([1, 1])
+    constant = tuple((0.96 / standard, 0.1, 0.3) for standard in (4, 8, 16))
+    assert slopes(three, StudyFound(constant, (constant,))) == pytest.approx([0], abs=1e-12)
+
+
+@pytest.mark.slow
+@needs_servo
+def test_the_whole_program_recovers_it_and_another_observer_is_found(one: Planted, tmp_path: Path) -> None:
+    (tmp_path / "small.toml").write_text(SMALL)
+    source = str(tmp_path / "small.toml")
+    judged = list(run(one, source, tmp_path / "study", 0.25, seed=1))
+    assert [row.holds for row in judged] == [True, True, True], markdown(judged)
+    assert judged[0].what == "intervals delivered as requested"
+    dull = replace(one, observer=Observer(weber_fraction=2.0))
+    other = list(run(dull, source, tmp_path / "other", 0.05, seed=1))
+    assert other[2].limit.startswith("2 ± 3 SD")
+    assert not other[2].holds, "the levels end at 0.6"
+
+
+def test_tables_have_a_row_for_each_value() -> None:
+    rows = [Verdict("a", "error", "+1 %", "within ±5 %", True), Verdict("a", "coverage", "50 %", "95 %", False)]
+    assert markdown(rows).splitlines()[2:] == [
+        "| a | error | +1 % | within ±5 % | yes |",
+        "| a | coverage | 50 % | 95 % | no |",
+    ]
+    assert table(rows).decode().splitlines()[1] == "a,error,+1 %,within ±5 %,true"
