@@ -20,6 +20,7 @@ from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import quartiles_or_none
 from study_app.analysis.tables.study import Study
 from study_app.analysis.tables.tracks import answers_timed, tracks
+from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.trials.design import Reply
 
 SUMMARIES: Final[dict[Reply, Summary]] = {"choice": "share", "rating": "mean", "number": "geometric mean"}
@@ -54,6 +55,8 @@ def _block(
         summary=SUMMARIES[block.design.reply],
         counts=block.counts,
         vary=None if stimulus is None else stimulus.vary,
+        quantity=None if stimulus is None else quantity_words(stimulus.vary),
+        unit=None if stimulus is None else quantity(stimulus.vary).unit,
         level_kind=None if stimulus is None else stimulus.level_kind,
         spacing="linear" if stimulus is None else stimulus.spacing,
         guess_rate=block.design.guess_rate if block.has_correct_answer else None,

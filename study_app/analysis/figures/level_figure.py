@@ -36,6 +36,7 @@ ASIDE: Final = 0.025
 """How far the points of one standard are from those of the next, as a share of the axis."""
 COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
 LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
+UNITLESS: Final = "weber"
 
 
 def level_pictures(
@@ -97,6 +98,20 @@ def mean_words(found: LevelsFound) -> str:
     return "geometric mean" if found.summary == "geometric mean" else "mean"
 
 
+def level_words(found: LevelsFound) -> str:
+    """Return what a level is, with its unit: "Weber fraction of viscosity", "Viscosity [Pa·s]", "Condition"."""
+    if found.quantity is None:
+        return "Condition"
+    words = f"{LEVELS[found.level_kind]}{found.quantity}"
+    unit = "" if found.level_kind == UNITLESS or not found.unit else f" [{found.unit}]"
+    return words[:1].upper() + words[1:] + unit
+
+
+def with_unit(found: LevelsFound, value: float) -> str:
+    """Return a value of the varied number with its unit."""
+    return f"{value:g} {found.unit or ''}".rstrip()
+
+
 def _chance(found: LevelsFound) -> str:
     return "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
 
@@ -118,8 +133,7 @@ def _draw(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
         _panel(axes, found, person, first=column == 0)
         for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
             label.set_fontproperties(sheet.font(6.5))
-    unit = "condition" if found.vary is None else f"{LEVELS[found.level_kind]}{found.vary}"
-    sheet.text(LEFT_PT, height - 10, unit, size=7, colour=style.TEXT_SOFT)
+    sheet.text(LEFT_PT, height - 10, level_words(found), size=7, colour=style.TEXT_SOFT)
     return sheet
 
 
@@ -132,7 +146,7 @@ def _keys(sheet: Sheet, found: LevelsFound) -> None:
         return
     x = sheet.width_pt - MARGIN_PT
     for standard, colour in reversed(list(zip(standards, COLOURS, strict=False))):
-        words = f"standard {standard:g}"
+        words = f"standard {with_unit(found, standard)}"
         x -= sheet.text_width(words, 7)
         sheet.text(x, 28, words, size=7, colour=colour)
         x -= 10

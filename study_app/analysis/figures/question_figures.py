@@ -45,10 +45,11 @@ def question_pictures(
 
 def _picture(study: Study, asked: AskedQuestion, found: QuestionFound, name: str, forms: Sequence[str]) -> Picture:
     figure = FIGURES[found.figure or ""]
-    look = partial(Look, found.short, answer_figures.marks(study), (counted(study.n, "participant"),))
+    title = f"{found.title}: {found.short}"
+    look = partial(Look, title, answer_figures.marks(study), (counted(study.n, "participant"),))
     files = {
         form: style.file_bytes(
-            figure.draw(asked, found, look(style.fonts_for(form))).figure, form, f"{study.name}: {found.short}"
+            figure.draw(asked, found, look(style.fonts_for(form))).figure, form, f"{study.name}: {title}"
         )
         for form in forms
     }

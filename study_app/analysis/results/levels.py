@@ -61,9 +61,10 @@ class LevelsFound:
     """A block of levels.
 
     ``summary`` says how the answers at a level are summarised, ``counts`` what a share is of ("correct"); ``vary`` is
-    the varied number, ``level_kind`` what a level is (weber, difference, value), both None where conditions are
-    compared; ``family`` is the psychometric function of the thresholds; ``adaptive``: answers chose the levels;
-    ``guess_rate`` is the share at chance, ``bounds`` are the ends of a scale. Without the key only ``times`` are known.
+    the varied number, ``quantity`` its name in words, ``unit`` its unit, ``level_kind`` what a level is (weber,
+    difference, value), all None where conditions are compared; ``family`` is the psychometric function of the
+    thresholds; ``adaptive``: answers chose the levels; ``guess_rate`` is the share at chance, ``bounds`` are the ends
+    of a scale. Without the key only ``times`` are known.
     """
 
     block: str
@@ -74,6 +75,8 @@ class LevelsFound:
     summary: Summary
     counts: str
     vary: str | None = None
+    quantity: str | None = None
+    unit: str | None = None
     level_kind: str | None = None
     spacing: str = "linear"
     guess_rate: float | None = None

@@ -14,6 +14,7 @@ from study_app.protocol.analysis_plan import Published
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of
+from study_app.protocol.quantities import quantity
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, did_you_mean
 from study_app.protocol.table import Table
@@ -139,6 +140,10 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
     else:
         try:
             present_value(protocol, stimulus)
+            quantity(stimulus.vary)
+        except KeyError:
+            message = f"{stimulus.vary} does not belong to a liquid: it holds for the whole session"
+            yield Fault((*place, "vary"), message, "a number of the liquid, or delay_ms")
         except StudyError:
             known = {DELAY, *number_names(protocol.scene_for(condition))}
             message = f'there is no number "{stimulus.vary}" in condition "{condition}"'

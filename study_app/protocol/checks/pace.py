@@ -18,6 +18,7 @@ from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol, Reach
+from study_app.protocol.quantities import quantity
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.trials.stimuli import DELAY, Stimulus
 from study_app.protocol.trials.tracks import condition_of, method_of, standards_of, stimulus_of
@@ -121,7 +122,7 @@ def _clipped_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
     task, stimulus = protocol.tasks[block.task], stimulus_of(protocol, block)
     if not isinstance(task, Follow):
         return
-    unit = f" {stimulus.unit}".rstrip()
+    unit = f" {quantity(stimulus.vary).unit}".rstrip()
     for standard, level, scene in ends(protocol, block):
         for message, hint in _clipped(scene, task, f"{stimulus.comparison(standard, level):g}{unit}"):
             yield Fault(("stimuli", str(block.stimulus), "levels"), message, hint)

@@ -27,7 +27,10 @@ def asked(design: Design, languages: Sequence[str]) -> Questionnaire:
 
 
 def _item(design: Design, text: Localised, languages: Sequence[str]) -> Question:
-    about = {"id": design.name, "text": text, "short": design.name}
+    short: Localised = {language: words(language).design_short for language in languages}
+    if design.item is not None:
+        short = design.item.replace("_", " ").capitalize()
+    about = {"id": design.name, "text": text, "short": short}
     if design.reply == "rating":
         return Rating(**about, scale=str(getattr(design, "scale", "")))
     if design.reply == "number":

@@ -16,8 +16,6 @@ LevelKind: TypeAlias = Literal["weber", "difference", "value"]
 
 DELAY: Final = "delay_ms"
 """The one varied number that belongs to the condition, not to its liquid."""
-UNITS: Final = {"_nspm": "N·s/m", "_pa_s": "Pa·s", "_kg_m3": "kg/m³", "_mps": "m/s", "_ms": "ms", "_m": "m", "_s": "s"}
-"""Units by the ends of names, longer ends first."""
 MOST_DELAY_MS: Final = 1000
 CONSTANT_LEVELS: Final = 7
 LEVELS_MOST: Final = 201
@@ -44,11 +42,6 @@ class Stimulus(Table):
     direction: Literal["up", "down"] = Field(
         default="up", description="Whether the comparison is above or below the standard."
     )
-
-    @property
-    def unit(self) -> str:
-        """The unit of the varied number, such as "N·s/m"; empty where its name ends in none."""
-        return next((unit for ending, unit in UNITS.items() if self.vary.endswith(ending)), "")
 
     @property
     def level_kind(self) -> LevelKind:

@@ -9,6 +9,7 @@ from study_app.haptics.model.overrides import override
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
+from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.stimuli import DELAY
 from study_app.protocol.trials.tasks.follow import Follow
 from study_app.protocol.trials.tracks import (
@@ -48,7 +49,8 @@ def design_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
     )
     pairs = product(standards_of(protocol, block), levels)
     compared = [stimulus.comparison(standard, level) for standard, level in pairs]
-    yield "Comparisons", f"{stimulus.vary} from {min(compared):.4g} to {max(compared):.4g} {stimulus.unit}".rstrip()
+    unit = quantity(stimulus.vary).unit
+    yield "Comparisons", f"{stimulus.vary} from {min(compared):.4g} to {max(compared):.4g} {unit}".rstrip()
     task = protocol.tasks[block.task]
     if isinstance(task, Follow) and stimulus.vary != DELAY:
         pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps

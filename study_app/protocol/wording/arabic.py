@@ -49,6 +49,7 @@ ARABIC = Words(
     number_needed="أدخل {kind}.",
     and_="و",
     small_numbers=("1", "2", "3", "4", "5", "6", "7", "8", "9", "10"),
+    design_short="الإجابة",
     design_questions={
         "forced_choice": "أيّهما كان أقوى؟",
         "abx": "أيّ من الأول والثاني تكرّر؟",

@@ -49,6 +49,7 @@ DUTCH = Words(
     number_needed="Voer {kind} in.",
     and_="en",
     small_numbers=("Eén", "Twee", "Drie", "Vier", "Vijf", "Zes", "Zeven", "Acht", "Negen", "Tien"),
+    design_short="Antwoord",
     design_questions={
         "forced_choice": "Welke was sterker?",
         "abx": "Welke van de eerste twee werd herhaald?",

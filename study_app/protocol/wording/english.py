@@ -49,6 +49,7 @@ ENGLISH = Words(
     number_needed="Enter {kind}.",
     and_="and",
     small_numbers=("One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten"),
+    design_short="Answer",
     design_questions={
         "forced_choice": "Which one was stronger?",
         "abx": "Which of the first two was repeated?",

@@ -49,6 +49,7 @@ FRENCH = Words(
     number_needed="Saisissez {kind}.",
     and_="et",
     small_numbers=("Une", "Deux", "Trois", "Quatre", "Cinq", "Six", "Sept", "Huit", "Neuf", "Dix"),
+    design_short="Réponse",
     design_questions={
         "forced_choice": "Lequel était le plus fort ?",
         "abx": "Lequel des deux premiers a été répété ?",

@@ -49,6 +49,7 @@ GERMAN = Words(
     number_needed="Geben Sie {kind} ein.",
     and_="und",
     small_numbers=("Eine", "Zwei", "Drei", "Vier", "Fünf", "Sechs", "Sieben", "Acht", "Neun", "Zehn"),
+    design_short="Antwort",
     design_questions={
         "forced_choice": "Was war stärker?",
         "abx": "Was von den ersten beiden wurde wiederholt?",

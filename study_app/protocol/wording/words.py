@@ -72,6 +72,7 @@ class Words:
     small_numbers: tuple[str, ...]
 
     # trials of intervals
+    design_short: str  # names the answer to a design's question, in figures and tables
     design_questions: Mapping[str, str]  # by the kind of design; forced choices share one
     design_answers: Mapping[str, str]  # by the answer's id
     interval_begins: str  # {ordinal}, an answer such as "First", and {of}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections import Counter, defaultdict
 from pathlib import Path
 from typing import Any
@@ -195,3 +196,17 @@ def test_plot_draws_the_questions_and_levels_of_a_study_without_statements(opene
     written = {path.name for path in plot(opened_levels, tmp_path)}
     assert {f"levels-{block}.{form}" for block in BLOCKS for form in ("png", "svg", "pdf", "txt")} < written
     assert "question-viscosity-choice_2ifc.png" in written
+
+
+def test_figures_name_quantities_and_titles_not_keys(reported: Path) -> None:
+    drawn = {path.stem: path.read_text(encoding="utf-8") for path in reported.glob("*.svg")}
+    assert "Weber fraction of viscosity<" in drawn["levels-viscosity"]
+    assert "standard 2 Pa·s<" in drawn["levels-viscosity"]
+    assert "Viscosity [Pa·s]<" in drawn["levels-number"]
+    assert "Condition<" in drawn["levels-pairs"]
+    assert "Viscosity: Answer<" in drawn["question-viscosity-choice_2ifc"]
+    for name, svg in drawn.items():
+        shown = re.findall(r">([^<>]+)</text>", svg)
+        assert len(shown) > 3, name
+        assert [words for words in shown if "_" in words] == [], name
+    assert "Comparison [Pa·s]</th>" in (reported / "report.html").read_text()

@@ -95,6 +95,13 @@ def study(*edits: tuple[str, str]) -> Protocol:
             'did you mean "damping_nspm"?',
         ),
         (
+            [('vary = "damping_nspm"', 'vary = "rate_hz"')],
+            "stimuli.damping.vary",
+            'vary = "rate_hz"',
+            "rate_hz does not belong to a liquid: it holds for the whole session",
+            "a number of the liquid, or delay_ms",
+        ),
+        (
             [('condition = "damper"', 'condition = "both"')],
             "stimuli.damping.condition",
             'condition = "both"',

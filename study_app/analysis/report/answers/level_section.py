@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from study_app.analysis.figures.level_figure import LEVELS, mean_words, summary_words
+from study_app.analysis.figures.level_figure import level_words, mean_words, summary_words, with_unit
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound
@@ -109,14 +109,15 @@ def _of_group(found: LevelsFound) -> str:
 
 def _columns(found: LevelsFound) -> Iterator[tuple[str, str]]:
     """Yield the columns that say what was presented: heading, and field of the answers."""
+    unit = f" [{found.unit}]" if found.unit else ""
     if any(one.standard is not None for one in found.of_group):
-        yield "Standard", "standard"
+        yield f"Standard{unit}", "standard"
     if found.level_kind not in {None, "value"}:
-        yield f"{LEVELS[found.level_kind]}{found.vary}".capitalize(), "level"
-    if found.vary is None or not any(one.standard is not None for one in found.of_group):
-        yield found.vary or "Comparison", "comparison"
+        yield level_words(found), "level"
+    if found.level_kind == "value" and not any(one.standard is not None for one in found.of_group):
+        yield level_words(found), "comparison"
     else:
-        yield f"Comparison ({found.vary})", "comparison"
+        yield f"Comparison{unit}", "comparison"
 
 
 def _of_people(found: LevelsFound, standard: float | None) -> str:
@@ -125,7 +126,7 @@ def _of_people(found: LevelsFound, standard: float | None) -> str:
     own = {(one.participant, one.level, one.comparison): one for one in found.answers if one.standard == standard}
     names = [_plain(one.comparison if one.level is None else one.level) for one in shown]
     return table(
-        ("Participant" if standard is None else f"Standard {standard:g}", *names),
+        ("Participant" if standard is None else f"Standard {with_unit(found, standard)}", *names),
         [
             [person, *(_cell(found, own.get((person, one.level, one.comparison))) for one in shown)]
             for person in found.people

@@ -1,0 +1,63 @@
+"""Quantities by name, in words and with units: the one table that lab, reports and figures read.
+
+Names are ``table.field``, as ``haptics.model.overrides`` takes them; the parameters of an effect are in its descriptor.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from study_app.haptics.model.effect import Parameter
+from study_app.haptics.model.effects import EFFECTS, NAMED
+from study_app.protocol.model import MAX_FORCE_N
+
+_P = Parameter
+_OF_THE_SCENE: Final = {
+    it.name: it
+    for it in (
+        _P("condition.delay_ms", "Visual delay", "ms"),
+        _P("liquid.density_kg_m3", "Density", "kg/m³", 1.0, logarithmic=True, decimals=1),
+        _P("liquid.viscosity_pa_s", "Viscosity", "Pa·s", 1e-5, 1000.0, 1e-3, True, factor=1e3, shown_unit="mPa·s"),
+        _P("region.centre_m", "Centre", "m", -1.0, 1.0, factor=1e3, shown_unit="mm", decimals=0),
+        _P("region.size_m", "Size", "m", 0.01, 5.0, factor=1e3, shown_unit="mm", logarithmic=True, decimals=0),
+        _P("region.radius_m", "Radius", "m", 0.01, 5.0, factor=1e3, shown_unit="mm", logarithmic=True, decimals=0),
+        _P("region.height_m", "Height", "m", 0.01, 5.0, factor=1e3, shown_unit="mm", logarithmic=True, decimals=0),
+        _P("body.diameter_m", "Diameter", "m", most=0.5, factor=1e3, shown_unit="mm", logarithmic=True, decimals=1),
+        _P("body.drag_coefficient", "Drag coefficient", "", most=2.0),
+        _P("body.density_kg_m3", "Body density", "kg/m³", 1.0, logarithmic=True, decimals=1),
+        _P("velocity.alpha", "Weight", "", 0.005, logarithmic=True, decimals=3),
+        _P("velocity.samples", "Samples", "ticks", whole=True, decimals=0),
+        _P("velocity.tolerance_m", "Tolerance", "m", most=1e-3, factor=1e6, shown_unit="µm", decimals=0),
+        _P("knee.threshold_mps", "Speed knee", "m/s", 0.1, 20.0, logarithmic=True),
+        _P("scene.scale", "Scale", "", 0.5, 50.0, logarithmic=True, decimals=2),
+        _P("scene.force_limit_n", "Force limit", "N", 0.1, MAX_FORCE_N, decimals=1),
+        _P("accuracy.relative", "Negligible share", "", factor=100.0, shown_unit="%", decimals=1),
+        _P("accuracy.absolute_n", "Negligible force", "N", most=2.0, decimals=3),
+        _P("motion.speed_mps", "Fastest", "m/s", 0.01, 20.0, logarithmic=True),
+        _P("motion.acceleration_mps2", "Hardest", "m/s²", 0.1, 200.0, logarithmic=True, decimals=1),
+    )
+}
+QUANTITIES: Final = _OF_THE_SCENE | {it.name: it for effect in EFFECTS for it in effect.controls}
+
+
+def quantity(name: str) -> Parameter:
+    """Return what a stimulus varies: ``table.field``, or a field alone, which means the first table that has it.
+
+    Raises
+    ------
+    KeyError
+        The table has no such quantity.
+    """
+    for known, row in QUANTITIES.items():
+        if name in {known, known.partition(".")[2]}:
+            return row
+    raise KeyError(name)
+
+
+def quantity_words(name: str) -> str:
+    """Return the name of a quantity within a sentence, such as "viscosity" or "wake scaling"."""
+    row = quantity(name)
+    table = row.name.partition(".")[0]
+    effect = NAMED.get(table)
+    words = row.label if effect is None or effect.with_liquid else f"{effect.label} {row.label}"
+    return words.lower()
