@@ -8,13 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from study_app.errors import StoreError
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
 from study_app.store.limits import Broken, beyond_limits
+
+UNDELIVERED: Final = "invalid"
+"""The outcome of a trial of which an interval was not delivered as requested."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +68,8 @@ class Progress:
     says why a trial's recording could not be kept, ``lacking`` how many samples it lacks.
 
     ``of_intervals`` is the latest trial if it is one of intervals; ``trial_answers`` are the answers to all of them,
-    ``repeated`` says of each why it was presented again.
+    ``repeated`` says of each why it was presented again, ``undelivered`` names the limits that its intervals broke, in
+    every attempt that was not delivered as requested.
     """
 
     start: Line = field(default_factory=dict)
@@ -101,6 +105,7 @@ class Progress:
     of_intervals: int | None = None
     trial_answers: dict[int, TrialAnswer] = field(default_factory=dict)
     repeated: dict[int, tuple[str, ...]] = field(default_factory=dict)
+    undelivered: dict[int, tuple[str, ...]] = field(default_factory=dict)
     _reason: str = ""
     _left_open: dict[tuple[int, int], dict[str, Given]] = field(default_factory=dict)
 
@@ -130,6 +135,8 @@ class Progress:
                 self._note_repetition(line)
             case "trial_ended":
                 self._end_trial(line)
+            case "interval_ended" if line.get("invalid"):
+                self.undelivered[line["trial"]] = (*self.undelivered.get(line["trial"], ()), *line["invalid"])
             case "target_reached":
                 self.targets += 1
             case "item_shown" | "choice":
@@ -205,7 +212,7 @@ class Progress:
     def _end_trial(self, line: Line) -> None:
         self.trial_lasted_s = None if self.trial_since_s is None else line["t_s"] - self.trial_since_s
         self.task_done = line["outcome"] in ("complete", "timeout")
-        self.invalid += line["outcome"] == "invalid"
+        self.invalid += line["outcome"] == UNDELIVERED
         if self.task_done:
             self.broken[line["trial"]] = beyond_limits(line, self.start.get("limits", {}))
         else:
@@ -215,7 +222,7 @@ class Progress:
         """Keep why a trial of intervals is presented again."""
         trial = line["trial"]
         self.of_intervals = trial if is_of_intervals(line) else None
-        if self.of_intervals is not None and line["attempt"] > 1:
+        if self.of_intervals is not None and line["attempt"] > 1 and self._reason != UNDELIVERED:
             self.repeated[trial] = (*self.repeated.get(trial, ()), self._reason or "interrupted")
         self._reason = ""
 

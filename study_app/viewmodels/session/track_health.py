@@ -18,6 +18,19 @@ from study_app.viewmodels.number_words import grouped
 
 LONG_RUN: Final = 8
 """So many equal answers in a row are marked."""
+UNDELIVERED: Final[Mapping[str, str]] = {
+    "lateness_ms": "the servo was late",
+    "worst_gap_ms": "the servo missed ticks",
+    "delay_error_ms": "the visual delay was not kept",
+    "frame_gap_ms": "frames were late or missing",
+    "withheld_percent": "force was withheld for safety",
+    "targets_percent": "too few targets were reached",
+    "level_error_percent": "the force was not as requested",
+    "level_error_ms": "the visual delays did not differ as requested",
+    "pace_error_percent": "the hand did not keep the pace",
+    "force_limit_n": "the force limit was reached",
+}
+"""Why an interval was invalid, by the key of the limit that it broke."""
 FAST_S: Final = 0.3
 """A median time to answer below this is marked [s]."""
 
@@ -29,11 +42,16 @@ def track_words(progress: Progress, schedule: Schedule, trial: Trial, choices: M
     """
     own = [one.number for one in schedule.trials if (one.block, one.code) == (trial.block, trial.code)]
     answers = [progress.trial_answers[number] for number in own if number in progress.trial_answers]
+    limits = Counter(limit for number in own for limit in progress.undelivered.get(number, ()))
+    behind = [number for number in own if progress.steps.get(number, progress.here) < progress.here]
+    given_up = [number for number in behind if number in progress.undelivered and number not in progress.trial_answers]
     reasons = Counter(reason for number in own for reason in progress.repeated.get(number, ()))
     return (
         f"Track {trial.code}: {len(answers)} of at most {grouped(len(own))} answered",
         *(_of_answers(answers, choices) if answers else ()),
         *(f"repeated {count}: {reason}" for reason, count in reasons.items()),
+        *(f"not delivered {count}: {UNDELIVERED.get(limit, limit)}" for limit, count in limits.items()),
+        *([f"{len(given_up)} unanswered: no attempt was delivered"] if given_up else []),
     )
 
 

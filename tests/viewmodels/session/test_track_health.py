@@ -8,8 +8,9 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.trials.limits import Limits
 from study_app.store.progress import Progress
-from study_app.viewmodels.session.track_health import track_words
+from study_app.viewmodels.session.track_health import UNDELIVERED, track_words
 from tests.protocol.trials.studies import study
 
 CHOICES = {"first": "First", "second": "Second"}
@@ -97,3 +98,38 @@ def test_a_trial_without_intervals_has_no_track(told: Told) -> None:
     assert told.progress.of_intervals == 1
     told.progress.take({"event": "trial_started", "t_s": 30.0, "trial": 2, "attempt": 1})
     assert told.progress.of_intervals is None
+
+
+def undelivered(told: Told, number: int, attempt: int, *limits: str) -> None:
+    """Present a trial whose first interval broke limits."""
+    told.tell("trial_started", 1.0, trial=number, attempt=attempt)
+    told.tell("interval_ended", 2.0, trial=number, attempt=attempt, interval=1, outcome="complete", invalid=limits)
+    told.tell("trial_ended", 3.0, trial=number, attempt=attempt, outcome="invalid")
+
+
+def test_reasons_of_invalid_intervals_are_words_without_a_number(told: Told) -> None:
+    undelivered(told, 1, 1, "pace_error_percent")
+    undelivered(told, 1, 2, "pace_error_percent", "force_limit_n")
+    told.trial(1, "first", attempt=3)
+    assert told.lines()[-2:] == (
+        "not delivered 2: the hand did not keep the pace",
+        "not delivered 1: the force limit was reached",
+    )
+    assert not any("repeated" in line for line in told.lines())
+
+
+def test_the_reason_is_shown_while_the_trial_is_presented_again(told: Told) -> None:
+    undelivered(told, 1, 1, "level_error_percent")
+    assert told.lines()[-1] == "not delivered 1: the force was not as requested"
+
+
+def test_a_trial_that_was_never_delivered_is_counted_as_unanswered(told: Told) -> None:
+    for attempt in (1, 2, 3):
+        undelivered(told, 1, attempt, "level_error_ms")
+    assert told.lines()[-1] == "not delivered 3: the visual delays did not differ as requested"
+    told.trial(2, "first")
+    assert told.lines()[-1] == "1 unanswered: no attempt was delivered"
+
+
+def test_every_limit_that_makes_an_interval_invalid_has_words() -> None:
+    assert set(UNDELIVERED) == {*Limits.model_fields, "force_limit_n"} - {"attempts"}
