@@ -274,7 +274,11 @@ PARTICIPANTS: tuple[Column, ...] = (
 )
 
 GROUP = Column("group", "text", "The participant's group; n/a in a study without groups.", may_miss=True, sealed=True)
-TRIALS_2: tuple[Column, ...] = (*_TRIALS_BY_NAME.values(), GROUP)
+TRIALS_2: tuple[Column, ...] = (
+    *_TRIALS_BY_NAME.values(),
+    _count("intervals", "Number of intervals that this attempt presented; n/a if its block has no design."),
+    GROUP,
+)
 """Columns of trials in a study whose protocol has format 2."""
 
 PARTICIPANTS_2: tuple[Column, ...] = (
@@ -320,6 +324,7 @@ LATER = frozenset(
         "limiter_estimator",
         "recording_lost",
         "group",
+        "intervals",
         "invalid_reasons",
         *(column.name for column in DELIVERED),
     }

@@ -69,7 +69,8 @@ class SessionRows:
                 which = line["trial"], line["attempt"]
                 repeats = bool(self.trials) and self.trials[-1]["trial"] == line["trial"]
                 self._started[which], self._places[which] = line, len(self.trials)
-                self.trials.append(_trial(self._session, line) | self._group)
+                presented = {"intervals": 0 if is_of_intervals(line) else None} if self._group else {}
+                self.trials.append(_trial(self._session, line) | presented | self._group)
                 if self._reconnected and repeats:
                     _note(self.trials[-1], f"presented again: {self._reconnected}")
                 self._reconnected = ""
@@ -119,12 +120,12 @@ class SessionRows:
 
     def _begin_interval(self, line: Line) -> None:
         which = line["trial"], line["attempt"]
-        if which not in self._places:
-            raise _never_started(line)
         before = self._intervals.get((*which, line["interval"] - 1))
         self._intervals[*which, line["interval"]] = len(self.intervals)
         earlier = None if before is None else self.intervals[before]
-        self.intervals.append(interval_row(self.trials[self._places[which]], self._started[which], line, earlier))
+        trial = self._row_of(line)
+        trial["intervals"] += 1
+        self.intervals.append(interval_row(trial, self._started[which], line, earlier))
 
     def _interval_of(self, line: Line) -> Row:
         if (place := self._intervals.get((line["trial"], line["attempt"], line["interval"]))) is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -130,6 +131,9 @@ def test_tables_say_invalid_and_why_without_a_number(session: Path) -> None:
     assert {row["valid"] for row in trials if row["outcome"] == "invalid"} == {"false"}
     assert {row["invalid_reasons"] for row in intervals} == {"n/a", "level_error_percent force_limit_n"}
     assert not {"value_delivered", "force_share", "apparent_mass_kg", "pace_mps"} & {*intervals[0]}
+    presented = Counter((row["trial"], row["attempt"]) for row in intervals)
+    assert {(row["trial"], row["attempt"]): int(row["intervals"]) for row in trials} == presented
+    assert len(set(presented.values())) == 2, "an attempt ends with the interval that was not delivered"
 
 
 def test_journal_recordings_and_answers_agree(study: Path) -> None:

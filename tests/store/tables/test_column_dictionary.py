@@ -17,8 +17,8 @@ def test_every_column_of_every_file_has_its_line() -> None:
     sections = {title: columns for title, _, _, columns in SECTIONS}
     responses, trials, participants = TABLES.values()
     tables = [responses, RESPONSES_2, trials, INTERVALS, participants]
-    outcome, group = OF_FORMAT_2
-    assert (outcome.levels[-1][0], group) == ("invalid", GROUP)
+    outcome, intervals, group = OF_FORMAT_2
+    assert (outcome.levels[-1][0], intervals.name, group) == ("invalid", "intervals", GROUP)
     assert list(sections.values()) == [*tables, OF_FORMAT_2, EXCLUSIONS, SAMPLES, FRAMES]
     parts = re.split(r"^<summary><b>([\w, ]+)</b>: ", text, flags=re.MULTILINE)
     assert parts[1::2] == [*sections, "Journal"]
