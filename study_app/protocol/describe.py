@@ -10,6 +10,8 @@ from study_app.protocol import liquid_summary
 from study_app.protocol.checks.level_warnings import level_warnings
 from study_app.protocol.groups.own_protocol import Variant, variants
 from study_app.protocol.groups.steps import sessions_differ
+from study_app.protocol.instruments.summary import sources
+from study_app.protocol.instruments.summary import warnings as from_memory
 from study_app.protocol.model import Block, Condition, Protocol, Questionnaire, Reach
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.latin_squares import row_count
@@ -200,11 +202,6 @@ def _block(protocol: Protocol, block: Block, language: str) -> Iterable[str]:
     return _titled(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
 
 
-def _design(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
-    yield from design_rows(protocol, block)
-    yield "Duration", f"about {_block_s(protocol, block, language) / 60:.0f} min"
-
-
 def _presentation(protocol: Protocol, block: Block) -> str:
     words = _counted(order_of(protocol, block).trials, "trial")
     if block.repetitions > 1:
@@ -302,7 +299,7 @@ def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
         for item in questionnaire.items
     ]
     scores = f"  Scores: {', '.join(questionnaire.scores)}" if questionnaire.scores else ""
-    return (title, *_aligned(rows), *([scores] if scores else []))
+    return (title, *_aligned(rows), *([scores] if scores else []), *(f"  {line}" for line in sources(questionnaire)))
 
 
 def _kind(item: Question, context: Context) -> str:
@@ -329,6 +326,7 @@ def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:
         *liquid_summary.warnings(protocol),
         *level_warnings(protocol),
         *_incomplete(protocol),
+        *from_memory(protocol),
     ):
         yield "Warnings", *(f"  {warning}" for warning in warnings)
 
