@@ -69,7 +69,7 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     correct = has_correct_answer(design, None if block.stimulus is None else protocol.stimuli[block.stimulus])
     for key in ("until", "catch"):
         if not correct and getattr(block, key) is not None:
-            what = "a level that is a value" if design.has_correct_answer else f'a design "{block.design}"'
+            what = "a forced choice at levels of values" if design.has_correct_answer else f'a design "{block.design}"'
             yield Fault((*place, key), f"{what} has no correct answer", "omit the key")
     if not correct and design.feedback not in {None, "never"}:
         yield Fault(
@@ -83,6 +83,13 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     if block.stimulus is None:
         if not design.has_standard:
             yield Fault((*place, "design"), "has one interval and compares nothing", "vary a stimulus")
+        return
+    if design.has_standard and standards_of(protocol, block) == (None,):
+        yield Fault(
+            (*place, "design"),
+            f'"{block.design}" presents a standard in noise trials, and a level that is a value has none',
+            'level = "weber" or "difference"',
+        )
         return
     if not design.adaptive and method_of(protocol, block).adaptive:
         yield Fault(

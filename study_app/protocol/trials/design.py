@@ -72,6 +72,8 @@ class Design(Table):
     has_correct_answer: ClassVar[bool] = True
     has_noise: ClassVar[bool] = False
     """Whether some slots present the standard alone."""
+    asks_for_more: ClassVar[bool] = False
+    """Whether the correct answer is the interval with more (or less), so that levels on both sides have none."""
     success_name: ClassVar[str] = "correct"
     """What `success` counts."""
     adaptive: ClassVar[bool] = True

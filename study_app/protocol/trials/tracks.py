@@ -99,9 +99,13 @@ def method_of(protocol: Protocol, block: Block) -> Method:
 
 
 def has_correct_answer(design: Design, stimulus: Stimulus | None) -> bool:
-    """Return whether an answer can be correct: where a level is the value itself, no interval is."""
-    by_value = design.has_standard and stimulus is not None and stimulus.level_kind == "value"
-    return design.has_correct_answer and not by_value
+    """Return whether an answer can be correct.
+
+    A level that is a value may be above or below the standard: then an interval can still be the odd one, or the same
+    as another, but a forced choice between more and less has no correct answer.
+    """
+    by_value = stimulus is not None and stimulus.level_kind == "value"
+    return design.has_correct_answer and not (by_value and design.asks_for_more)
 
 
 def stimulus_of(protocol: Protocol, block: Block) -> Stimulus:

@@ -72,7 +72,9 @@ REST = '[pages.rest]\nkind = "break"\ntitle = "Rest"\nbody = "Rest."\n'
             "until",
             "has no correct answer",
         ),
-        ([VALUE, ('design = "2ifc"', 'design = "2ifc"\nuntil = { right = 1, of = 2 }')], "", "until", "a value has no"),
+        ([VALUE, ('design = "2ifc"', 'design = "2ifc"\nuntil = { right = 1, of = 2 }')], "", "until",
+         "a forced choice at levels of values has no correct answer"),
+        ([VALUE, ('design = "2ifc"', 'design = "yesno"')], "", "design", '"yesno" presents a standard'),
         ([VALUE, NUMBER], '[designs.n]\nkind = "2ifc"\nfeedback = "always"', "feedback", "no answer is correct"),
         ([('design = "2ifc"', 'design = "2ifc"\nuntil = { right = 3, of = 2 }')], "", "right", "3 of 2 answers"),
         (
@@ -92,3 +94,9 @@ def test_a_problem_is_named_with_its_place(edits: list[tuple[str, str]], more: s
     problems = [(problem.place, str(problem)) for problem in caught.value.problems]
     assert any(where.endswith(place) and message in said for where, said in problems), problems
     assert all(problem.line for problem in caught.value.problems)
+
+
+@pytest.mark.parametrize("design", ["oddity", "abx", "samedifferent"])
+def test_designs_whose_answer_is_correct_at_any_level_take_values_feedback_and_a_criterion(design: str):
+    until = 'design = "n"\nuntil = { right = 1, of = 2 }'
+    study(VALUE, ('design = "2ifc"', until), more=f'[designs.n]\nkind = "{design}"\nfeedback = "always"')

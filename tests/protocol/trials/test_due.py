@@ -54,6 +54,26 @@ def test_levels_as_a_number_are_spaced_over_the_range():
     assert {round(due.level, 12) for due in run(protocol, key_of(protocol))} == {0.1, 0.2, 0.4, 0.8}
 
 
+@pytest.mark.parametrize("design", ["oddity", "abx", "samedifferent"])
+def test_values_have_correct_answers_where_none_asks_for_more(design: str):
+    protocol = study(('design = "2ifc"', f'design = "{design}"'), ("levels = [0.1", 'level = "value"\nlevels = [0.1'))
+    key = key_of(protocol)
+    trials = answered(protocol, key, build_schedule(protocol, "P001", 1))
+    assert {one.correct for _, one in trials} == {True}
+    built = design_of(protocol, protocol.blocks["viscosity"])
+    for due, _ in trials:
+        holds = built.arrangements[due.arrangement]
+        assert [one.value for one in due.intervals] == [due.level if held else due.standard for held in holds]
+    answers = {built.correct(due.arrangement) for due, _ in trials}
+    assert answers == set(built.answers)
+
+
+def test_values_have_no_correct_answer_in_a_forced_choice():
+    protocol = study(("levels = [0.1", 'level = "value"\nlevels = [0.1'))
+    trials = answered(protocol, key_of(protocol), build_schedule(protocol, "P001", 1))
+    assert {(one.correct, one.success) for _, one in trials} == {(None, True)}
+
+
 def test_estimation_of_a_value_has_one_interval_and_no_standard():
     protocol = study(
         ('design = "2ifc"', 'design = "estimation"'),

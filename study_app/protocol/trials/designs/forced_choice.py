@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import ClassVar, Literal
 
 from study_app.protocol.trials.design import ORDINALS, Arrangement, Attention, Design, one_differs
 
@@ -15,6 +15,7 @@ class ForcedChoice(Design):
     """
 
     kind: Literal["2ifc", "3ifc", "4ifc"] = "2ifc"
+    asks_for_more: ClassVar[bool] = True
 
     @property
     def wording(self) -> str:
