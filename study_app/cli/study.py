@@ -68,6 +68,11 @@ def design(protocol: str, participants: int, seed: int) -> None:
 @click.option("--device", cls=DeviceName, default=DEFAULT_DEVICE, show_default=True)
 @click.option("--language", metavar="LANG", help="Default: the first language of the protocol.")
 @OPERATOR
+@click.option(
+    "--row-of",
+    metavar="ID",
+    help="Participant who is replaced: take that participant's row of every Williams or Latin square.",
+)
 @WINDOWED
 @SCREEN
 @click.option("--pilot", is_flag=True, help="Pilot session: in a window, marked, stored in results/<study>-pilot.")
@@ -81,6 +86,7 @@ def run(
     device: str,
     language: str | None,
     operator: str,
+    row_of: str | None,
     *,
     windowed: bool,
     screen: int | None,
@@ -103,6 +109,7 @@ def run(
         device_options=given(device_options),
         language=language,
         operator=operator,
+        row_of=row_of,
         windowed=windowed,
         screen=screen,
         results=results,

@@ -321,6 +321,11 @@ class Protocol(Table):
         return tuple(self.blocks[step] for step in self.steps if step in self.blocks)
 
     @property
+    def deals_rows(self) -> bool:
+        """Whether a block is in the order of a square, whose rows are dealt to participants."""
+        return any(block.order in ("williams", "latin") for block in self.blocks_in_order)
+
+    @property
     def forms(self) -> dict[str, Questionnaire]:
         """The questionnaires that are presented on their own, by name, in the order of the session."""
         return {step: self.questionnaires[step] for step in self.steps if step in self.questionnaires}

@@ -277,7 +277,7 @@ def _withheld(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
 
 def _balance(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
     """Say which row of a square the participant takes, where the protocol deals rows."""
-    if not any(block.order in ("williams", "latin") for block in protocol.blocks_in_order):
+    if not protocol.deals_rows:
         return ()
     number = enrolment(facts.participant)
     if number is None:

@@ -10,12 +10,13 @@ from pathlib import Path
 from random import Random
 
 from study_app.devices.registry import descriptor_of
-from study_app.errors import StoreError
+from study_app.errors import SessionError, StoreError
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.latin_squares import enrolment
 from study_app.protocol.orders.schedule import stream
 from study_app.session.resume import find_protocol, source_to_resume
-from study_app.store.folders import locate, study_folder
+from study_app.store.folders import ID_PATTERN, locate, study_folder
 from study_app.store.progress import progress
 from study_app.store.sessions.participant_ids import refuse_never_begun
 from study_app.store.sessions.reopen import check_can_go_on
@@ -28,7 +29,7 @@ class NewSession:
     """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
 
     ``resumes`` is the folder of the session that goes on, None for a new one; ``device_options`` are the values
-    of the device's options, by name.
+    of the device's options, by name. ``row_of`` is the id whose rows of squares the session takes, None: its own.
     """
 
     source: str
@@ -45,6 +46,7 @@ class NewSession:
     recordings: bool = True
     resumes: Path | None = None
     device_options: Mapping[str, str | Path] = field(default_factory=dict)
+    row_of: str | None = None
 
     def read_source(self) -> bytes:
         """Return the protocol's source; of a session that goes on, with its liquid files as they were sealed."""
@@ -115,7 +117,30 @@ def resumed(
         recordings=bool(start.get("recordings")),
         resumes=session_folder,
         device_options=device_options or {},
+        row_of=start.get("row_of"),
     )
+
+
+def check_row(row_of: str | None, study: Protocol) -> None:
+    """Refuse an id whose rows of squares a session is to take where that decides nothing.
+
+    Raises
+    ------
+    SessionError
+        The study deals no rows, or the id has no number that would deal one.
+    """
+    if row_of is None:
+        return
+    if not study.deals_rows:
+        raise SessionError(
+            f"row of {row_of!r}: no block of {study.study.name} has a Williams or Latin order, so no participant has a "
+            "row; leave it out"
+        )
+    if not ID_PATTERN.fullmatch(row_of) or enrolment(row_of) is None:
+        raise SessionError(
+            f"row of {row_of!r}: rows are dealt by the number in a participant's id; give the id of the participant "
+            "who is replaced, such as P007"
+        )
 
 
 def draw_seed() -> int:

@@ -13,7 +13,7 @@ from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
 from study_app.session.masking import Masking
 from study_app.session.preflight import Facts, Screen
-from study_app.session.request import NewSession
+from study_app.session.request import NewSession, check_row
 from study_app.store.blinded.allocation import check_session
 from study_app.store.blinded.blinding import check_conditions
 from study_app.store.clock import SessionClock
@@ -52,6 +52,7 @@ def check(chosen: NewSession, study: Protocol) -> None:
         return
     folder = StudyFolder(chosen.results)
     check_participant(chosen.participant, pilot=chosen.pilot)
+    check_row(chosen.row_of, study)
     check_study(folder, study.study.name)
     check_unused(folder, chosen.participant, chosen.session)
     check_session(folder, study, chosen.participant, chosen.session)
@@ -67,7 +68,7 @@ def measured(rig: Rig, chosen: NewSession, *, sleep: Callable[[float], object] =
         chosen.results,
         device=rig.device.name,
         screen=Screen(refresh_hz=0.0, scaling=1.0),
-        participant=chosen.participant,
+        participant=chosen.row_of or chosen.participant,
         recordings=chosen.recordings,
         lasts_s=MEASURED_S,
         sleep=sleep,
@@ -106,5 +107,6 @@ def open_store(
         pilot=chosen.pilot,
         recordings=chosen.recordings,
         motors_masked=None if masking is None else masking.entry,
+        row_of=chosen.row_of,
     )
     return begin(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))

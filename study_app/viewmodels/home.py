@@ -131,7 +131,7 @@ def interrupted(
             protocol = parse(read(source), source)
             study = locate(session.folder)[0]
             protocol = session_protocol(study, protocol, session.participant, begun.start["session"])
-            schedule = build_schedule(protocol, session.participant, begun.start["seed"])
+            schedule = build_schedule(protocol, session.participant, begun.start["seed"], begun.start.get("row_of"))
             step = resume_at(protocol, schedule, lines).step
         except StudyError:
             continue  # what is wrong with it is said when it is asked for by its folder

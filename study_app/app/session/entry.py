@@ -35,6 +35,7 @@ def run(
     results: Path | None = None,
     pilot: bool = False,
     recordings: bool = True,
+    row_of: str | None = None,
     tell: Callable[[str], object] | None = None,
 ) -> int:
     """Run a session without dialogs; return the exit code when its windows are closed.
@@ -49,6 +50,7 @@ def run(
     windowed, screen : where the participant's window opens; screens count from 1
     results : the study's folder; default ``results/<study>`` of the workspace, of a pilot ``results/<study>-pilot``
     pilot : to try it out: in a window with a frame, apart from the data and marked
+    row_of : the participant who is replaced, whose rows of squares the session takes; default: the participant's own
     recordings : whether every tick of the servo and every frame of a trial is kept
     tell : is given the lines of the pre-flight, before the first page
 
@@ -76,6 +78,7 @@ def run(
         pilot=pilot,
         recordings=recordings,
         device_options=device_options or {},
+        row_of=row_of,
     )
     check(chosen, study)
     if Path(protocol).is_file():

@@ -227,7 +227,7 @@ class LiveSession(QObject):
         self._crash_trace = CrashTrace(self._store.folder.crash)
         self._store.append("preflight", checks=[one.entry for one in found])
         protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
-        schedule = build_schedule(protocol, chosen.participant, chosen.seed)
+        schedule = build_schedule(protocol, chosen.participant, chosen.seed, chosen.row_of)
         start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines, self._store.key)
         if descriptor_of(chosen.device).kind == "seen":
             protocol = without_force(protocol)

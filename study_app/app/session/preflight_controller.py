@@ -223,7 +223,7 @@ def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], .
     if chosen.resumes is None:
         return ()
     own = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
-    schedule = build_schedule(own, chosen.participant, chosen.seed)
+    schedule = build_schedule(own, chosen.participant, chosen.seed, chosen.row_of)
     return resumed_rows(own, schedule, journal.read(locate(chosen.resumes)[1].journal))
 
 

@@ -30,7 +30,7 @@ from study_app.gui.widgets.cards import Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.protocol.groups.steps import refuse_beyond_last
-from study_app.session.request import NewSession, draw_seed, study_results
+from study_app.session.request import NewSession, check_row, draw_seed, study_results
 from study_app.store.sessions.participant_ids import MAX_SESSION, check_participant
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.viewmodels.device_list import device_label, device_or_default
@@ -80,6 +80,7 @@ class NewSessionDialog(QDialog):
         self.session = Number(1, MAX_SESSION, 1)
         self.seed = text_field("Seed")
         self.operator = text_field("Operator")
+        self.row_of = text_field("Replaces participant")
         self.language = Choice()
         self.device = Choice()
         self.device_options = DeviceOptionFields(machine.device_options)
@@ -138,6 +139,7 @@ class NewSessionDialog(QDialog):
         self.participant.textChanged.connect(self._check)
         self.session.valueChanged.connect(self._check)
         self.seed.textChanged.connect(self._check)
+        self.row_of.textChanged.connect(self._check)
         self.results.textChanged.connect(self._check)
         self.ways[0].clicked.connect(lambda: self.session.setValue(self._free[0]))
         self.ways[1].clicked.connect(lambda: self.participant.setText(self._free[1]))
@@ -182,7 +184,11 @@ class NewSessionDialog(QDialog):
         grid.addLayout(both, 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
         folder = field_with_button(self.results, change)
         add_field(grid, 10, 0, "Results folder of this study", folder, hint=self.where, across=2)
-        grid.addWidget(self.device_options, 12, 0, 1, 2)
+        if self.facts.protocol.deals_rows:
+            add_field(
+                grid, 12, 0, "Replaces participant", self.row_of, hint="whose row of the square is taken; else empty"
+            )
+        grid.addWidget(self.device_options, 14, 0, 1, 2)
         self._area = QScrollArea()
         self._area.setWidgetResizable(True)
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -301,12 +307,16 @@ class NewSessionDialog(QDialog):
             if state.fault:
                 return state.fault
             state.used.check_unused(participant, self.session.value())
+            check_row(self._row_of(), self.facts.protocol)
             refuse_beyond_last(self.facts.protocol, self.session.value())
         except StudyError as error:
             return str(error)
         if missing := self.device_options.fault():
             return missing
         return "" if self.seed.hasAcceptableInput() else "the seed is a whole number from 0 to 2147483647"
+
+    def _row_of(self) -> str | None:
+        return self.row_of.text().strip() or None
 
     def _offer_ways(self) -> None:
         """Where the id is used, offer the ways to go on that need no thought; going on with its session is for home."""
@@ -341,4 +351,5 @@ class NewSessionDialog(QDialog):
             results=Path(self.results.text().strip()),
             pilot=self.pilot.isChecked(),
             device_options=self.device_options.values(),
+            row_of=self._row_of(),
         )

@@ -15,7 +15,8 @@ first round, the next as many the second; each round deals all rows in an order 
 stream of the *study*, not of the session, because sessions have seeds of their own and would not fill a round. So a
 session's row depends on the study's name, the block's name and the id alone. It is predictable, which does no harm:
 rows are rows of codes, and what a code stands for is sealed. An id without a number takes a row drawn from the id
-itself: even on average only.
+itself: even on average only. Who replaces a participant can be given that participant's rows: the session then takes
+the rows of that id.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ def enrolment(participant: str) -> int | None:
     return int(numbers[-1]) if numbers else None
 
 
-def row_of(study: str, block: str, rows: int, participant: str) -> int:
+def dealt_row(study: str, block: str, rows: int, participant: str) -> int:
     """Return the row (from 0) that a participant takes in a block of a study."""
     number = enrolment(participant)
     if number is None:

@@ -70,6 +70,7 @@ def reproduce(
     complete: bool,
     group: str | None = None,
     session: int = 1,
+    row_of: str | None = None,
 ) -> tuple[str, ...]:
     """Return how the trials that were run differ from those that receipt, seed and participant give.
 
@@ -89,6 +90,8 @@ def reproduce(
         The participant's group in a study with groups.
     session : int
         The session's number.
+    row_of : str, optional
+        The id whose rows of squares the session took; None: the participant's own.
 
     Raises
     ------
@@ -96,7 +99,7 @@ def reproduce(
         The receipt's protocol does not tell the orders.
     """
     orders = orders_of_receipt(protocol, group=group, session=session)
-    planned = {trial.number: trial for trial in build_schedule(orders, participant, seed).trials}
+    planned = {trial.number: trial for trial in build_schedule(orders, participant, seed, row_of).trials}
     attempts = tuple(recorded)
     found = [
         sentence

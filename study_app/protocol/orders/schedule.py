@@ -20,6 +20,7 @@ williams latin  a row of a square, dealt by the number in the participant's id, 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -28,7 +29,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.order_constraint import Constraint
 from study_app.protocol.orders.block_orders import BlockOrder, FormOrder, Orders, block_codes, orders_of
 from study_app.protocol.orders.constrained import arrange
-from study_app.protocol.orders.latin_squares import row, row_count, row_of
+from study_app.protocol.orders.latin_squares import dealt_row, row, row_count
 from study_app.protocol.streams import Draw, shuffle, stream
 from study_app.protocol.trials.tracks import tracks_of
 
@@ -103,8 +104,11 @@ class Schedule:
         return tuple(step for step in self.steps if isinstance(step, Trial))
 
 
-def build_schedule(protocol: Protocol | Orders, participant: str, seed: int) -> Schedule:
-    """Return the session of ``participant``: a pure function of its arguments."""
+def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, row_of: str | None = None) -> Schedule:
+    """Return the session of ``participant``: a pure function of its arguments.
+
+    ``row_of`` is the id of the participant whose rows of squares the session takes; None: the participant's own.
+    """
     orders = orders_of(protocol) if isinstance(protocol, Protocol) else protocol
     steps: list[Step] = []
     number = 1
@@ -115,7 +119,8 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int) -> 
         if isinstance(step, FormOrder):
             steps.append(FormStep(step.id, _form_items(step, participant, seed)))
             continue
-        for trial in _trials(orders.study, step, participant, seed, number):
+        codes = codes_of(orders.study, step, participant, seed, row_of)
+        for trial in _trials(step, codes, participant, seed, number):
             steps.append(trial)
             if step.break_page is not None and step.break_after(trial.index):
                 steps.append(PageStep(step.break_page))
@@ -123,7 +128,7 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int) -> 
     return Schedule(participant, seed, tuple(steps))
 
 
-def codes_of(study: str, block: BlockOrder, participant: str, seed: int) -> tuple[str, ...]:
+def codes_of(study: str, block: BlockOrder, participant: str, seed: int, row_of: str | None = None) -> tuple[str, ...]:
     """Return the codes of a block's trials, in the order in which ``participant`` meets them."""
     codes, times = block.codes, block.repetitions
     match block.order:
@@ -146,11 +151,11 @@ def codes_of(study: str, block: BlockOrder, participant: str, seed: int) -> tupl
             )
             return tuple(code for code, slots in tracks for _ in range(slots))
         case "williams" | "latin" as square:
-            taken = row_of(study, block.id, row_count(square, len(codes)), participant)
+            taken = dealt_row(study, block.id, row_count(square, len(codes)), row_of or participant)
             return tuple(codes[number] for number in row(square, len(codes), taken, times))
 
 
-def _trials(study: str, block: BlockOrder, participant: str, seed: int, first: int) -> list[Trial]:
+def _trials(block: BlockOrder, codes: Sequence[str], participant: str, seed: int, first: int) -> list[Trial]:
     return [
         Trial(
             number=first + index - 1,
@@ -162,7 +167,7 @@ def _trials(study: str, block: BlockOrder, participant: str, seed: int, first: i
             code=code,
             items=_items(block, participant, seed, index),
         )
-        for index, code in enumerate(codes_of(study, block, participant, seed), start=1)
+        for index, code in enumerate(codes, start=1)
     ]
 
 

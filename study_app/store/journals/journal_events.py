@@ -215,7 +215,7 @@ _KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for co
         "text": "language operator key_hash protocol_hash version device page block phase code item "
         "outcome form group sealed arrangement sha256 frames_sha256 reason by kind text what status previous",
         "study's name": "study",
-        "participant's id": "participant",
+        "participant's id": "participant row_of",
         "recording's name": "recording recording_frames",
         "flag": "simulated pilot recordings measures_sealed intervals",
         "integer": "n format session entry seed torn_bytes trial attempt interval part index of target "

@@ -64,6 +64,8 @@ class SessionStart:
         Whether the trials' samples and frames are kept, through the ``recorder`` of the store.
     motors_masked : mapping, optional
         How the motors of the device are masked, for the receipt; None where that was not asked.
+    row_of : str, optional
+        The id whose rows of squares the session takes; None: the participant's own.
     """
 
     participant: str
@@ -78,6 +80,7 @@ class SessionStart:
     pilot: bool = False
     recordings: bool = False
     motors_masked: Mapping[str, Any] | None = None
+    row_of: str | None = None
 
 
 def begin(
@@ -156,6 +159,7 @@ def first_words(
         "key_hash": key_hash,
         "protocol_hash": protocol_hash(source),
         "version": study_app.__version__,
+        **({} if start.row_of is None else {"row_of": start.row_of}),
     }
     limits = protocol.limits.model_dump(mode="json")
     started = {"format": FORMAT, **facts, "device": start.device.get("name"), "limits": limits}

@@ -70,6 +70,7 @@ def reproduced(session_folder: Path) -> Reproduced:
             complete=complete,
             group=_group(study, lines),
             session=ran["session"],
+            row_of=ran.get("row_of"),
         )
     except (KeyError, TypeError) as error:
         raise StoreError(f"{folder.path}: receipt or journal lack {error}: verify the study's folder") from error
@@ -93,7 +94,7 @@ def _levels(study: StudyFolder, ran: Mapping[str, Any], lines: list[Line], found
     try:
         protocol = own_protocol(whole_protocol(ran["protocol"], key), _group(study, lines), ran["session"])
         orders = orders_of_receipt(ran["protocol"], group=_group(study, lines), session=ran["session"])
-        schedule = build_schedule(orders, ran["participant"], ran["seed"])
+        schedule = build_schedule(orders, ran["participant"], ran["seed"], ran.get("row_of"))
         compared = _Compared(protocol, Key(key.codes, key.nonce), schedule)
         for index, line in enumerate(lines):
             compared.take(line, lines[:index])

@@ -186,7 +186,8 @@ def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, fou
         found.error(path, "contains the hash of another key")
     if not lines:
         return
-    if differing := [name for name in receipt.FACTS if name in held and held[name] != lines[0].get(name)]:
+    compared = [name for name in (*receipt.FACTS, "row_of") if name in held or name == "row_of"]
+    if differing := [name for name in compared if held.get(name) != lines[0].get(name)]:
         found.error(path, f"{', '.join(differing)}: differ from the journal")
     if receipt.other_format(held, lines[0]):
         found.error(

@@ -14,6 +14,7 @@ from study_app.gui.display.screens import ScreenShown
 from study_app.gui.home import new_session_dialog
 from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.gui.widgets.background import Background
+from study_app.protocol.load import source_bytes
 from study_app.session.request import MAX_SEED, draw_seed
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.workstation import MachineSettings
@@ -302,3 +303,26 @@ def test_a_session_beyond_the_last_is_refused(qtbot, tmp_path):
     made.session.setValue(3)
     assert not made.begin.isEnabled()
     assert "permitted: 1 to 2" in made.verdict.text()
+
+
+def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, results, tmp_path):
+    study = tmp_path / "square.toml"
+    study.write_text(source_bytes("demo").decode().replace('\norder = "shuffled"', '\norder = "latin"'))
+    dialog = NewSessionDialog(study_facts(str(study)), results)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    assert dialog.row_of.isVisible()
+    assert dialog.chosen().row_of is None
+    qtbot.keyClicks(dialog.row_of, "P002")
+    assert dialog.begin.isEnabled()
+    assert dialog.chosen().row_of == "P002"
+    dialog.row_of.setText("anna")
+    assert "rows are dealt by the number" in dialog.verdict.text()
+    assert not dialog.begin.isEnabled()
+
+
+def test_replaced_participant_is_not_asked_for_in_a_study_without_squares(qtbot, results):
+    dialog = NewSessionDialog(study_facts("demo"), results)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    assert not dialog.row_of.isVisible()
