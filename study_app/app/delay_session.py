@@ -27,7 +27,7 @@ from study_app.gui.display.opengl import WITHOUT_OPENGL
 from study_app.gui.display.screens import choose_screens
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import parse
-from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
+from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.session.request import NewSession
 from study_app.session.start import open_store
 from study_app.store.recording_files import read_frames
@@ -161,7 +161,7 @@ class _Showing:
     def hold(self) -> tuple[Shown, ...]:
         """Hold the session and return what was shown in it."""
         rig = open_rig(self._chosen.device, study_settings(self._protocol, self._chosen.tremor()))
-        schedule = build_schedule(self._protocol, self._chosen.participant, self._chosen.seed)
+        schedule = self._chosen.schedule(self._protocol)
         try:
             with open_store(self._chosen, self._protocol, self._source, rig, {}) as store:
                 bridge = open_windows(

@@ -14,7 +14,7 @@ from study_app.errors import SessionError, StoreError
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.latin_squares import enrolment
-from study_app.protocol.orders.schedule import stream
+from study_app.protocol.orders.schedule import Schedule, build_schedule, stream
 from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store.folders import ID_PATTERN, locate, study_folder
 from study_app.store.progress import progress
@@ -55,6 +55,10 @@ class NewSession:
     def read_protocol(self) -> Protocol:
         """Return the protocol of `read_source`."""
         return parse(self.read_source(), self.source)
+
+    def schedule(self, protocol: Protocol) -> Schedule:
+        """Return the steps of the session, in the participant's own protocol."""
+        return build_schedule(protocol, self.participant, self.seed, self.row_of)
 
     def tremor(self) -> Random:
         """Return the random numbers of a hand that moves by itself."""

@@ -12,7 +12,7 @@ from typing import Any
 from study_app.errors import ProtocolError, SessionError
 from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial
+from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial, build_schedule
 from study_app.protocol.trials.answered import heard_in
 from study_app.protocol.trials.method import Heard
 from study_app.store.blinded.blinding import Key
@@ -66,6 +66,11 @@ def resume_at(protocol: Protocol, schedule: Schedule, lines: Iterable[Line], key
         before = {trial.number for trial in schedule.steps[:step] if isinstance(trial, Trial)}
         heard = tuple(one for one in heard if one.trial in before)
     return Start(step, progress.presented, heard, progress.invalid if step == progress.step == reached else 0)
+
+
+def begun_schedule(protocol: Protocol, start: Line) -> Schedule:
+    """Return the steps of the session whose journal begins with the line ``start``."""
+    return build_schedule(protocol, start["participant"], start["seed"], start.get("row_of"))
 
 
 def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:

@@ -11,8 +11,8 @@ from pathlib import Path
 from study_app.errors import ProtocolError, StudyError
 from study_app.protocol.load import at_hand, is_scene_file, load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
-from study_app.session.resume import find_protocol, is_rehearsal, resume_at, source_to_resume
+from study_app.protocol.orders.schedule import Schedule, Trial
+from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.folders import locate
@@ -131,7 +131,7 @@ def interrupted(
             protocol = parse(read(source), source)
             study = locate(session.folder)[0]
             protocol = session_protocol(study, protocol, session.participant, begun.start["session"])
-            schedule = build_schedule(protocol, session.participant, begun.start["seed"], begun.start.get("row_of"))
+            schedule = begun_schedule(protocol, begun.start)
             step = resume_at(protocol, schedule, lines).step
         except StudyError:
             continue  # what is wrong with it is said when it is asked for by its folder

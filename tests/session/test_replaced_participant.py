@@ -17,7 +17,9 @@ from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule
 from study_app.session.request import NewSession, resumed
+from study_app.session.resume import begun_schedule
 from study_app.session.start import check, open_store
+from study_app.store.journals import journal
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
@@ -88,10 +90,13 @@ def test_receipt_keeps_the_row_and_reproduce_uses_it(square: Path, row_of: str) 
 
 
 def test_resumed_session_keeps_the_row(square: Path) -> None:
-    _, store = run_one(square, "P025", "P002")
+    protocol, store = run_one(square, "P025", "P002")
     store.close()
     chosen = resumed(store.folder.path, protocol=str(square))
     assert (chosen.participant, chosen.row_of) == ("P025", "P002")
+    planned = build_schedule(protocol, "P025", SEED, "P002")
+    assert chosen.schedule(protocol) == begun_schedule(protocol, journal.read(store.folder.journal)[0]) == planned
+    assert planned != build_schedule(protocol, "P025", SEED)
 
 
 def test_session_without_a_row_of_another_has_no_such_key(square: Path) -> None:

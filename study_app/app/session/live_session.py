@@ -32,7 +32,6 @@ from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse
-from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.wording.without_force import without_force
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.request import NewSession
@@ -227,7 +226,7 @@ class LiveSession(QObject):
         self._crash_trace = CrashTrace(self._store.folder.crash)
         self._store.append("preflight", checks=[one.entry for one in found])
         protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
-        schedule = build_schedule(protocol, chosen.participant, chosen.seed, chosen.row_of)
+        schedule = chosen.schedule(protocol)
         start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines, self._store.key)
         if descriptor_of(chosen.device).kind == "seen":
             protocol = without_force(protocol)

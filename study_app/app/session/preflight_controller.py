@@ -21,7 +21,6 @@ from study_app.gui.theme.theme import Theme
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.tasks.stroke import Stroke
 from study_app.session.preflight import Facts, checks
 from study_app.session.request import NewSession
@@ -223,7 +222,7 @@ def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], .
     if chosen.resumes is None:
         return ()
     own = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
-    schedule = build_schedule(own, chosen.participant, chosen.seed, chosen.row_of)
+    schedule = chosen.schedule(own)
     return resumed_rows(own, schedule, journal.read(locate(chosen.resumes)[1].journal))
 
 
