@@ -45,7 +45,7 @@ def question_pictures(
 
 def _picture(study: Study, asked: AskedQuestion, found: QuestionFound, name: str, forms: Sequence[str]) -> Picture:
     figure = FIGURES[found.figure or ""]
-    title = f"{found.title}: {found.short}"
+    title = found.short if found.short == found.title else f"{found.title}: {found.short}"
     look = partial(Look, title, answer_figures.marks(study), (counted(study.n, "participant"),))
     files = {
         form: style.file_bytes(

@@ -11,7 +11,7 @@ from study_app.analysis.tables.asked_questions import AskedQuestion
 
 
 def _of(asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
-    chosen = [str(response).split() for response in given(answers)["response"]]
+    chosen = [asked.question.counted(str(response)) for response in given(answers)["response"]]
     return {
         **counts_of_missing(answers),
         "counts": {option: sum(option in one for one in chosen) for option in asked.levels},

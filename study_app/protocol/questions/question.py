@@ -108,6 +108,10 @@ class Question(Table):
         """Return all answers in their order, where these are few: as a table holds them, with their words."""
         return {}
 
+    def counted(self, response: str) -> tuple[str, ...]:
+        """Return which of `levels` an answer counts for, as a table holds it: of a ranking, say, the first alone."""
+        return tuple(response.split())
+
     def _shown(self, number: int, context: Context) -> tuple[str, int, str, bool]:
         """Return the fields that the views of all kinds have."""
         return self.id, number, context.text(self.text), self.required
