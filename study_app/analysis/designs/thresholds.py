@@ -19,7 +19,7 @@ from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.psychometrics.posterior import fitted
 from study_app.analysis.statistics.random_effects import group_mean
 from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.protocol.trials.psychometric import Family, analysis_grid, family_of, width_prior_of
+from study_app.protocol.trials.psychometric import Family, analysis_grid, family_of, rises, width_prior_of
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.grid import Grid
 
@@ -35,7 +35,7 @@ class Counts:
 
 def family(block: LevelBlock) -> Family | None:
     """Return the psychometric function of a block; None where no answer enters one."""
-    if block.stimulus is None or block.design.reply != "choice" or block.design.kind == "samedifferent":
+    if block.stimulus is None or not rises(block.stimulus, block.design):
         return None
     return family_of(block.stimulus, block.design)
 

@@ -14,7 +14,7 @@ from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
 from study_app.protocol.trials.method import Method
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of
+from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
 from study_app.store.blinded.blinding import Key
 from study_app.store.blinded.whole_protocol import whole_protocol
 
@@ -43,9 +43,7 @@ class LevelBlock:
     @property
     def counts(self) -> str:
         """What the share of answers at a level is of."""
-        counted = self.design.success_name
-        chosen = counted == "correct" and self.design.has_correct_answer and not self.has_correct_answer
-        return "comparison chosen" if chosen else counted
+        return success_name(self.design, self.stimulus)
 
     def presents_modulus(self, index: int) -> bool:
         """Return whether the trial at this place in the block presents the modulus, which is not analysed."""

@@ -19,6 +19,7 @@ from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, did_you_mean
 from study_app.protocol.table import Table
 from study_app.protocol.trials.kinds import DESIGN_KINDS, METHOD_KINDS
+from study_app.protocol.trials.psychometric import rises
 from study_app.protocol.trials.stimuli import DELAY, MOST_DELAY_MS, Stimulus
 from study_app.protocol.trials.tracks import (
     condition_of,
@@ -96,6 +97,13 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
             (*place, "method"),
             f'"{block.design}" has no track: correct answers determine no level',
             'method = "constant"',
+        )
+    elif method_of(protocol, block).adaptive and not rises(protocol.stimuli[block.stimulus], design):
+        yield Fault(
+            (*place, "method"),
+            f'"{block.design}" at levels of values is answered correctly above and below the standard: '
+            "there is no threshold",
+            'method = "constant", or level = "weber" or "difference"',
         )
     if unknown := [one for one in block.standards if one not in protocol.stimuli[block.stimulus].standards]:
         listed = ", ".join(f"{one:g}" for one in protocol.stimuli[block.stimulus].standards)

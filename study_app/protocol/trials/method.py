@@ -125,8 +125,16 @@ class Method(Table):
         """Yield what is permitted and may still be a mistake: the key and a sentence."""
         return iter(())
 
-    def target(self, design: Design) -> str | None:
-        """Return in words which share of successes its levels aim at; None: at none."""
+    def target(self, guess: float | None, success: str) -> str | None:
+        """Return in words which share of successes its levels aim at; None: at none.
+
+        Parameters
+        ----------
+        guess : float or None
+            The share of successes by guessing, 0 where no answer is correct; None: it is free.
+        success : str
+            What is counted, such as "correct".
+        """
         return None
 
     def rounds(self, stimulus: Stimulus) -> int:

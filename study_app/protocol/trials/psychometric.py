@@ -35,6 +35,15 @@ def is_distance(stimulus: Stimulus) -> bool:
     return stimulus.level_kind != "value"
 
 
+def rises(stimulus: Stimulus, design: Design) -> bool:
+    """Return whether the share of successes can only rise with the level, so that it has a threshold.
+
+    It does not where a level is a value and the odd or the repeated interval is asked for: that is noticed above the
+    standard and below it.
+    """
+    return design.adaptive and (is_distance(stimulus) or not design.has_standard or design.asks_for_more)
+
+
 def family_of(stimulus: Stimulus, design: Design) -> Family:
     """Return the default family: Weibull where a distance of zero must mean chance, else normal."""
     by_chance = is_distance(stimulus) and stimulus.spacing == "log" and design.guess_rate is not None

@@ -15,9 +15,11 @@ from study_app.protocol.trials.tasks.follow import Follow
 from study_app.protocol.trials.tracks import (
     condition_of,
     design_of,
+    has_correct_answer,
     method_of,
     standards_of,
     stimulus_of,
+    success_name,
     tracks_of,
 )
 
@@ -40,7 +42,9 @@ def design_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
     name = LEVELS[stimulus.level_kind]
     of_each = " per standard" if standards else ""
     slots = [track.slots for track in tracks_of(protocol, block)]
-    aimed = "" if (target := method.target(design)) is None else f": {target}"
+    guess = design.guess_rate if has_correct_answer(design, stimulus) else 0.0
+    target = method.target(guess, success_name(design, stimulus))
+    aimed = "" if target is None else f": {target}"
     trials = slots[0] * method.tracks
     tracks = "" if method.tracks == 1 else f" in {method.tracks} tracks"
     yield (

@@ -108,6 +108,12 @@ def has_correct_answer(design: Design, stimulus: Stimulus | None) -> bool:
     return design.has_correct_answer and not (by_value and design.asks_for_more)
 
 
+def success_name(design: Design, stimulus: Stimulus | None) -> str:
+    """Return what a share of answers is of: "correct", "yes", or "comparison chosen" where no answer is correct."""
+    unlike_others = design.has_correct_answer and not has_correct_answer(design, stimulus)
+    return "comparison chosen" if unlike_others else design.success_name
+
+
 def stimulus_of(protocol: Protocol, block: Block) -> Stimulus:
     """Return what a block varies."""
     return protocol.stimuli[str(block.stimulus)]

@@ -53,6 +53,12 @@ stimulus = "around"
 design = "2ifc"
 method = "five"
 
+[blocks.odd]
+task = "stir"
+stimulus = "around"
+design = "oddity"
+method = "five"
+
 [blocks.pairs]
 task = "stir"
 design = "2ifc"
@@ -60,7 +66,7 @@ conditions = ["oil", "other", "late"]
 standard = "oil"
 repetitions = 4
 """
-SEQUENCE = ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "equal", "pairs"]')
+SEQUENCE = ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "equal", "odd", "pairs"]')
 
 
 @pytest.fixture(scope="session")

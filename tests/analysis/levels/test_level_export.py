@@ -38,7 +38,7 @@ def rows(folder: Path, name: str) -> list[dict[str, str]]:
 def test_a_sealed_study_exports_its_intervals_without_what_tells_a_level(sealed_levels: Path, tmp_path: Path) -> None:
     export(sealed_levels, tmp_path)
     intervals = rows(tmp_path, "intervals")
-    assert len(intervals) == 3 * (12 * 2 + 9 + 6 + 7 + 6 * 2 + 8 * 2)
+    assert len(intervals) == 3 * (12 * 2 + 9 + 6 + 7 + 6 * 2 + 6 * 3 + 8 * 2)
     assert SEALED.isdisjoint(intervals[0])
     assert {"level", "standard", "presented", "force_mean_n"} < SEALED
     assert not (tmp_path / "study-levels_description-tracks_data.csv").exists()
@@ -64,7 +64,7 @@ def test_tracks_have_a_row_per_trial_with_what_it_presented(opened_levels: Path,
                 assert row["response_s"] == str(round(item["first_s"] - item["onset_s"], 6))
             if line["event"] == "interval_ended":
                 assert row[f"force_mean_n_{line['interval']}"] == str(line["force_mean_n"])
-    assert len(tracks) == 3 * 48
+    assert len(tracks) == 3 * 54
 
 
 def test_tracks_say_whether_answers_were_correct_and_which_rows_are_analysed(exported: Path) -> None:
@@ -76,6 +76,10 @@ def test_tracks_say_whether_answers_were_correct_and_which_rows_are_analysed(exp
                 assert row["right"] == str(where == int(row["comparison_interval"])).lower()
             case "detect":
                 assert row["right"] == str((row["response"] == "yes") == (row["arrangement"] == "C")).lower()
+            case "odd":
+                odd = "C" if row["arrangement"].count("C") == 1 else "S"
+                where = ["first", "second", "third"].index(row["response"])
+                assert row["right"] == str(where == row["arrangement"].index(odd)).lower()
             case _:
                 assert row["right"] == "n/a", row["block"]
         modulus = row["block"] == "number" and row["index"] == "1"
@@ -115,7 +119,7 @@ def test_codebook_describes_every_column_and_spss_has_labels(exported: Path) -> 
     labels = dict(zip(sav[1].column_names, sav[1].column_labels, strict=True))
     assert labels["level_asked"].startswith("level_asked: ") or "level" in labels["level_asked"]
     assert all(labels.values())
-    assert len(sav[0]) == 3 * 48
+    assert len(sav[0]) == 3 * 54
     assert (exported / "psych-ds" / "data" / "study-levels_description-tracks_data.csv").exists()
 
 

@@ -29,7 +29,7 @@ from study_app.store.verification.leaks import certain_telltales, presented_numb
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo]
-BLOCKS = ["viscosity", "detect", "rate", "number", "equal", "pairs"]
+BLOCKS = ["viscosity", "detect", "rate", "number", "equal", "odd", "pairs"]
 ODD = {"SC": "second", "CS": "first"}
 
 
@@ -108,6 +108,21 @@ def test_where_levels_are_values_no_answer_is_correct(opened_levels: Path) -> No
     assert {one.level: one.count for one in found.of_group} == {level: chosen[level] for level in (0.5, 2.0, 8.0)}
 
 
+def test_the_odd_interval_is_correct_at_values_on_both_sides_of_the_standard_and_has_no_threshold(
+    opened_levels: Path,
+) -> None:
+    found = found_in(opened_levels, "odd")
+    assert (found.counts, found.guess_rate, found.level_kind) == ("correct", 1 / 3, "value")
+    right: Counter[float] = Counter()
+    for _, trial, answer in answers(opened_levels, "odd"):
+        odd = "C" if trial["arrangement"].count("C") == 1 else "S"
+        right[trial["level"]] += answer == ["first", "second", "third"][trial["arrangement"].index(odd)]
+    assert {one.level: one.count for one in found.of_group} == {level: right[level] for level in (0.5, 2.0, 8.0)}
+    assert {one.n for one in found.of_group} == {6}
+    assert (found.family, found.thresholds) == (None, ())
+    assert found_in(opened_levels, "equal").family == "normal"
+
+
 def test_numbers_give_geometric_means_without_the_modulus(opened_levels: Path) -> None:
     found = found_in(opened_levels, "number")
     given: dict[Any, list[float]] = defaultdict(list)
@@ -145,8 +160,8 @@ def test_report_has_a_table_a_figure_and_numbers_of_every_block_of_levels(report
         assert "SIMULATED participants" in caption
         people = {one["participant"] for one in block["answers"]}
         assert people == {None, "P001", "P002", "P003"}
-    assert page.count("Answers at each level</h3>") == 5
-    assert page.count("Time to answer</h3>") == 6
+    assert page.count("Answers at each level</h3>") == 6
+    assert page.count("Time to answer</h3>") == 7
     assert "Not yet revealed" not in page
     assert "share correct" in page
     assert "share “yes”" in page
@@ -178,7 +193,7 @@ def test_report_of_a_sealed_folder_shows_counts_and_times_by_code_and_no_level(
     assert page.count("Not yet revealed") == len(BLOCKS)
     assert [one["answers"] for one in held] == [[]] * len(BLOCKS)
     assert all(one["vary"] is None and one["level_kind"] is None for one in held)
-    assert sum(times["numbers"]["n"] for one in held for times in one["times"]) == 3 * 48
+    assert sum(times["numbers"]["n"] for one in held for times in one["times"]) == 3 * 54
     assert not list(tmp_path.glob("levels-*"))
     key = read_key(sealed_levels)
     published = read(StudyFolder(sealed_levels).sessions()[0].receipt)["protocol"]

@@ -99,6 +99,13 @@ def test_answers_that_enter_no_psychometric_function_have_no_threshold() -> None
         assert list(thresholds(block(design), rows({"P001": 0.2}))) == []
 
 
+@pytest.mark.parametrize(("design", "shape"), [("2ifc", "normal"), ("4ifc", "normal"), ("oddity", None), ("abx", None)])
+def test_of_values_only_a_choice_of_more_has_a_threshold(design: str, shape: str | None) -> None:
+    around = Stimulus(vary="damping_nspm", level="value", levels=(4.0, 16.0), standards=(8.0,))
+    assert family(block(design, around)) == shape
+    assert family(block(design)) == "weibull"
+
+
 def test_the_band_holds_the_function_and_is_narrow_with_many_answers() -> None:
     grid = analysis_grid(STIMULUS, default_design("2ifc"), "weibull", width_prior_of(STIMULUS))
     u = [math.log10(level) for level in LEVELS]

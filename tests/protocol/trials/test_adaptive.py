@@ -158,6 +158,17 @@ def test_a_staircase_ends_after_so_many_reversals() -> None:
             '"samedifferent" has no track: correct answers determine no level',
             'method = "constant"',
         ),
+        *(
+            (
+                f'kind = "{kind}"',
+                (('design = "2ifc"', f'design = "{design}"'), ("standards = [1, 2]", 'level = "value"')),
+                "blocks.viscosity.method",
+                f'"{design}" at levels of values is answered correctly above and below the standard: '
+                "there is no threshold",
+                'method = "constant", or level = "weber" or "difference"',
+            )
+            for kind, design in (("questplus", "oddity"), ("updown", "abx"))
+        ),
     ],
 )
 def test_each_mistake_in_a_method_is_one_fault(
@@ -185,6 +196,11 @@ def test_check_says_at_what_percentage_a_method_aims() -> None:
     assert "(updown: converges to 80.4 % correct), 60 trials per standard" in describe(adaptive('kind = "updown"'))
     shown = describe(adaptive('kind = "questplus"\ntracks = 2'))
     assert "(questplus: threshold at 75 % correct), 60 trials per standard in 2 tracks" in shown
+    value = ("standards = [1, 2]", 'level = "value"')
+    shown = describe(adaptive('kind = "questplus"', value))
+    assert "(questplus: threshold at 50 % comparison chosen)" in shown
+    assert "% comparison chosen" in describe(adaptive('kind = "updown"', value))
+    assert "threshold at" not in describe(adaptive('kind = "questplus"', ('design = "2ifc"', 'design = "yesno"')))
 
 
 @pytest.mark.slow

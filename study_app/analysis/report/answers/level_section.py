@@ -54,8 +54,8 @@ def _thresholds(found: LevelsFound) -> str:
     """Return a row per standard and participant, the group first."""
     standards = len({one.standard for one in found.thresholds}) > 1
     return table(
-        (*(("Standard",) if standards else ()), "Participant", "n", "threshold", "95 % interval", "width",
-         "flat width prior"),
+        (*((f"Standard{_unit(found)}",) if standards else ()), "Participant", "n", "threshold", "95 % interval",
+         "width", "flat width prior"),
         [
             [
                 *((_plain(one.standard),) if standards else ()),
@@ -76,12 +76,17 @@ def _threshold_words(found: LevelsFound) -> str:
     at = "" if found.guess_rate is None else f" ({50 * (1 + found.guess_rate):.3g} % {found.counts})"
     width = "decades" if found.spacing == "log" else "units of the level"
     return (
-        f"A threshold is the level at which the {found.family} function is half-way between guesses and lapses{at}: "
-        f"posterior median with an equal-tailed 95 % interval, from all counted answers, at the levels delivered to "
-        f"the hand. The width, from 5 to 95 % of the rise [{width}], has a log-normal prior; the last column is the "
-        f"threshold under a flat one. “Above” and “below” mark thresholds beyond the levels presented. The group is "
-        f"the random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from three participants on."
+        f"A threshold is the level ({level_words(found)}) at which the {found.family} function is half-way between "
+        f"guesses and lapses{at}: posterior median with an equal-tailed 95 % interval, from all counted answers, at "
+        f"the levels delivered to the hand. The width, from 5 to 95 % of the rise [{width}], has a log-normal prior; "
+        f"the last column is the threshold under a flat one. “Above” and “below” mark thresholds beyond the levels "
+        f"presented. The group is the random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from "
+        f"three participants on."
     )
+
+
+def _unit(found: LevelsFound) -> str:
+    return f" [{found.unit}]" if found.unit else ""
 
 
 def _time_cells(numbers: Mapping[str, Any]) -> list[str]:
@@ -109,7 +114,7 @@ def _of_group(found: LevelsFound) -> str:
 
 def _columns(found: LevelsFound) -> Iterator[tuple[str, str]]:
     """Yield the columns that say what was presented: heading, and field of the answers."""
-    unit = f" [{found.unit}]" if found.unit else ""
+    unit = _unit(found)
     if any(one.standard is not None for one in found.of_group):
         yield f"Standard{unit}", "standard"
     if found.level_kind not in {None, "value"}:

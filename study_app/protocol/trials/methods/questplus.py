@@ -9,7 +9,6 @@ from pydantic import Field
 
 from study_app.protocol.table import Table
 from study_app.protocol.trials.adaptive import Adaptive
-from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.method import Heard, TrackSetting
 from study_app.protocol.trials.psychometric import (
     LAPSES,
@@ -66,10 +65,9 @@ class QuestPlus(Adaptive):
         if self.family == "weibull" and stimulus.spacing == "linear":
             yield "family", '"weibull" is a function of the logarithm of a level', 'spacing = "log", or "normal"'
 
-    def target(self, design: Design) -> str | None:
+    def target(self, guess: float | None, success: str) -> str | None:
         """Return the percentage of the threshold."""
-        guess = design.guess_rate
-        return None if guess is None else f"threshold at {50 * (1 + guess):.3g} % {design.success_name}"
+        return None if guess is None else f"threshold at {50 * (1 + guess):.3g} % {success}"
 
     def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
         """Return whether the threshold's interval is narrow enough."""

@@ -9,7 +9,6 @@ from pydantic import Field
 
 from study_app.protocol.table import Table
 from study_app.protocol.trials.adaptive import Adaptive
-from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.method import Heard, TrackSetting
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.updown import RATIOS, Staircase, converges_to
@@ -61,10 +60,10 @@ class UpDown(Adaptive):
         if self.tracks == 1:
             yield "tracks", "participants can predict a single up–down track: choose tracks = 2"
 
-    def target(self, design: Design) -> str | None:
+    def target(self, guess: float | None, success: str) -> str | None:
         """Return the percentage to which it converges."""
         ratio = self._published_ratio if self.ratio is None else self.ratio
-        return f"converges to {100 * converges_to(int(self.rule[0]), ratio):.1f} % {design.success_name}"
+        return f"converges to {100 * converges_to(int(self.rule[0]), ratio):.1f} % {success}"
 
     @property
     def _published_ratio(self) -> float:
