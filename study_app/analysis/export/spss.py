@@ -95,7 +95,7 @@ def _question(
     if isinstance(asked, AskedScore) or not asked.levels:
         return values, {}
     if asked.question.value_type == "text":
-        if getattr(asked.question, "several", False):
+        if asked.question.names_several:
             return values, {}
         numbers = {option: number for number, option in enumerate(asked.levels, start=1)}
         coded = values.map(numbers).astype("Float64").fillna(NOT_ANSWERED)

@@ -87,6 +87,11 @@ class Choice(Question):
             permitted = answer in ids
         return None if permitted else f"answer {answer} is not among the options: choose {' or '.join(ids)}"
 
+    @property
+    def names_several(self) -> bool:
+        """Whether several options can be chosen."""
+        return self.several
+
     def levels(self, context: Context) -> dict[str, str]:
         """Return the options."""
         return {option.id: context.text(option.text) for option in self.options}

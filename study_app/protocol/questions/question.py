@@ -108,9 +108,14 @@ class Question(Table):
         """Return all answers in their order, where these are few: as a table holds them, with their words."""
         return {}
 
+    @property
+    def names_several(self) -> bool:
+        """Whether an answer names several of `levels`, with spaces between them in a table."""
+        return False
+
     def counted(self, response: str) -> tuple[str, ...]:
         """Return which of `levels` an answer counts for, as a table holds it: of a ranking, say, the first alone."""
-        return tuple(response.split())
+        return tuple(response.split()) if self.names_several else (response,)
 
     def _shown(self, number: int, context: Context) -> tuple[str, int, str, bool]:
         """Return the fields that the views of all kinds have."""
