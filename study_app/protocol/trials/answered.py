@@ -28,9 +28,8 @@ def presented_by(protocol: Protocol, codes: Mapping[str, Mapping[str, str]], sta
     block = protocol.blocks[started["block"]]
     design = design_of(protocol, block)
     track = track_of(protocol, block, codes[block.id][started["code"]])
-    modulus = design.first is not None and started["index"] == 1
     arrangement = arrangement_of(design, started["arrangement"])
-    return due_of(protocol, block, track, arrangement, started["level"], analysed=not modulus, catch=started["catch"])
+    return due_of(protocol, block, track, arrangement, started["level"], catch=started["catch"])
 
 
 def heard_of(

@@ -45,8 +45,6 @@ class Due:
         Which of the design's arrangements.
     intervals : tuple of Stimulated
         What each interval presents, in order.
-    analysed : bool
-        False for the trial that presents the modulus of a magnitude estimation.
     catch : bool
         True for a catch trial, which presents the largest level.
     """
@@ -55,7 +53,6 @@ class Due:
     standard: float | None
     arrangement: int
     intervals: tuple[Stimulated, ...]
-    analysed: bool = True
     catch: bool = False
 
 
@@ -87,7 +84,7 @@ def next_level(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, h
     design = design_of(protocol, block)
     if design.first is not None:
         if trial.index == 1:
-            return due_of(protocol, block, track, 0, design.first.level, analysed=False)
+            return due_of(protocol, block, track, 0, design.first.level)
         slot -= 1
     if track.comparison is not None:  # conditions are compared
         return due_of(protocol, block, track, draws.arrangement(design, slot), None)
@@ -156,13 +153,12 @@ def due_of(
     arrangement: int,
     level: float | None,
     *,
-    analysed: bool = True,
     catch: bool = False,
 ) -> Due:
     """Return what a trial of a track presents at a level (None: conditions are compared), in an arrangement."""
     presented = design_of(protocol, block).arrangements[arrangement]
     intervals = tuple(_interval(protocol, block, track, level if holds else None, holds) for holds in presented)
-    return Due(level, track.standard, arrangement, intervals, analysed, catch)
+    return Due(level, track.standard, arrangement, intervals, catch)
 
 
 def _interval(protocol: Protocol, block: Block, track: Track, level: float | None, comparison: bool) -> Stimulated:

@@ -132,7 +132,7 @@ def _rows(one: Planted, key: Key, person: str, seed: int) -> Iterator[tuple[Any,
         heard.append(
             Heard(answered.trial, answered.code, answered.level, answered.success, answered.correct, due.catch)
         )
-        yield person, block.id, due.standard, due.level, due.level, due.analysed, answered.success
+        yield person, block.id, due.standard, due.level, due.level, True, answered.success
 
 
 def keyed_draw(key: Key, person: str, trial: int) -> Any:

@@ -59,6 +59,40 @@ def test_planted_thresholds_are_found_per_participant_and_for_the_group() -> Non
     assert group.low < group.threshold < group.high
 
 
+def test_a_steep_function_has_its_own_width() -> None:
+    draw, found = np.random.default_rng(5), []
+    for number in range(1200):
+        level = LEVELS[number % len(LEVELS)]
+        right = bool(draw.random() < success("weibull", math.log10(level), -1.0, 0.5, 0.5, 0.0))
+        found.append(("P001", "b", 8.0, level, level, True, right))
+    frame = rows({"P001": 0.1}, trials=1200).assign(success=pd.array([row[-1] for row in found], dtype="boolean"))
+    _, one = thresholds(block(), frame)
+    assert one.width is not None
+    assert one.width < 0.75
+    assert one.threshold == pytest.approx(0.1, rel=0.1)
+
+
+@pytest.mark.parametrize(("planted", "width", "beyond"), [(60.0, 60.0, None), (104.0, 20.0, "above")])
+def test_levels_that_are_evenly_spaced_have_widths_and_thresholds_in_their_unit(
+    planted: float, width: float, beyond: str | None
+) -> None:
+    stimulus = Stimulus(vary="delay_ms", levels=(10, 100), standards=(100.0,), spacing="linear")
+    levels = np.linspace(10, 100, 10)
+    psi = success("normal", levels, planted, width, 0.5, 0.0)
+    frame = pd.DataFrame(
+        [
+            ("P001", "b", 100.0, level, level, True, number < round(40 * share))
+            for level, share in zip(levels, psi, strict=True)
+            for number in range(40)
+        ],
+        columns=["participant", "block", "standard", "level", "level_delivered", "analysed", "success"],
+    ).astype({"level_delivered": "Float64", "success": "boolean"})
+    _, one = thresholds(block(stimulus=stimulus), frame)
+    assert one.beyond == beyond
+    assert one.threshold == pytest.approx(planted, rel=0.03)
+    assert one.width == pytest.approx(width, rel=0.7)
+
+
 def test_thresholds_are_at_the_levels_delivered_not_at_those_requested() -> None:
     asked = rows({"P001": 0.2})
     moved = asked.assign(level_delivered=asked["level"] * 1.1)

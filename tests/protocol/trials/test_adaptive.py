@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -104,6 +105,27 @@ def test_a_track_ends_once_its_interval_is_narrow() -> None:
 def test_a_staircase_ends_after_so_many_reversals() -> None:
     ended = answers_of(adaptive('kind = "updown"\ntrials = 200\nstop = { reversals = 6 }', ONE_STANDARD), 0.4)
     assert 8 <= len(ended) < 120
+
+
+@pytest.mark.parametrize(
+    ("stop", "after"),
+    [
+        ('kind = "updown"\ntrials = 200\nstop = { reversals = 1, after = 50 }', 50),
+        ('kind = "questplus"\ntrials = 200\nstop = { ratio = 1000, after = 25 }', 25),
+    ],
+)
+def test_a_track_does_not_end_before_so_many_answers(stop: str, after: int) -> None:
+    assert len(answers_of(adaptive(stop, ONE_STANDARD), 0.4)) == after
+
+
+def test_a_step_up_is_a_tenth_of_the_span() -> None:
+    heard = answers_of(adaptive('kind = "updown"\nbegin = 0.2', ONE_STANDARD), threshold=0.8)
+    steps = [math.log10(after.level / before.level) for before, after in pairwise(heard) if not before.success]
+    inner = [
+        step for step, one in zip(steps, (one for one in heard if not one.success), strict=False) if one.level < 0.6
+    ]
+    assert inner == pytest.approx([math.log10(8) / 10] * len(inner))
+    assert len(inner) > 3
 
 
 @pytest.mark.parametrize(
@@ -229,3 +251,6 @@ def test_noise_trials_of_yes_no_have_no_level_of_their_own(kind: str) -> None:
     assert len(comparisons) == 40
     assert comparisons[0] == pytest.approx(0.4, rel=0.05)
     assert min(comparisons) >= 0.1
+    if kind == "updown":
+        steps = [abs(math.log10(after / before)) for before, after in pairwise(comparisons)]
+        assert max(steps) <= math.log10(8) / 10 + 1e-9, "a staircase goes on from the last comparison"

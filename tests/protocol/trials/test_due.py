@@ -10,6 +10,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.streams import shuffle, stream
 from study_app.protocol.trials.due import next_level
 from study_app.protocol.trials.keyed import Key
+from study_app.protocol.trials.presentation import arrangement_text, longest_delay_s
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tracks import design_of
 from tests.protocol.trials.studies import SECRET, answered, key_of, run, study
@@ -85,16 +86,15 @@ def test_estimation_of_a_value_has_one_interval_and_no_standard():
     assert all(due.intervals == (Stimulated("oil", "viscosity_pa_s", due.level),) for due in presented)
 
 
-def test_the_modulus_comes_first_and_is_not_analysed():
+def test_the_modulus_comes_first():
     protocol = study(
         ('design = "2ifc"', 'design = "number"'),
         ("standards = [1, 2]", 'level = "value"'),
         more='[designs.number]\nkind = "estimation"\nmodulus = { level = 0.5, number = 10 }\n',
     )
     first, *others = run(protocol, key_of(protocol))
-    assert (first.level, first.analysed) == (0.5, False)
+    assert first.level == 0.5
     assert Counter(due.level for due in others) == {0.2: 8, 0.4: 8, 0.8: 8}
-    assert all(due.analysed for due in others)
 
 
 def test_a_share_of_yes_no_slots_presents_the_standard_alone():
@@ -189,6 +189,35 @@ def test_draws_depend_on_secret_participant_and_session(different: str):
     )
     assert [due.level for due in one] != [due.level for due in other]
     assert [due.arrangement for due in one] != [due.arrangement for due in other]
+
+
+@pytest.mark.parametrize(
+    ("design", "presented"),
+    [
+        ("2ifc", "0.4CS 0.2SC 0.8SC 0.8CS 0.2SC 0.4CS 0.2CS 0.8SC"),
+        ("yesno", "0S 0.4C 0.2C 0S 0.8C 0.8C 0.2C 0.4C"),
+        ("oddity", "0.4CCS 0.2CCS 0.8SCC 0.8CSS 0.2SCS 0.4SSC 0.2CSC 0.8CSC"),
+    ],
+)
+def test_a_secret_draws_what_it_drew_in_earlier_versions(design: str, presented: str):
+    """Otherwise a later version could not reproduce a session's levels."""
+    protocol = study(('design = "2ifc"', f'design = "{design}"'), ("standards = [1, 2]", "standards = [2]"))
+    drawn = run(protocol, key_of(protocol))[:8]
+    letters = [arrangement_text(design_of(protocol, protocol.blocks["viscosity"]), due.arrangement) for due in drawn]
+    assert " ".join(f"{due.level:g}{of}" for due, of in zip(drawn, letters, strict=True)) == presented
+
+
+def test_the_standard_is_written_s_and_the_comparison_c():
+    protocol = study(('design = "2ifc"', 'design = "abx"'))
+    design = design_of(protocol, protocol.blocks["viscosity"])
+    assert [arrangement_text(design, number) for number in range(4)] == ["SCS", "SCC", "CSC", "CSS"]
+
+
+@pytest.mark.parametrize(("direction", "longest_s"), [("up", 0.18), ("down", 0.1)])
+def test_pictures_linger_for_the_longest_delay_of_any_trial(direction: str, longest_s: float):
+    edits = ('"viscosity_pa_s"', f'"delay_ms"\ndirection = "{direction}"'), ("standards = [1, 2]", "standards = [100]")
+    protocol = study(*edits, ("levels = [0.1, 0.8]", "levels = [20, 80]"), ("[0.2, 0.4, 0.8]", "[20, 80]"))
+    assert longest_delay_s(protocol, protocol.blocks["viscosity"]) == pytest.approx(longest_s)
 
 
 def test_nothing_that_tells_a_level_is_printed():

@@ -27,6 +27,7 @@ def stimulus(**keys: Any) -> Stimulus:
 )
 def test_the_comparison_of_a_level(keys: dict[str, str], standard: float | None, level: float, comparison: float):
     assert stimulus(**keys).comparison(standard, level) == comparison
+    assert stimulus(**keys).level_between(standard, comparison) == level
 
 
 def test_a_time_is_varied_by_differences_and_anything_else_by_weber_fractions():
