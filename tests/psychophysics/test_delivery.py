@@ -75,6 +75,20 @@ def test_a_hand_at_rest_has_no_damping(position_m: Any) -> None:
     assert moved.rms_speed_mps == 0
 
 
+def test_a_hand_that_hardly_moves_has_no_damping() -> None:
+    for amplitude_m, rests in ((1e-5, True), (5e-5, False)):
+        moved = motion(*swing(amplitude_m=amplitude_m), 1 / RATE_HZ)
+        assert (damping(-8.0 * moved.velocity_mps, moved) is None) == rests
+
+
+def test_a_motion_is_judged_from_a_time_on() -> None:
+    moved = motion(*swing(), 1 / RATE_HZ)
+    later = moved.after(moved.times_s[700])
+    assert later.times_s == pytest.approx(moved.times_s[700:], abs=0)
+    assert later.velocity_mps == pytest.approx(moved.velocity_mps[700:], abs=0)
+    assert later.acceleration_mps2 == pytest.approx(moved.acceleration_mps2[700:], abs=0)
+
+
 def test_the_share_sent_is_a_regression_on_the_model_force() -> None:
     model_n = np.random.default_rng(2).normal(size=(100, 3))
     assert share(0.9 * model_n, model_n) == pytest.approx(0.9)

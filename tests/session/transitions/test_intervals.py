@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from study_app.errors import SessionError
+from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.trials.answered import heard_in
 from study_app.protocol.trials.presentation import scene_of
 from study_app.session.pages import ChoicePage, FeedbackPage, NumberPage, Progress, QuestionnairePage, TaskPage
@@ -85,6 +87,15 @@ def test_the_next_trial_of_the_block_begins_with_a_rest_that_belongs_to_it() -> 
     state, commands = advance(state, ResumeAsked(1000.0, "participant"))
     assert (state.phase, state.attempt, state.interval) == (Phase.TASK, 2, 1)
     assert started(commands) is not None
+
+
+def test_the_first_trial_of_a_block_begins_without_the_rest_between_trials() -> None:
+    state = pairs.opened()
+    commands: tuple[Any, ...] = ()
+    while not (isinstance(state.step, Trial) and state.trial.block == "viscosity"):
+        state, commands = advance(state, pairs.next_event(state, state.since_s))
+    assert (state.phase, state.trial.index) == (Phase.TASK, 1)
+    assert written(commands)[-2:] == ["trial_started", "interval_started"]
 
 
 def test_every_interval_presents_what_is_due_and_a_trial_presented_again_presents_the_same() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -106,6 +107,19 @@ def test_a_break_after_a_trial_that_was_given_up_is_not_passed_over() -> None:
     assert "passed_over" not in events
 
 
+def test_a_break_after_trials_that_were_all_given_up_is_shown_in_a_resumed_session_too() -> None:
+    protocol = pairs.protocol()
+    fails = frozenset((trial, attempt) for trial in (1, 2) for attempt in range(3))
+    lines = [line for _, line in events_of(pairs.opened(protocol), fails)]
+    ended = [number for number, line in enumerate(lines) if line["event"] == "trial_ended" and line["trial"] == 2][2]
+    assert lines[ended + 1] == {"event": "page_shown", "t_s": lines[ended]["t_s"], "page": "rest"}
+    began = {"event": "session_started", "t_s": 0.0, "language": "en"}
+    schedule = pairs.opened(protocol).plan.schedule
+    start = resume_at(protocol, schedule, [began, *lines[: ended + 1]], NO_SEALS)
+    state, commands = advance(pairs.opened(protocol, start=start), Begin(0.0))
+    assert (state.phase, written(commands)) == (Phase.READING, ["page_shown"])
+
+
 def test_an_interruption_is_no_attempt_that_failed() -> None:
     state = in_main(pairs.opened())
     state, _ = advance(state, done(10.0, "pace_error_percent"))
@@ -159,7 +173,8 @@ def test_a_session_killed_after_any_line_gives_up_the_same_trials_as_one_that_wa
     assert given_up == {10}
     schedule = pairs.opened(protocol).plan.schedule
     began = {"event": "session_started", "t_s": 0.0, "language": "en"}
-    whole = answers(lines)
+    whole, invalid = answers(lines), undelivered(lines)
+    assert invalid == {8: 1, 9: 2, 10: 3}
     for count in range(1, len(lines)):
         start = resume_at(protocol, schedule, [began, *lines[:count]], NO_SEALS)
         state, _ = advance(pairs.opened(protocol, start=start), Begin(0.0))
@@ -167,6 +182,12 @@ def test_a_session_killed_after_any_line_gives_up_the_same_trials_as_one_that_wa
             state, _ = advance(state, ResumeAsked(0.0, "operator"))
         resumed = [line for _, line in events_of(state, FAILS)]
         assert answers([*lines[:count], *resumed]) == whole, lines[count - 1]
+        assert undelivered([*lines[:count], *resumed]) == invalid, lines[count - 1]
+
+
+def undelivered(lines: list[dict[str, Any]]) -> Counter[int]:
+    """Return how many attempts at each trial were not delivered as requested."""
+    return Counter(line["trial"] for line in lines if line["event"] == "trial_ended" and line["outcome"] == "invalid")
 
 
 def answers(lines: list[dict[str, Any]]) -> dict[int, list[Any]]:
