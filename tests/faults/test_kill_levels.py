@@ -52,9 +52,24 @@ def comparable(value: Any) -> Any:
     return [comparable(inner) for inner in value] if isinstance(value, list) else value
 
 
-def test_a_session_killed_at_random_bytes_of_its_journal_equals_one_that_was_not(tmp_path: Path) -> None:
+CONSTANT = 'kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 1'
+ADAPTIVE = 'kind = "questplus"\ntrials = 8\ntracks = 2'
+CATCH = 'method = "few"\ncatch = { share = 0.25 }'
+
+
+@pytest.mark.parametrize(
+    "edits",
+    [pytest.param({}, id="constant"), pytest.param({CONSTANT: ADAPTIVE, 'method = "few"': CATCH}, id="adaptive")],
+)
+def test_a_session_killed_at_random_bytes_of_its_journal_equals_one_that_was_not(
+    tmp_path: Path, edits: dict[str, str]
+) -> None:
+    text = short_text()
+    for old, new in edits.items():
+        assert old in text
+        text = text.replace(old, new)
     protocol = tmp_path / "levels.toml"
-    protocol.write_text(short_text())
+    protocol.write_text(text)
     outcomes = outcomes_of("killer", protocol, tmp_path, KILLS, 3, "bytes", limit_s=240 + 50 * KILLS)
     whole = told(tmp_path / "whole")
     assert sum(event == "trial_started" for event, *_ in whole) >= 7
