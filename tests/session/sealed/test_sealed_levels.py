@@ -114,7 +114,9 @@ def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def answer_blindly(study: Protocol, block: Any, item: Any, sensed: Any, before: Any, draw: Callable[[], float]) -> Any:
+def answer_blindly(
+    study: Protocol, block: Any, item: Any, sensed: Any, before: Any, draw: Callable[[], float], *_: Any
+) -> Any:
     """Answer by the draw alone, whatever was felt."""
     design, share = design_of(study, block), draw()
     if design.reply == "choice":
