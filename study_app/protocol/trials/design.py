@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Protocol, TypeAlias
 
 from pydantic import Field
@@ -12,10 +12,16 @@ from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id, Localised
 
+if TYPE_CHECKING:
+    from study_app.psychophysics.detection import Sensitivity
+
 Feedback: TypeAlias = Literal["never", "practice", "always"]
 Reply: TypeAlias = Literal["choice", "rating", "number"]
 Arrangement: TypeAlias = tuple[bool, ...]
 """Per interval whether it presents the comparison, in the order of presentation."""
+
+Counted: TypeAlias = Mapping[tuple[int, str], int]
+"""How often each answer was given to each arrangement."""
 
 
 class Modulus(Table):
@@ -127,9 +133,26 @@ class Design(Table):
         correct = self.correct(arrangement)
         return None if correct is None else answer == correct
 
+    def correct_of(self, answers: Counted) -> tuple[int, int]:
+        """Return how many answers were correct, and of how many."""
+        right = sum(count for pair, count in answers.items() if self.is_correct(*pair))
+        return right, sum(answers.values())
+
     def success(self, arrangement: int, answer: str) -> bool | None:
         """Return what an answer counts as for a psychometric function; None where it does not enter one."""
         return self.is_correct(arrangement, answer)
+
+    def sensitivity(self, answers: Counted, *, roving: bool) -> Sensitivity | None:
+        """Return d′ and bias of one observer; None where the answers do not give them.
+
+        Parameters
+        ----------
+        answers : mapping
+            How often each answer was given to each arrangement.
+        roving : bool
+            Whether standards vary from trial to trial, so that intervals can only be compared with each other.
+        """
+        return None
 
     def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
         """Return the answer of a simulated observer, where the reply is a choice.
@@ -149,6 +172,12 @@ class Design(Table):
         """Return whether the participant sees if an answer was correct."""
         when = self.feedback or ("practice" if self.has_correct_answer else "never")
         return when == "always" or (when == "practice" and practice)
+
+
+def to_arrangements(answers: Counted, arrangements: Collection[int], given: str) -> tuple[int, int]:
+    """Return how often ``given`` was answered to some arrangements, and how many answers they had."""
+    held = {pair: count for pair, count in answers.items() if pair[0] in arrangements}
+    return sum(count for (_, answer), count in held.items() if answer == given), sum(held.values())
 
 
 ORDINALS = ("first", "second", "third", "fourth")

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from study_app.protocol.trials.design import Arrangement, Attention, Design
+from study_app.protocol.trials.design import Arrangement, Attention, Counted, Design
+
+if TYPE_CHECKING:
+    from study_app.psychophysics.detection import Sensitivity
 
 
 class Abx(Design):
@@ -32,6 +35,12 @@ class Abx(Design):
         """Return which of the first two was repeated."""
         first, _, third = self.arrangements[arrangement]
         return self.answers[0] if first == third else self.answers[1]
+
+    def sensitivity(self, answers: Counted, *, roving: bool) -> Sensitivity | None:
+        """Return d′ under the differencing model where standards rove, else under independent observations."""
+        from study_app.psychophysics.detection import abx  # noqa: PLC0415 - loads numpy
+
+        return abx(*self.correct_of(answers), "differencing" if roving else "independent")
 
     def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
         """Return which of the first two is closer to the third."""

@@ -3,9 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
-from study_app.protocol.trials.design import ORDINALS, Arrangement, Attention, Design, one_differs
+from study_app.protocol.trials.design import (
+    ORDINALS,
+    Arrangement,
+    Attention,
+    Counted,
+    Design,
+    one_differs,
+    to_arrangements,
+)
+
+if TYPE_CHECKING:
+    from study_app.psychophysics.detection import Sensitivity
 
 
 class ForcedChoice(Design):
@@ -40,6 +51,14 @@ class ForcedChoice(Design):
     def correct(self, arrangement: int) -> str:
         """Return the interval of the comparison."""
         return self.answers[self.arrangements[arrangement].index(True)]
+
+    def sensitivity(self, answers: Counted, *, roving: bool) -> Sensitivity | None:
+        """Return d′ of the intervals, and of two intervals the criterion: above 0 the second is preferred."""
+        from study_app.psychophysics.detection import from_correct, two_intervals  # noqa: PLC0415 - loads numpy
+
+        if self.kind != "2ifc":
+            return from_correct(self.kind, *self.correct_of(answers))
+        return two_intervals(*to_arrangements(answers, {0}, "first"), *to_arrangements(answers, {1}, "first"))
 
     def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
         """Return the strongest interval, or the weakest."""

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from study_app.protocol.trials.design import ORDINALS, Arrangement, Attention, Design, one_differs
+from study_app.protocol.trials.design import ORDINALS, Arrangement, Attention, Counted, Design, one_differs
+
+if TYPE_CHECKING:
+    from study_app.psychophysics.detection import Sensitivity
 
 
 class Oddity(Design):
@@ -33,6 +36,12 @@ class Oddity(Design):
         presented = self.arrangements[arrangement]
         odd = presented.count(True) == 1
         return self.answers[presented.index(odd)]
+
+    def sensitivity(self, answers: Counted, *, roving: bool) -> Sensitivity | None:
+        """Return d′ of the triangle test."""
+        from study_app.psychophysics.detection import from_correct  # noqa: PLC0415 - loads numpy
+
+        return from_correct(self.kind, *self.correct_of(answers))
 
     def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
         """Return the interval that is farthest from the mean of the others."""

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
-from study_app.protocol.trials.design import Arrangement, Attention, Design
+from study_app.protocol.trials.design import Arrangement, Attention, Counted, Design, to_arrangements
+
+if TYPE_CHECKING:
+    from study_app.psychophysics.detection import Sensitivity
 
 
 class SameDifferent(Design):
@@ -33,6 +36,16 @@ class SameDifferent(Design):
         """Return whether the two were the same."""
         first, second = self.arrangements[arrangement]
         return "same" if first == second else "different"
+
+    def sensitivity(self, answers: Counted, *, roving: bool) -> Sensitivity | None:
+        """Return d′ and k under the differencing model where standards rove, else d′ of independent observations."""
+        from study_app.psychophysics.detection import same_different  # noqa: PLC0415 - loads numpy
+
+        return same_different(
+            *to_arrangements(answers, {2, 3}, "different"),
+            *to_arrangements(answers, {0, 1}, "different"),
+            "differencing" if roving else "independent",
+        )
 
     def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
         """Return "different" where a difference is noticed."""

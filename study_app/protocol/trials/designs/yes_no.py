@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from study_app.haptics.model.ranges import within
-from study_app.protocol.trials.design import Arrangement, Attention, Design
+from study_app.protocol.trials.design import Arrangement, Attention, Counted, Design, to_arrangements
+
+if TYPE_CHECKING:
+    from study_app.psychophysics.detection import Sensitivity
 
 
 class YesNo(Design):
@@ -48,6 +51,12 @@ class YesNo(Design):
     def success(self, arrangement: int, answer: str) -> bool:
         """Return whether the answer was yes, whatever was presented."""
         return answer == "yes"
+
+    def sensitivity(self, answers: Counted, *, roving: bool) -> Sensitivity | None:
+        """Return d′ and the criterion: above 0 the observer says yes less often than no."""
+        from study_app.psychophysics.detection import yes_no  # noqa: PLC0415 - loads numpy
+
+        return yes_no(*to_arrangements(answers, {0}, "yes"), *to_arrangements(answers, {1}, "yes"))
 
     def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
         """Return "yes" above the mean of the intervals so far."""

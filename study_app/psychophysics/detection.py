@@ -1,0 +1,234 @@
+"""Detection theory: P(correct) of a design from d′ and the inverse, and d′ and bias from counts of answers.
+
+Rates use the log-linear correction (Hautus 1995), so that a rate of 0 or 1 has a finite d′. Models of the designs:
+Macmillan & Creelman 2005, Detection Theory, chapters 1, 7, 9 and 10; oddity: Frijters 1979, Br. J. Math. Stat.
+Psychol. 32, 229–241. *Independent* observation models compare each interval with known alternatives; *differencing*
+models compare the intervals of a trial with each other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache, partial
+from statistics import NormalDist
+from typing import Final, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
+Model: TypeAlias = Literal["differencing", "independent"]
+
+NORMAL: Final = NormalDist()
+NODES: Final = 200
+ENDS: Final = 9.0
+"""Integrals over the normal density end so many standard deviations from its mean."""
+MOST: Final = 20.0
+"""The largest d′ that is searched."""
+TOLERANCE: Final = 1e-10
+
+_erfc = np.vectorize(math.erfc, otypes=[float])
+
+
+@dataclass(frozen=True, slots=True)
+class Sensitivity:
+    """d′ and bias from the answers of one observer.
+
+    Attributes
+    ----------
+    d_prime : float
+        Under ``model``; 0 at or below chance where it follows from the share correct.
+    criterion : float or None
+        c of yes–no and of two-interval forced choice, k of the differencing model of same–different; else None.
+    variance : float or None
+        Of d′ (Gourevitch & Galanter 1967); None where no closed form exists.
+    model : "differencing" | "independent" | None
+        None where there is one model only.
+    other : float or None
+        d′ under the other model.
+    """
+
+    d_prime: float
+    criterion: float | None = None
+    variance: float | None = None
+    model: Model | None = None
+    other: float | None = None
+
+
+def rate(count: float, n: float) -> float:
+    """Return the share ``count`` of ``n`` with the log-linear correction: (count + ½)/(n + 1)."""
+    return (count + 0.5) / (n + 1.0)
+
+
+def proportion_correct(task: str, d_prime: float) -> float:
+    """Return P(correct) of an unbiased observer.
+
+    Parameters
+    ----------
+    task : str
+        A key of `PROPORTIONS`, such as "2ifc", "abx differencing" or "oddity".
+    d_prime : float
+        Distance of comparison and standard in standard deviations of one observation, 0 or more.
+    """
+    return PROPORTIONS[task](d_prime)
+
+
+def d_prime_at(task: str, proportion: float) -> float:
+    """Return d′ at a P(correct), by bisection to 1e-10; 0 at or below chance."""
+    return _inverse(PROPORTIONS[task], proportion)
+
+
+def forced_choice(d_prime: float, intervals: int) -> float:
+    """Return P(the comparison is the largest of ``intervals``): ∫ φ(x − d′) Φ(x)^(m−1) dx."""
+    x, weights = _rule(-ENDS, ENDS)
+    return float((weights * _cdf(x + d_prime) ** (intervals - 1)).sum())
+
+
+def yes_no(hits: float, signals: float, false_alarms: float, noises: float) -> Sensitivity | None:
+    """Return d′ = z(H) − z(F) and c = −½(z(H) + z(F)) from counts; None without signal or without noise trials."""
+    if not signals or not noises:
+        return None
+    high, low = rate(hits, signals), rate(false_alarms, noises)
+    z_high, z_low = NORMAL.inv_cdf(high), NORMAL.inv_cdf(low)
+    variance = sum(
+        share * (1 - share) / (n * NORMAL.pdf(z) ** 2)
+        for share, n, z in ((high, signals, z_high), (low, noises, z_low))
+    )
+    return Sensitivity(z_high - z_low, -0.5 * (z_high + z_low), variance)
+
+
+def two_intervals(first_of_first: float, firsts: float, first_of_second: float, seconds: float) -> Sensitivity | None:
+    """Return d′ = (z(H) − z(F))/√2 and c of two-interval forced choice.
+
+    Parameters
+    ----------
+    first_of_first, firsts : float
+        How often the answer was "first", and how many trials there were, where the comparison came first.
+    first_of_second, seconds : float
+        Likewise where it came second.
+    """
+    found = yes_no(first_of_first, firsts, first_of_second, seconds)
+    if found is None or found.variance is None:
+        return None
+    return Sensitivity(found.d_prime / math.sqrt(2.0), found.criterion, found.variance / 2.0)
+
+
+def from_correct(task: str, correct: float, n: float) -> Sensitivity | None:
+    """Return d′ from the number of correct answers; None without answers."""
+    return Sensitivity(d_prime_at(task, rate(correct, n))) if n else None
+
+
+def abx(correct: float, n: float, model: Model) -> Sensitivity | None:
+    """Return d′ of ABX from the number of correct answers; None without answers."""
+    if not n:
+        return None
+    found = {name: d_prime_at(f"abx {name}", rate(correct, n)) for name in ("differencing", "independent")}
+    other = found["independent" if model == "differencing" else "differencing"]
+    return Sensitivity(found[model], model=model, other=other)
+
+
+def same_different(hits: float, differents: float, false_alarms: float, sames: float, model: Model) -> (
+    Sensitivity | None
+):  # fmt: skip
+    """Return d′ of same–different, and k of the differencing model; None without trials of both kinds.
+
+    Parameters
+    ----------
+    hits, differents : float
+        How often the answer was "different", and how many trials there were, where the two differed.
+    false_alarms, sames : float
+        Likewise where they were the same.
+    model : "differencing" | "independent"
+        Which d′ is reported; `Sensitivity.other` has the other one.
+    """
+    if not differents or not sames:
+        return None
+    high, low = rate(hits, differents), rate(false_alarms, sames)
+    k = -math.sqrt(2.0) * NORMAL.inv_cdf(low / 2.0)
+    differencing = _inverse(partial(different_rate, k=k), high)
+    unbiased = NORMAL.cdf(0.5 * (NORMAL.inv_cdf(high) - NORMAL.inv_cdf(low)))
+    independent = d_prime_at("samedifferent independent", unbiased)
+    if model == "differencing":
+        return Sensitivity(differencing, k, model=model, other=independent)
+    return Sensitivity(independent, model=model, other=differencing)
+
+
+def different_rate(d_prime: float, k: float) -> float:
+    """Return P("different") of the differencing model for two that are d′ apart: |x₁ − x₂| > k."""
+    root = math.sqrt(2.0)
+    return NORMAL.cdf((d_prime - k) / root) + NORMAL.cdf((-d_prime - k) / root)
+
+
+def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
+    """Return d_a = √2 z(AUC) from ratings; None where one of the two has none.
+
+    Parameters
+    ----------
+    noise, signal : (n,) and (m,) array
+        The ratings of the lowest level, and of another one. AUC is the Mann–Whitney share of pairs in which the
+        second is higher, ties counting half, with the log-linear correction over the pairs.
+    """
+    low, high = np.asarray(noise, float), np.asarray(signal, float)
+    if not low.size or not high.size:
+        return None
+    higher = np.sign(high[:, None] - low[None, :])
+    wins = float((higher > 0).sum() + 0.5 * (higher == 0).sum())
+    return Sensitivity(math.sqrt(2.0) * NORMAL.inv_cdf(rate(wins, higher.size)))
+
+
+def _inverse(proportion_of: Callable[[float], float], proportion: float) -> float:
+    """Return where an increasing function of d′ reaches ``proportion``; 0 where it is there already at 0."""
+    low, high = 0.0, MOST
+    if proportion <= proportion_of(low):
+        return 0.0
+    while high - low > TOLERANCE:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if proportion_of(middle) < proportion else (low, middle)
+    return 0.5 * (low + high)
+
+
+@cache
+def _rule(low: float, high: float) -> tuple[Floats, Floats]:
+    """Return the nodes of Gauss–Legendre quadrature, and their weights times the normal density."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    x = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+    return x, 0.5 * (high - low) * weights * np.exp(-0.5 * x**2) / math.sqrt(2.0 * math.pi)
+
+
+def _cdf(x: Floats) -> Floats:
+    return np.asarray(0.5 * _erfc(-x / math.sqrt(2.0)), float)
+
+
+def _two(d_prime: float) -> float:
+    return NORMAL.cdf(d_prime / math.sqrt(2.0))
+
+
+def _abx(d_prime: float, divisor: float) -> float:
+    """Return P(correct): both comparisons point the right way, or both the wrong way."""
+    first, second = NORMAL.cdf(d_prime / math.sqrt(2.0)), NORMAL.cdf(d_prime / divisor)
+    return first * second + (1.0 - first) * (1.0 - second)
+
+
+def _oddity(d_prime: float) -> float:
+    """Return P(correct) of the triangle test: 2 ∫₀^∞ [Φ(−z√3 + d′√⅔) + Φ(−z√3 − d′√⅔)] φ(z) dz."""
+    z, weights = _rule(0.0, ENDS)
+    away = d_prime * math.sqrt(2.0 / 3.0)
+    return float(2.0 * (weights * (_cdf(-z * math.sqrt(3.0) + away) + _cdf(-z * math.sqrt(3.0) - away))).sum())
+
+
+def _same_different(d_prime: float) -> float:
+    return 0.5 * (1.0 + (2.0 * NORMAL.cdf(d_prime / 2.0) - 1.0) ** 2)
+
+
+PROPORTIONS: Final[Mapping[str, Callable[[float], float]]] = {
+    "2ifc": _two,
+    "3ifc": partial(forced_choice, intervals=3),
+    "4ifc": partial(forced_choice, intervals=4),
+    "abx differencing": partial(_abx, divisor=math.sqrt(6.0)),
+    "abx independent": partial(_abx, divisor=2.0),
+    "oddity": _oddity,
+    "samedifferent independent": _same_different,
+}
+"""P(correct) from d′, by design and model."""

@@ -1,0 +1,141 @@
+"""Detection theory: P(correct) and d′ of each design against closed forms, published values and simulation."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import mannwhitneyu, norm
+
+from study_app.psychophysics.detection import (
+    PROPORTIONS,
+    abx,
+    d_prime_at,
+    different_rate,
+    forced_choice,
+    from_correct,
+    proportion_correct,
+    rate,
+    rating,
+    same_different,
+    two_intervals,
+    yes_no,
+)
+
+CHANCE = {"2ifc": 1 / 2, "3ifc": 1 / 3, "4ifc": 1 / 4, "oddity": 1 / 3}
+WORKED = {  # P(correct) at d′ = 1 and 2, confirmed by simulations of 2·10⁶ trials to 0.0007
+    "2ifc": (0.7602, 0.9214),
+    "3ifc": (0.6337, 0.8658),
+    "4ifc": (0.5520, 0.8228),
+    "abx differencing": (0.5825, 0.7468),
+    "abx independent": (0.5997, 0.7877),
+    "oddity": (0.4180, 0.6048),
+    "samedifferent independent": (0.5733, 0.7330),
+}
+
+
+@pytest.mark.parametrize("task", PROPORTIONS)
+def test_proportion_correct_is_the_worked_one_at_d_prime_1_and_2_and_chance_at_0(task):
+    assert [proportion_correct(task, d) for d in (1, 2)] == pytest.approx(WORKED[task], abs=5e-5)
+    assert proportion_correct(task, 0) == pytest.approx(CHANCE.get(task, 0.5), abs=1e-12)
+    assert proportion_correct(task, 15) == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.parametrize("task", PROPORTIONS)
+def test_d_prime_inverts_the_proportion_and_is_0_at_or_below_chance(task):
+    for planted in (0.05, 0.7, 1.9, 4.2):
+        assert d_prime_at(task, proportion_correct(task, planted)) == pytest.approx(planted, abs=1e-7)
+    assert d_prime_at(task, CHANCE.get(task, 0.5)) == pytest.approx(0, abs=1e-6)
+    assert d_prime_at(task, 0.1) == 0
+
+
+def test_two_intervals_as_an_integral_is_the_closed_form():
+    for d_prime in (0.0, 0.3, 1.0, 3.5):
+        assert forced_choice(d_prime, 2) == pytest.approx(norm.cdf(d_prime / math.sqrt(2)), abs=1e-12)
+
+
+@pytest.mark.parametrize("task", ["3ifc", "4ifc", "abx differencing", "oddity"])
+def test_proportions_are_those_of_simulated_observers(task):
+    draw, n, d_prime = np.random.default_rng(3), 400_000, 1.4
+    if task == "abx differencing":
+        x = draw.normal(size=(n, 3)) + d_prime * np.array([0, 1, 1])
+        right = np.abs(x[:, 2] - x[:, 1]) < np.abs(x[:, 2] - x[:, 0])
+    elif task == "oddity":
+        x = draw.normal(size=(n, 3)) + d_prime * np.array([0, 0, 1])
+        gaps = np.abs(np.stack([x[:, 1] - x[:, 2], x[:, 0] - x[:, 2], x[:, 0] - x[:, 1]]))
+        right = gaps.argmin(axis=0) == 2
+    else:
+        x = draw.normal(size=(n, int(task[0])))
+        x[:, 0] += d_prime
+        right = x.argmax(axis=1) == 0
+    assert right.mean() == pytest.approx(proportion_correct(task, d_prime), abs=4 * 0.5 / math.sqrt(n))
+
+
+def test_yes_no_has_the_published_d_prime_and_criterion():
+    found = yes_no(8e6, 1e7, 4e6, 1e7)  # Macmillan & Creelman 2005, chapter 1: H = .8, F = .4
+    assert (found.d_prime, found.criterion) == pytest.approx((1.095, -0.294), abs=5e-4)
+
+
+def test_yes_no_is_finite_at_a_hit_rate_of_1_and_a_false_alarm_rate_of_0():
+    found = yes_no(20, 20, 0, 20)
+    assert found.d_prime == pytest.approx(2 * norm.ppf(20.5 / 21))
+    assert found.criterion == pytest.approx(0)
+    assert yes_no(20, 20, 0, 0) is None
+    assert yes_no(0, 0, 3, 20) is None
+
+
+def test_the_variance_of_d_prime_is_that_of_repeated_experiments():
+    draw, signals, noises = np.random.default_rng(5), 200, 120
+    hits, alarms = draw.binomial(signals, 0.75, 4000), draw.binomial(noises, 0.2, 4000)
+    found = [yes_no(h, signals, f, noises) for h, f in zip(hits, alarms, strict=True)]
+    assert np.mean([one.variance for one in found]) == pytest.approx(np.var([one.d_prime for one in found]), rel=0.06)
+
+
+def test_two_intervals_separates_sensitivity_from_a_bias_to_the_first():
+    d_prime, bias, n = 1.2, 0.4, 10**7
+    high, low = (norm.cdf((sign * d_prime + bias) / math.sqrt(2)) for sign in (1, -1))
+    found = two_intervals(high * n, n, low * n, n)
+    assert found.d_prime == pytest.approx(d_prime, abs=1e-5)
+    assert found.criterion == pytest.approx(-bias / math.sqrt(2), abs=1e-5)
+    assert found.variance == pytest.approx(yes_no(high * n, n, low * n, n).variance / 2)
+    assert two_intervals(9, 10, 0, 0) is None
+
+
+def test_d_prime_from_all_correct_answers_is_finite():
+    assert from_correct("3ifc", 30, 30).d_prime == pytest.approx(d_prime_at("3ifc", 30.5 / 31))
+    assert from_correct("3ifc", 30, 30).d_prime < 6
+    assert from_correct("oddity", 2, 30).d_prime == 0
+    assert from_correct("oddity", 0, 0) is None
+
+
+def test_abx_reports_one_model_and_keeps_the_other():
+    one, other = abx(75, 100, "differencing"), abx(75, 100, "independent")
+    assert (one.d_prime, one.other) == (other.other, other.d_prime)
+    assert one.d_prime == pytest.approx(d_prime_at("abx differencing", 75.5 / 101))
+    assert one.d_prime > other.d_prime
+
+
+def test_same_different_finds_the_planted_d_prime_and_criterion_under_differencing():
+    d_prime, k, n = 1.7, 1.3, 10**7
+    found = same_different(n * different_rate(d_prime, k), n, n * different_rate(0, k), n, "differencing")
+    assert (found.d_prime, found.criterion) == pytest.approx((d_prime, k), abs=1e-5)
+    draw = np.random.default_rng(1).normal(size=(400_000, 2))
+    assert (np.abs(draw[:, 0] - draw[:, 1] + d_prime) > k).mean() == pytest.approx(different_rate(d_prime, k), abs=3e-3)
+
+
+def test_same_different_of_an_unbiased_independent_observer():
+    n, d_prime = 10**8, 1.5
+    share = proportion_correct("samedifferent independent", d_prime)
+    found = same_different(n * share, n, n * (1 - share), n, "independent")
+    assert found.d_prime == pytest.approx(d_prime, abs=1e-5)
+    assert found.criterion is None
+    assert same_different(3, 20, 12, 20, "independent").d_prime == 0
+    assert same_different(20, 20, 0, 20, "differencing").d_prime < 8
+    assert same_different(20, 20, 0, 0, "differencing") is None
+
+
+def test_ratings_have_the_area_of_mann_and_whitney():
+    low, high = [1, 2, 2, 3, 4], [2, 3, 5, 5, 4, 3]
+    wins = mannwhitneyu(high, low).statistic
+    assert rating(low, high).d_prime == pytest.approx(math.sqrt(2) * norm.ppf(rate(wins, 30)))
+    assert rating([1, 1], [5, 5]).d_prime == pytest.approx(math.sqrt(2) * norm.ppf(4.5 / 5))
+    assert rating([], [5]) is None
