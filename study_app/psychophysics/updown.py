@@ -56,14 +56,18 @@ class Staircase:
         last = answers[-1][0]
         return min(max(last + self._moves(answers)[-1], self.low), self.high)
 
-    def reversals(self, answers: Sequence[Answer]) -> list[float]:
-        """Return the levels of the trials at which the direction changed."""
+    def reversals_at(self, answers: Sequence[Answer]) -> list[int]:
+        """Return the places, from 0, of the trials at which the direction changed."""
         found, before = [], 0.0
-        for (level, _), move in zip(answers, self._moves(answers), strict=True):
+        for place, move in enumerate(self._moves(answers)):
             if move * before < 0.0:
-                found.append(level)
+                found.append(place)
             before = move or before
         return found
+
+    def reversals(self, answers: Sequence[Answer]) -> list[float]:
+        """Return the levels of the trials at which the direction changed."""
+        return [answers[place][0] for place in self.reversals_at(answers)]
 
     def mean_of_reversals(self, answers: Sequence[Answer], average: int) -> float | None:
         """Return the mean of the last even number of reversals, up to ``average``; None where there are too few.

@@ -9,12 +9,13 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student
 
+from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.designs.thresholds import family, thresholds
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound, Summary
 from study_app.analysis.results.question_answers import GroupAnswers
 from study_app.analysis.statistics.outcome import Array, clopper_pearson
+from study_app.analysis.statistics.student_interval import student_interval
 from study_app.analysis.tables.compared_blocks import setting_name
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import quartiles_or_none
@@ -63,6 +64,7 @@ def _block(
         bounds=bounds,
         answers=() if opened is None else tuple(_answers(block, opened, bounds)),
         thresholds=() if opened is None else tuple(thresholds(block, opened)),
+        sensitivities=() if opened is None else tuple(sensitivities(block, opened)),
         family=family(block),
         adaptive=block.method is not None and block.method.adaptive,
     )
@@ -124,7 +126,7 @@ def _summarised(
     summary: Summary, values: Array, bounds: tuple[float, float] | None
 ) -> tuple[float, float | None, float | None]:
     """Return the mean of shares, points or logarithms and its 95 % interval within bounds, as numbers of their kind."""
-    low, high = _student(values)
+    low, high = student_interval(values)
     if summary == "geometric mean":
         low, high = (None if end is None else math.exp(end) for end in (low, high))
         return math.exp(values.mean()), low, high
@@ -135,12 +137,3 @@ def _summarised(
 
 def _number(value: Any) -> float | None:
     return None if pd.isna(value) else float(value)
-
-
-def _student(values: Array) -> tuple[float | None, float | None]:
-    """Return the 95 % interval of a mean (Student 1908); None for a single value and for equal ones."""
-    n = len(values)
-    if n < 2 or (spread := float(np.std(values, ddof=1))) == 0.0:
-        return None, None
-    half = float(student.ppf(0.975, n - 1)) * spread / math.sqrt(n)
-    return float(values.mean()) - half, float(values.mean()) + half

@@ -7,30 +7,38 @@ at the mean of their delivered levels.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from study_app.analysis.results.levels import ThresholdFound
 from study_app.analysis.statistics.outcome import Array
+from study_app.analysis.statistics.psychometrics.goodness import drift, p_of_fit
 from study_app.analysis.statistics.psychometrics.posterior import fitted
 from study_app.analysis.statistics.random_effects import group_mean
 from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.analysis.tables.tracks import TRACK, answers_of, setting_of
 from study_app.protocol.trials.psychometric import Family, analysis_grid, family_of, rises, width_prior_of
 from study_app.protocol.trials.stimuli import Stimulus
+from study_app.psychophysics.families import CLIP, success
 from study_app.psychophysics.grid import Grid
 
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Answers of one participant at one standard, by level in u: shape (k,) each."""
+    """Answers of one participant at one standard, by level in u: shape (k,) each.
+
+    ``places``, shape (n,), are the levels of the rows.
+    """
 
     levels: Array
     successes: Array
     failures: Array
+    places: NDArray[np.int64]
 
 
 def family(block: LevelBlock) -> Family | None:
@@ -56,6 +64,7 @@ def counts_of(stimulus: Stimulus, rows: pd.DataFrame) -> Counts:
         levels=np.array([stimulus.coordinate(float(level)) for level in placed]),
         successes=successes,
         failures=groups["success"].count().to_numpy(dtype=float) - successes,
+        places=np.asarray(groups.ngroup(), np.int64),
     )
 
 
@@ -73,21 +82,29 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdFou
     if shape is None or stimulus is None:
         return
     grid = grid_of(block, stimulus, shape)
-    rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["success"].notna()]
-    for standard, at_standard in rows.groupby("standard", dropna=False, sort=True):
-        own = [_own(stimulus, grid, standard, person, one) for person, one in at_standard.groupby("participant")]
-        yield _group(stimulus, standard, [one for one, _ in own], [variance for _, variance in own])
-        yield from (one for one, _ in own)
+    all_rows = opened[(opened["block"] == block.id) & opened["success"].notna()].sort_values(["session", "trial"])
+    for standard, at_standard in all_rows.groupby("standard", dropna=False, sort=True):
+        own = [
+            _own(block, stimulus, grid, standard, person, one)
+            for person, one in at_standard.groupby("participant")
+            if one["analysed"].any()
+        ]
+        if own:
+            yield _group(stimulus, standard, own)
+        yield from own
 
 
 def _own(
-    stimulus: Stimulus, grid: Grid, standard: Any, person: Any, rows: pd.DataFrame
-) -> tuple[ThresholdFound, float]:
-    """Return a participant's threshold and its variance in u."""
+    block: LevelBlock, stimulus: Stimulus, grid: Grid, standard: Any, person: Any, heard: pd.DataFrame
+) -> ThresholdFound:
+    """Return a participant's threshold; of the rows those that are analysed enter the fit."""
+    rows = heard[heard["analysed"]]
     counts = counts_of(stimulus, rows)
     found = fitted(counts.levels, counts.successes, counts.failures, grid)
     level_of = stimulus.level_of
-    one = ThresholdFound(
+    psi = success(grid.family, counts.levels, found.threshold, found.width, found.guess, found.lapse)
+    psi = np.clip(psi, CLIP, 1 - CLIP)
+    return ThresholdFound(
         participant=str(person),
         standard=_number(standard),
         n=found.n,
@@ -99,12 +116,28 @@ def _own(
         guess=found.guess,
         flat_width=level_of(found.flat),
         beyond=found.beyond,
+        variance=found.variance,
+        fit_p=p_of_fit(counts.successes, counts.successes + counts.failures, psi),
+        drift=drift(rows["success"].to_numpy(dtype=bool), psi[counts.places]),
+        reversal_mean=_reversal_mean(block, stimulus, heard),
+        target_percent=None if block.method is None else block.method.target_percent,
     )
-    return one, found.variance
 
 
-def _group(stimulus: Stimulus, standard: Any, own: list[ThresholdFound], variances: list[float]) -> ThresholdFound:
-    mean = group_mean([stimulus.coordinate(one.threshold) for one in own], variances)
+def _reversal_mean(block: LevelBlock, stimulus: Stimulus, heard: pd.DataFrame) -> float | None:
+    """Return the mean, in u, of the classical estimates of the tracks; None where none has any."""
+    if block.method is None or block.method.target_percent is None:
+        return None
+    means = []
+    for _, rows in heard.groupby(TRACK, sort=True):
+        setting = setting_of(block, rows["track"].iloc[0])
+        mean = None if setting is None else block.method.reversal_mean(setting, answers_of(rows))
+        means += [] if mean is None else [stimulus.coordinate(mean)]
+    return stimulus.level_of(float(np.mean(means))) if means else None
+
+
+def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdFound]) -> ThresholdFound:
+    mean = group_mean([stimulus.coordinate(one.threshold) for one in own], [one.variance or 0.0 for one in own])
     low, high = (None if end is None else stimulus.level_of(end) for end in (mean.low, mean.high))
     return ThresholdFound(None, _number(standard), mean.n, stimulus.level_of(mean.mean), low, high)
 

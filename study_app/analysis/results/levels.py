@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from study_app.analysis.results.question_answers import GroupAnswers
+from study_app.analysis.statistics.psychometrics.goodness import WORST, drifts
 
 Summary: TypeAlias = Literal["share", "mean", "geometric mean"]
 
@@ -38,8 +40,10 @@ class ThresholdFound:
 
     ``threshold`` with the ends of its 95 % interval and ``flat_width`` (the threshold under a flat prior on the width)
     are levels. ``width`` reaches from 5 to 95 % of the function's rise, in decades on log spacing.
-    ``beyond`` says that the threshold lies above or below the levels presented; ``reversal_mean`` is the up–down
-    track's classical estimate. Of the group only ``n`` (participants), threshold and interval are known.
+    ``beyond`` says that the threshold lies above or below the levels presented; ``variance`` is the threshold's
+    posterior variance in u. ``fit_p`` is that of the deviance, ``drift`` the correlation of trial number and deviance
+    residual. ``reversal_mean`` is the classical estimate of the up–down tracks, at ``target_percent`` successes. Of
+    the group only ``n`` (participants), threshold and interval are known.
     """
 
     participant: str | None
@@ -53,7 +57,44 @@ class ThresholdFound:
     guess: float | None = None
     flat_width: float | None = None
     beyond: str | None = None
+    variance: float | None = None
+    fit_p: float | None = None
+    drift: float | None = None
     reversal_mean: float | None = None
+    target_percent: float | None = None
+
+    @property
+    def fits(self) -> bool:
+        """Whether simulated answers deviate from the function as much as those given; true where this is not known."""
+        return self.fit_p is None or self.fit_p >= WORST
+
+    @property
+    def drifts(self) -> bool:
+        """Whether answers became better or worse over the trials, beyond 2/√n."""
+        return drifts(self.drift, self.n)
+
+
+@dataclass(frozen=True, slots=True)
+class SensitivityFound:
+    """A participant's sensitivity and bias or, where ``participant`` is None, their means over ``n`` participants.
+
+    They are those at a ``standard``, to a condition as ``comparison``, or of ratings at a ``level`` against the lowest.
+    ``shares`` are those of each answer. ``d_prime`` has a 95 % interval where its variance is known, of the group by
+    Student's t; ``criterion`` is c, or k of same–different; ``other`` is d′ under the model that is not ``model``.
+    """
+
+    participant: str | None
+    n: int
+    shares: Mapping[str, float]
+    standard: float | None = None
+    comparison: str | None = None
+    level: float | None = None
+    d_prime: float | None = None
+    low: float | None = None
+    high: float | None = None
+    criterion: float | None = None
+    model: str | None = None
+    other: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +124,7 @@ class LevelsFound:
     bounds: tuple[float, float] | None = None
     answers: tuple[LevelAnswers, ...] = ()
     thresholds: tuple[ThresholdFound, ...] = ()
+    sensitivities: tuple[SensitivityFound, ...] = ()
     family: str | None = None
     adaptive: bool = False
 

@@ -45,6 +45,12 @@ class LevelBlock:
         """What the share of answers at a level is of."""
         return success_name(self.design, self.stimulus)
 
+    @property
+    def standards_rove(self) -> bool:
+        """Whether trials of several standards alternate."""
+        standards = {one.standard for one in self.settings}
+        return len(standards) > 1 and self.method is not None and self.method.order == "interleaved"
+
     def presents_modulus(self, index: int) -> bool:
         """Return whether the trial at this place in the block presents the modulus, which is not analysed."""
         return self.design.first is not None and index == 1

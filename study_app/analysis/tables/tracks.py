@@ -9,9 +9,12 @@ import pandas as pd
 
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study import Study
+from study_app.protocol.trials.method import Answer, TrackSetting
 from study_app.protocol.trials.presentation import arrangement_of
 from study_app.protocol.trials.stimuli import DELAY, Stimulus
 
+TRACK: Final = ["participant", "session", "block", "code"]
+"""What one track is in the rows of `tracks`."""
 PRESENTATION: Final = ["participant", "session", "trial", "attempt"]
 OF_INTERVALS: Final = ("force_mean_n", "mean_speed_mps")
 """What a trial's row repeats of each of its intervals."""
@@ -43,7 +46,8 @@ def tracks(study: Study) -> pd.DataFrame:
     """Return the last attempt at each trial of levels, with what it presented; the key must be open.
 
     ``right`` says whether the answer was correct, ``success`` what it counts as for a psychometric function;
-    ``analysed`` is false where the trial does not count or presents the modulus of a magnitude estimation.
+    ``analysed`` is false where the trial does not count or presents the modulus of a magnitude estimation; ``reversal``
+    says where an up–down track changed its direction.
     """
     by_id = {block.id: block for block in study.levels}
     rows = study.trials[study.trials["block"].isin(list(by_id))]
@@ -51,10 +55,37 @@ def tracks(study: Study) -> pd.DataFrame:
     answers = answers_timed(study)[[*PRESENTATION, "response", "value", "response_s"]]
     found = rows.merge(_presented(study.intervals), on=PRESENTATION, how="left")
     found = found.merge(answers, on=PRESENTATION, how="left")
-    found["slot"] = found.groupby(["participant", "session", "block", "code"]).cumcount() + 1
+    found["slot"] = found.groupby(TRACK).cumcount() + 1
     track_rows = [_track_row(by_id[row["block"]], row) for row in found[list(_READ)].to_dict("records")]
     found = found.drop(columns=list(_DELIVERED))
-    return found.join(pd.DataFrame(track_rows, index=found.index, columns=list(_TYPES)).astype(_TYPES))
+    found = found.join(pd.DataFrame(track_rows, index=found.index, columns=list(_TYPES)).astype(_TYPES))
+    return found.assign(reversal=_reversals(found, by_id))
+
+
+def setting_of(block: LevelBlock, track: str) -> TrackSetting | None:
+    """Return what the levels of a track ("8/1") were chosen for; None where conditions are compared."""
+    number = track.rpartition("/")[2]
+    return None if block.stimulus is None else TrackSetting(block.stimulus, block.design, int(number))
+
+
+def answers_of(rows: pd.DataFrame) -> list[Answer]:
+    """Return the answers of one track as its method heard them: those that were not counted, too."""
+    heard = rows[rows["success"].notna() & rows["level"].notna()].sort_values("trial")
+    return list(zip(heard["level"].astype(float), heard["success"].astype(bool), strict=True))
+
+
+def _reversals(found: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Series[Any]:
+    """Return whether the direction of its track changed at each trial; missing where the method has no steps."""
+    reversal = pd.Series(pd.NA, index=found.index, dtype="boolean")
+    for _, rows in found.groupby(TRACK, sort=False):
+        block, heard = blocks[rows["block"].iloc[0]], rows[rows["success"].notna() & rows["level"].notna()]
+        setting = setting_of(block, rows["track"].iloc[0])
+        at = None if setting is None or block.method is None else block.method.reversals(setting, answers_of(rows))
+        if at is not None:
+            places = heard.sort_values("trial").index
+            reversal[places] = False
+            reversal[places[list(at)]] = True
+    return reversal
 
 
 def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:

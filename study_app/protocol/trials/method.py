@@ -15,6 +15,8 @@ from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.stimuli import Stimulus
 
 TrackOrder: TypeAlias = Literal["interleaved", "blocked"]
+Answer: TypeAlias = tuple[float, bool]
+"""The level presented, and whether the answer was a success."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +137,19 @@ class Method(Table):
         success : str
             What is counted, such as "correct".
         """
+        return None
+
+    @property
+    def target_percent(self) -> float | None:
+        """The percentage of successes at the mean of its reversals; None where it has no steps."""
+        return None
+
+    def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...] | None:
+        """Return the places, from 0, of a track's answers at which its direction changed; None: it has no steps."""
+        return None
+
+    def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
+        """Return the classical estimate of a track, a level; None where it has none."""
         return None
 
     def rounds(self, stimulus: Stimulus) -> int:

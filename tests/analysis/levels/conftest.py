@@ -67,6 +67,54 @@ standard = "oil"
 repetitions = 4
 """
 SEQUENCE = ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "equal", "odd", "pairs"]')
+ADAPTIVE = """
+format = 2
+study.name = "adaptive"
+
+[liquids.damper]
+drag = { law = "linear", damping_nspm = 8 }
+
+[tasks.stir]
+kind = "follow"
+lead_s = 0.5
+cycles = 1
+
+[stimuli.damping]
+vary = "damping_nspm"
+standards = [4, 8]
+levels = [0.02, 0.6]
+
+[methods.steps]
+kind = "updown"
+tracks = 2
+trials = 24
+step_up = 2
+
+[methods.quest]
+kind = "questplus"
+trials = 9
+
+[blocks.staircase]
+stimulus = "damping"
+design = "2ifc"
+method = "steps"
+
+[blocks.quest]
+stimulus = "damping"
+standards = [8]
+design = "3ifc"
+method = "quest"
+"""
+
+
+@pytest.fixture(scope="session")
+def opened_adaptive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a study of up–down tracks at two standards and of QUEST+ at one, its key open."""
+    folder = tmp_path_factory.mktemp("adaptive")
+    (folder / "adaptive.toml").write_text(ADAPTIVE)
+    study = rehearse(folder / "adaptive.toml", participants=3, seed=1, results=folder / "study", recordings=False)
+    assert unblind(study, "AB", "to analyse").left == ()
+    return study
 
 
 @pytest.fixture(scope="session")

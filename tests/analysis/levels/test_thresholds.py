@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -13,12 +14,15 @@ from study_app.analysis.results.levels import ThresholdFound
 from study_app.analysis.statistics.psychometrics.posterior import band, fitted
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.method import Heard, TrackSetting
+from study_app.protocol.trials.methods.updown import UpDown
 from study_app.protocol.trials.psychometric import analysis_grid, width_prior_of
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.families import success
 
 STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
 LEVELS = STIMULUS.spaced(9)
+NAMES = ["participant", "session", "trial", "block", "standard", "level", "level_delivered", "analysed", "success"]
 
 
 def block(design: str = "2ifc", stimulus: Stimulus = STIMULUS) -> LevelBlock:
@@ -35,9 +39,8 @@ def rows(
             level = levels[number % len(levels)]
             u = math.log10(level * delivered) if level > 0 else -math.inf
             right = bool(draw.random() < success("weibull", u, math.log10(threshold), 1.4, 0.5, 0.01))
-            found.append((person, "b", 8.0, level, level * delivered, True, right))
-    names = ["participant", "block", "standard", "level", "level_delivered", "analysed", "success"]
-    return pd.DataFrame(found, columns=names).astype({"level_delivered": "Float64", "success": "boolean"})
+            found.append((person, "01", number + 1, "b", 8.0, level, level * delivered, True, right))
+    return pd.DataFrame(found, columns=NAMES).astype({"level_delivered": "Float64", "success": "boolean"})
 
 
 def test_planted_thresholds_are_found_per_participant_and_for_the_group() -> None:
@@ -118,10 +121,12 @@ def test_noise_trials_determine_the_guess_rate_of_yes_no() -> None:
         level = (0.0, *LEVELS)[number % 10] if number % 3 else 0.0
         u = stimulus.coordinate(level)
         found.append(
-            ("P001", "b", 8.0, level, level, True, bool(draw.random() < success("normal", u, -0.7, 1, 0.2, 0)))
-        )
-    names = ["participant", "block", "standard", "level", "level_delivered", "analysed", "success"]
-    frame = pd.DataFrame(found, columns=names).astype({"level_delivered": "Float64", "success": "boolean"})
+            (
+                "P001", "01", number, "b", 8.0, level, level, True,
+                bool(draw.random() < success("normal", u, -0.7, 1, 0.2, 0)),
+            )
+        )  # fmt: skip
+    frame = pd.DataFrame(found, columns=NAMES).astype({"level_delivered": "Float64", "success": "boolean"})
     _, one = thresholds(block("yesno"), frame)
     assert one.guess == pytest.approx(0.2, abs=0.06)
     assert one.threshold == pytest.approx(0.2, rel=0.25)
@@ -154,6 +159,66 @@ def test_the_band_holds_the_function_and_is_narrow_with_many_answers() -> None:
     many = fitted(u, 1e4 * psi, 1e4 * (1 - psi), grid)
     assert many.threshold == pytest.approx(-0.7, abs=0.03)  # widths are few
     assert many.flat == pytest.approx(many.threshold, abs=0.03)
+
+
+def test_a_function_that_does_not_fit_and_answers_that_drift_are_said_to() -> None:
+    plain = rows({"P001": 0.2})
+    _, good = thresholds(block(), plain)
+    assert good.fits
+    assert not good.drifts
+    assert good.drift is not None
+    odd = plain.assign(success=(plain["level"] < 0.1) | (plain["trial"] % 2 == 0)).astype({"success": "boolean"})
+    _, bad = thresholds(block(), odd)
+    assert bad.fit_p == 0.001
+    assert not bad.fits
+    late = plain.assign(success=plain["success"] & (plain["trial"] > 120)).astype({"success": "boolean"})
+    _, later = thresholds(block(), late)
+    assert later.drifts
+
+
+def tracks_of_staircases(method: UpDown, trials: int) -> pd.DataFrame:
+    """Return rows of two interleaved tracks of one participant, whose levels follow from the answers before."""
+    draw, heard = np.random.default_rng(9), {1: list[Heard](), 2: list[Heard]()}
+    found = []
+    for trial in range(1, trials + 1):
+        number = 1 + trial % 2
+        level = method.after(TrackSetting(STIMULUS, default_design("2ifc"), number), heard[number])
+        assert level is not None
+        right = bool(draw.random() < success("weibull", math.log10(level), math.log10(0.15), 1.4, 0.5, 0.01))
+        heard[number].append(Heard(trial, f"A{number}", level, right, right))
+        found.append(("P001", "01", trial, "b", 8.0, level, level, True, right, f"A{number}", f"8/{number}"))
+    frame = pd.DataFrame(found, columns=[*NAMES, "code", "track"])
+    return frame.astype({"level_delivered": "Float64", "success": "boolean"})
+
+
+def test_reversal_means_of_the_tracks_are_averaged_in_u_with_the_percentage_of_the_rule() -> None:
+    method = UpDown(tracks=2, trials=80, step_up=1.4)
+    frame = tracks_of_staircases(method, 80)
+    _, found = thresholds(replace(block(), method=method), frame.sample(frac=1, random_state=1))
+    means = []
+    for number in (1, 2):
+        own = frame[frame["track"] == f"8/{number}"]
+        answers = [(math.log10(level), bool(right)) for level, right in zip(own["level"], own["success"], strict=True)]
+        means.append(method.staircase(STIMULUS, number).mean_of_reversals(answers, 8))
+    assert None not in means
+    assert found.reversal_mean == pytest.approx(10 ** np.mean(means))
+    assert found.target_percent == pytest.approx(80.35, abs=0.01)
+    assert 0.05 < found.reversal_mean < 0.5
+
+
+def test_trials_that_are_excluded_leave_the_fit_and_not_the_track() -> None:
+    method = UpDown(tracks=2, trials=80, step_up=1.4)
+    frame = tracks_of_staircases(method, 80)
+    _, whole = thresholds(replace(block(), method=method), frame)
+    _, fewer = thresholds(replace(block(), method=method), frame.assign(analysed=frame["trial"] % 5 > 0))
+    assert (whole.n, fewer.n) == (80, 64)
+    assert fewer.reversal_mean == whole.reversal_mean
+    assert fewer.threshold != whole.threshold
+
+
+def test_other_methods_have_no_reversal_mean() -> None:
+    _, found = thresholds(block(), rows({"P001": 0.2}))
+    assert (found.reversal_mean, found.target_percent) == (None, None)
 
 
 def test_found_thresholds_of_the_group_know_n_and_interval_alone() -> None:

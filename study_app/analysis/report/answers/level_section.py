@@ -7,6 +7,7 @@ from typing import Any
 
 from study_app.analysis.figures.level_figure import level_words, mean_words, summary_words, with_unit
 from study_app.analysis.figures.picture import Picture
+from study_app.analysis.report.answers import threshold_section
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound
 from study_app.analysis.results.words import number
@@ -15,7 +16,6 @@ SEALED = (
     "Not yet revealed: standards, levels, what each interval presented, and which answers were correct. They appear "
     "here after unblinding."
 )
-BEYOND = {None: "", "above": "above ", "below": "below "}
 EXPLAINED = (
     "{mean} over the participants, with the 95 % interval by Student's t where at least two participants differ. "
     "Below: each participant, with the number of answers."
@@ -44,45 +44,7 @@ def section(found: LevelsFound, pictures: Sequence[Picture]) -> Iterator[str]:
     if not found.adaptive:
         for standard in sorted({one.standard for one in found.answers}, key=lambda one: one or 0.0):
             yield _of_people(found, standard)
-    if found.thresholds:
-        yield heading(3, "Thresholds")
-        yield _thresholds(found)
-        yield paragraph(_threshold_words(found), "soft")
-
-
-def _thresholds(found: LevelsFound) -> str:
-    """Return a row per standard and participant, the group first."""
-    standards = len({one.standard for one in found.thresholds}) > 1
-    return table(
-        (*((f"Standard{_unit(found)}",) if standards else ()), "Participant", "n", "threshold", "95 % interval",
-         "width", "flat width prior"),
-        [
-            [
-                *((_plain(one.standard),) if standards else ()),
-                one.participant or f"group of {one.n}",
-                "–" if one.participant is None else str(one.n),
-                f"{BEYOND[one.beyond]}{one.threshold:.3g}",
-                "–" if one.low is None or one.high is None else f"{one.low:.3g} – {one.high:.3g}",
-                "–" if one.width is None else f"{one.width:.2g}",
-                "–" if one.flat_width is None else f"{one.flat_width:.3g}",
-            ]
-            for one in found.thresholds
-        ],
-        words=int(not standards),
-    )  # fmt: skip
-
-
-def _threshold_words(found: LevelsFound) -> str:
-    at = "" if found.guess_rate is None else f" ({50 * (1 + found.guess_rate):.3g} % {found.counts})"
-    width = "decades" if found.spacing == "log" else "units of the level"
-    return (
-        f"A threshold is the level ({level_words(found)}) at which the {found.family} function is half-way between "
-        f"guesses and lapses{at}: posterior median with an equal-tailed 95 % interval, from all counted answers, at "
-        f"the levels delivered to the hand. The width, from 5 to 95 % of the rise [{width}], has a log-normal prior; "
-        f"the last column is the threshold under a flat one. “Above” and “below” mark thresholds beyond the levels "
-        f"presented. The group is the random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from "
-        f"three participants on."
-    )
+    yield from threshold_section.section(found)
 
 
 def _unit(found: LevelsFound) -> str:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from study_app.protocol.table import Table
 from study_app.protocol.trials.adaptive import Adaptive
-from study_app.protocol.trials.method import Heard, TrackSetting
+from study_app.protocol.trials.method import Answer, Heard, TrackSetting
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.updown import RATIOS, Staircase, converges_to
 
@@ -62,8 +62,13 @@ class UpDown(Adaptive):
 
     def target(self, guess: float | None, success: str) -> str | None:
         """Return the percentage to which it converges."""
+        return f"converges to {self.target_percent:.1f} % {success}"
+
+    @property
+    def target_percent(self) -> float:
+        """The percentage to which the rule converges."""
         ratio = self._published_ratio if self.ratio is None else self.ratio
-        return f"converges to {100 * converges_to(int(self.rule[0]), ratio):.1f} % {success}"
+        return 100 * converges_to(int(self.rule[0]), ratio)
 
     @property
     def _published_ratio(self) -> float:
@@ -83,6 +88,18 @@ class UpDown(Adaptive):
         u = self.staircase(track.stimulus, track.number).next(_answers(track, heard))
         return min(max(track.stimulus.level_of(u), low), high)
 
+    def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...]:
+        """Return the places of the answers at which the direction changed; those to a level of zero have none."""
+        kept = [place for place, (level, _) in enumerate(answers) if level > 0]
+        at = self.staircase(track.stimulus, track.number).reversals_at(_in_u(track.stimulus, answers))
+        return tuple(kept[place] for place in at)
+
+    def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
+        """Return the level of the mean of the last reversals; None where there are too few."""
+        staircase = self.staircase(track.stimulus, track.number)
+        mean = staircase.mean_of_reversals(_in_u(track.stimulus, answers), self.average)
+        return None if mean is None else track.stimulus.level_of(mean)
+
     def staircase(self, stimulus: Stimulus, track: int) -> Staircase:
         """Return the rule for a stimulus, in the coordinate u; ``track`` counts from 1."""
         low, high = stimulus.domain
@@ -97,6 +114,10 @@ class UpDown(Adaptive):
         )
 
 
-def _answers(track: TrackSetting, heard: Sequence[Heard]) -> list[tuple[float, bool]]:
-    """Return the coordinates of the comparisons presented, with their successes."""
-    return [(track.stimulus.coordinate(one.level), bool(one.success)) for one in heard if one.level > 0]
+def _answers(track: TrackSetting, heard: Sequence[Heard]) -> list[Answer]:
+    return _in_u(track.stimulus, [(one.level, bool(one.success)) for one in heard])
+
+
+def _in_u(stimulus: Stimulus, answers: Sequence[Answer]) -> list[Answer]:
+    """Return the answers to comparisons with their levels in u; noise trials, at a level of zero, move no track."""
+    return [(stimulus.coordinate(level), success) for level, success in answers if level > 0]

@@ -1,0 +1,172 @@
+"""The part of a block's section that only a block with a design has: thresholds, sensitivity and bias."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from study_app.analysis.report.html_page import heading, paragraph, table
+from study_app.analysis.results.levels import LevelsFound, SensitivityFound, ThresholdFound
+from study_app.analysis.statistics.psychometrics.goodness import SETS
+
+BEYOND: Final = {None: "", "above": "above ", "below": "below "}
+MODELS: Final = {
+    "differencing": " d′ is that of the differencing model, since standards vary from trial to trial.",
+    "independent": " d′ is that of independent observations; the differencing model is in the table of thresholds.",
+}
+
+
+def section(found: LevelsFound) -> Iterator[str]:
+    """Yield thresholds, and sensitivity and bias, of a block whose key is open."""
+    if found.thresholds:
+        yield heading(3, "Thresholds")
+        yield _thresholds(found)
+        yield paragraph(_threshold_words(found), "soft")
+    if found.sensitivities:
+        yield heading(3, "Sensitivity and bias")
+        yield _sensitivities(found)
+        yield paragraph(_sensitivity_words(found), "soft")
+
+
+def _thresholds(found: LevelsFound) -> str:
+    """Return a row per standard and participant, the group first."""
+    standards = len({one.standard for one in found.thresholds}) > 1
+    percent = _target_percent(found)
+    return table(
+        (
+            *(("Standard",) if standards else ()),
+            "Participant",
+            "n",
+            "threshold",
+            "95 % interval",
+            "width",
+            "flat width prior",
+            *((f"mean of reversals ({percent:.1f} %)",) if percent is not None else ()),
+            "fit (p)",
+            "drift",
+        ),
+        [
+            [
+                *((_level(one.standard),) if standards else ()),
+                one.participant or f"group of {one.n}",
+                "–" if one.participant is None else str(one.n),
+                f"{BEYOND[one.beyond]}{one.threshold:.3g}",
+                "–" if one.low is None or one.high is None else f"{one.low:.3g} – {one.high:.3g}",
+                "–" if one.width is None else f"{one.width:.2g}",
+                _level(one.flat_width, 3),
+                *((_level(one.reversal_mean, 3),) if percent is not None else ()),
+                _fit(one),
+                _drift(one),
+            ]
+            for one in found.thresholds
+        ],
+        words=int(not standards),
+    )
+
+
+def _target_percent(found: LevelsFound) -> float | None:
+    return next((one.target_percent for one in found.own_thresholds), None)
+
+
+def _level(value: float | None, digits: int = 4) -> str:
+    return "–" if value is None else f"{value:.{digits}g}"
+
+
+def _fit(one: ThresholdFound) -> str:
+    if one.fit_p is None:
+        return "–"
+    return f"{one.fit_p:.3f}{'' if one.fits else ': the function does not fit'}"
+
+
+def _drift(one: ThresholdFound) -> str:
+    return "–" if one.drift is None else f"{one.drift:+.2f}{'!' if one.drifts else ''}".replace("-", "−")
+
+
+def _threshold_words(found: LevelsFound) -> str:
+    at = "" if found.guess_rate is None else f" ({50 * (1 + found.guess_rate):.3g} % {found.counts})"
+    width = "decades" if found.spacing == "log" else "units of the level"
+    percent = _target_percent(found)
+    reversals = (
+        ""
+        if percent is None
+        else f" The mean of reversals is the classical estimate of an up–down track, at {percent:.1f} % {found.counts}."
+    )
+    return (
+        f"A threshold is the level at which the {found.family} function is half-way between guesses and lapses{at}: "
+        f"posterior median with an equal-tailed 95 % interval, from all counted answers, at the levels delivered to "
+        f"the hand. The width, from 5 to 95 % of the rise [{width}], has a log-normal prior; the next column is the "
+        f"threshold under a flat one. “Above” and “below” mark thresholds beyond the levels presented. The group is "
+        f"the random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from three participants on."
+        f"{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of trial "
+        f"number and deviance residual, with “!” beyond 2/√n."
+    )
+
+
+def _sensitivities(found: LevelsFound) -> str:
+    """Return a row per standard, comparison or level and participant, the group first."""
+    ones = found.sensitivities
+    wheres = len({_where(one) for one in ones}) > 1
+    where = "Standard" if ones[0].standard is not None else "Level" if ones[0].level is not None else "Comparison"
+    measured = any(one.d_prime is not None for one in ones)
+    biased = any(one.criterion is not None for one in ones)
+    answers = tuple(ones[0].shares)
+    return table(
+        (
+            *((where,) if wheres else ()),
+            "Participant",
+            "n",
+            *(("d′", "95 % interval") if measured else ()),
+            *((_criterion_name(found),) if biased else ()),
+            *(f"“{answer.replace('_', ' ')}”" for answer in (answers[:1] if len(answers) == 2 else answers)),
+        ),
+        [
+            [
+                *((_where(one),) if wheres else ()),
+                one.participant or f"group of {one.n}",
+                "–" if one.participant is None else str(one.n),
+                *((_decimal(one.d_prime), _interval(one)) if measured else ()),
+                *((_decimal(one.criterion),) if biased else ()),
+                *(f"{100 * one.shares[answer]:.0f} %" for answer in (answers[:1] if len(answers) == 2 else answers)),
+            ]
+            for one in ones
+        ],
+        words=int(not wheres),
+    )
+
+
+def _where(one: SensitivityFound) -> str:
+    if one.comparison is not None:
+        return one.comparison.replace("_", " ")
+    value = one.level if one.standard is None else one.standard
+    return "–" if value is None else f"{value:.4g}"
+
+
+def _criterion_name(found: LevelsFound) -> str:
+    return "k" if found.design == "samedifferent" else "c"
+
+
+def _decimal(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}".replace("-", "−")
+
+
+def _interval(one: SensitivityFound) -> str:
+    return "–" if one.low is None or one.high is None else f"{_decimal(one.low)} – {_decimal(one.high)}"
+
+
+def _sensitivity_words(found: LevelsFound) -> str:
+    shares = "Percentages are shares of the answers." if found.sensitivities[0].shares else ""
+    if all(one.d_prime is None for one in found.sensitivities):
+        return shares
+    over = "over all levels presented" if found.vary is not None else "for each comparison"
+    if found.summary == "mean":
+        over = "of each level against the lowest, as d_a from the area under the ROC curve"
+    bias = {
+        "2ifc": " c is above 0 where the second interval is preferred.",
+        "yesno": " c is above 0 where “no” is preferred.",
+        "samedifferent": " k is the difference above which the answer is “different”.",
+    }.get(found.design, "")
+    model = MODELS.get(found.sensitivities[0].model or "", "")
+    return (
+        f"d′ {over}, from rates with the log-linear correction (Hautus 1995; Macmillan & Creelman 2005); that of the "
+        f"group is the mean over participants with Student’s interval.{model}{bias} {shares}"
+    ).rstrip()

@@ -1,0 +1,148 @@
+"""d′, criterion and shares of answers per participant, standard, comparison and level, from rows of tracks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import norm, ttest_1samp
+
+from study_app.analysis.designs.sensitivities import sensitivities
+from study_app.analysis.results.levels import SensitivityFound
+from study_app.analysis.tables.compared_blocks import Setting
+from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs.rating_of_interval import Rated
+from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.methods.constant import Constant
+from study_app.protocol.trials.presentation import arrangement_text
+from study_app.protocol.trials.stimuli import Stimulus
+from study_app.psychophysics.detection import different_rate, proportion_correct
+
+STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(4.0, 8.0))
+ROVING = tuple(Setting(f"V{number}", f"{standard}/1") for number, standard in enumerate((4, 8), start=1))
+ONE = (Setting("V1", "8/1"),)
+NAMES = ["participant", "block", "standard", "track", "level", "arrangement", "response", "value", "analysed"]
+TRIALS = 60_000
+
+
+def block(
+    design: Design | str, stimulus: Stimulus | None = STIMULUS, settings: tuple[Setting, ...] = ROVING
+) -> LevelBlock:
+    kind = default_design(design) if isinstance(design, str) else design
+    return LevelBlock("b", "Block", "main", kind, stimulus, settings, Constant() if stimulus else None)
+
+
+def rows(design: str, chosen: dict[int, float], answers: tuple[str, str], person: str = "P001") -> pd.DataFrame:
+    """Return rows in which the first of two answers has a given share at each arrangement."""
+    kind, found = default_design(design), []
+    for arrangement, share in chosen.items():
+        letters = arrangement_text(kind, arrangement)
+        for number in range(TRIALS):
+            answer = answers[0] if number < round(share * TRIALS) else answers[1]
+            found.append((person, "b", 8.0, "8/1", 0.2, letters, answer, None, True))
+    return pd.DataFrame(found, columns=NAMES)
+
+
+def own(block: LevelBlock, frame: pd.DataFrame) -> SensitivityFound:
+    _, one = sensitivities(block, frame)
+    return one
+
+
+def test_2ifc_has_d_prime_criterion_and_share_of_first() -> None:
+    d_prime, bias = 1.3, 0.5
+    first = {0: norm.cdf((d_prime + bias) / math.sqrt(2)), 1: norm.cdf((-d_prime + bias) / math.sqrt(2))}
+    one = own(block("2ifc"), rows("2ifc", first, ("first", "second")))
+    assert one.d_prime == pytest.approx(d_prime, abs=2e-3)
+    assert one.criterion == pytest.approx(-bias / math.sqrt(2), abs=2e-3)
+    assert one.shares["first"] == pytest.approx((first[0] + first[1]) / 2, abs=1e-4)
+    assert one.low is not None
+    assert one.high is not None
+    assert one.high - one.low == pytest.approx(2 * (one.high - one.d_prime), abs=1e-9)
+    assert (one.standard, one.n, one.participant) == (8.0, 2 * TRIALS, "P001")
+
+
+def test_yes_no_takes_false_alarms_from_the_noise_trials() -> None:
+    one = own(block("yesno"), rows("yesno", {0: 0.8, 1: 0.4}, ("yes", "no")))
+    assert one.d_prime == pytest.approx(1.095, abs=1e-3)
+    assert one.criterion == pytest.approx(-0.294, abs=1e-3)
+
+
+def test_same_different_is_differencing_where_standards_rove_and_independent_otherwise() -> None:
+    d_prime, k = 1.8, 1.4
+    high, low = different_rate(d_prime, k), different_rate(0, k)
+    frame = rows("samedifferent", {0: 1 - low, 1: 1 - low, 2: 1 - high, 3: 1 - high}, ("same", "different"))
+    roving, fixed = own(block("samedifferent"), frame), own(block("samedifferent", settings=ONE), frame)
+    assert (roving.model, fixed.model) == ("differencing", "independent")
+    assert roving.d_prime == pytest.approx(d_prime, abs=3e-3)
+    assert roving.criterion == pytest.approx(k, abs=3e-3)
+    assert roving.other == fixed.d_prime
+    assert fixed.other == roving.d_prime
+    assert fixed.criterion is None
+
+
+@pytest.mark.parametrize(("design", "task"), [("abx", "abx independent"), ("oddity", "oddity"), ("3ifc", "3ifc")])
+def test_designs_without_a_criterion_have_d_prime_from_the_share_correct(design: str, task: str) -> None:
+    kind, share = default_design(design), proportion_correct(task, 1.5)
+    found = []
+    for arrangement in range(len(kind.arrangements)):
+        right = str(kind.correct(arrangement))
+        wrong = next(answer for answer in kind.answers if answer != right)
+        letters = arrangement_text(kind, arrangement)
+        for number in range(5000):
+            answer = right if number < share * 5000 else wrong
+            found.append(("P001", "b", 8.0, "8/1", 0.2, letters, answer, None, True))
+    one = own(block(design, settings=ONE), pd.DataFrame(found, columns=NAMES))
+    assert one.d_prime == pytest.approx(1.5, abs=5e-3)
+    assert one.criterion is None
+    assert sum(one.shares.values()) == pytest.approx(1)
+
+
+def test_conditions_have_a_sensitivity_each_and_the_group_has_students_interval() -> None:
+    shares = {"P001": 0.6, "P002": 0.75, "P003": 0.9}
+    frames = [
+        rows("2ifc", {0: share, 1: 1 - share}, ("first", "second"), person).assign(track=name, standard=None)
+        for person, share in shares.items()
+        for name in ("late", "thick")
+    ]
+    found = list(sensitivities(block("2ifc", None, ()), pd.concat(frames)))
+    assert [(one.comparison, one.participant) for one in found] == [
+        (name, person) for name in ("late", "thick") for person in (None, *shares)
+    ]
+    group, *people = found[:4]
+    d_primes = [one.d_prime for one in people]
+    assert group.d_prime == pytest.approx(np.mean(d_primes))
+    ends = ttest_1samp(d_primes, 0).confidence_interval(0.95)
+    assert (group.low, group.high) == pytest.approx((ends.low, ends.high))
+
+
+def test_equal_participants_give_no_interval_of_the_group() -> None:
+    frames = [
+        rows("2ifc", {0: share, 1: 1 - share}, ("first", "second"), f"P00{n}") for n, share in enumerate((0.7, 0.7))
+    ]
+    frames[1] = frames[1].iloc[::-1]
+    group, *_ = sensitivities(block("2ifc"), pd.concat(frames))
+    assert (group.low, group.high) == (None, None)
+
+
+def test_without_a_correct_answer_only_shares_are_known() -> None:
+    stimulus = Stimulus(vary="damping_nspm", level="value", levels=(1, 20), standards=(8.0,))
+    one = own(block("2ifc", stimulus), rows("2ifc", {0: 0.7, 1: 0.5}, ("first", "second")))
+    assert (one.d_prime, one.criterion, one.shares["first"]) == (None, None, pytest.approx(0.6))
+
+
+def test_ratings_have_d_a_of_each_level_against_the_lowest() -> None:
+    draw, found = np.random.default_rng(3), []
+    for level, shift in ((1.0, 0.0), (2.0, 0.8), (4.0, 1.6)):
+        values = draw.normal(shift, 1, 4000)
+        found += [("P001", "b", None, "/1", level, "C", str(value), value, True) for value in values]
+    stimulus = Stimulus(vary="damping_nspm", level="value", levels=(1, 4))
+    people = [
+        one
+        for one in sensitivities(block(Rated(scale="five"), stimulus), pd.DataFrame(found, columns=NAMES))
+        if one.participant
+    ]
+    assert [one.level for one in people] == [2.0, 4.0]
+    assert [one.d_prime for one in people] == pytest.approx([0.8, 1.6], abs=0.06)
