@@ -12,7 +12,7 @@ import pandas as pd
 
 from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.designs.thresholds import family, thresholds
-from study_app.analysis.results.levels import LevelAnswers, LevelsFound, Summary
+from study_app.analysis.results.levels import LevelAnswers, LevelsFound, LevelTimes, Summary
 from study_app.analysis.results.question_answers import GroupAnswers
 from study_app.analysis.statistics.outcome import Array, clopper_pearson
 from study_app.analysis.statistics.student_interval import student_interval
@@ -27,14 +27,20 @@ from study_app.protocol.trials.design import Reply
 SUMMARIES: Final[dict[Reply, Summary]] = {"choice": "share", "rating": "mean", "number": "geometric mean"}
 """How the answers at a level are summarised, by the reply that the design asks for."""
 
+MOST_LEVELS: Final = 8
+"""Rows of times to answer at a standard; of more levels, neighbours share a row."""
 
-def levels_found(study: Study) -> tuple[LevelsFound, ...]:
-    """Return what was answered in every main block of levels, in the order of the session."""
+
+def levels_found(study: Study, rows: pd.DataFrame | None = None) -> tuple[LevelsFound, ...]:
+    """Return what was answered in every main block of levels, in the order of the session.
+
+    ``rows`` are those of `tracks`, where they are already known.
+    """
     main = [block for block in study.levels if block.phase == "main"]
     if not main:
         return ()
     timed = answers_timed(study)
-    opened = tracks(study) if study.revealed else None
+    opened = rows if rows is not None else tracks(study) if study.revealed else None
     bounds = {one.where.id: one.bounds for one in study.others.questions}
     return tuple(_block(one, timed[timed["block"] == one.id], opened, bounds.get(one.id)) for one in main)
 
@@ -64,6 +70,7 @@ def _block(
         bounds=bounds,
         answers=() if opened is None else tuple(_answers(block, opened, bounds)),
         thresholds=() if opened is None else tuple(thresholds(block, opened)),
+        level_times=() if opened is None else tuple(_level_times(block, opened)),
         sensitivities=() if opened is None else tuple(sensitivities(block, opened)),
         family=family(block),
         adaptive=block.method is not None and block.method.adaptive,
@@ -74,6 +81,23 @@ def _times(answers: pd.DataFrame) -> dict[str, Any]:
     seconds = answers["response_s"].dropna().to_numpy(dtype=float)
     low, middle, high = quartiles_or_none(seconds)
     return {"n": len(seconds), "median": middle, "q1": low, "q3": high}
+
+
+def _level_times(block: LevelBlock, opened: pd.DataFrame) -> Iterator[LevelTimes]:
+    """Yield the times of correct and of other answers by level; many levels in `MOST_LEVELS` ranges of neighbours."""
+    rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["right"].notna()]
+    rows = rows[rows["level"].notna() & rows["response_s"].notna()]
+    for standard, at_standard in rows.groupby("standard", dropna=False, sort=True):
+        levels = np.unique(at_standard["level"].to_numpy(dtype=float))
+        for some in np.array_split(levels, min(len(levels), MOST_LEVELS)):
+            here = at_standard[at_standard["level"].astype(float).between(some[0], some[-1])]
+            seconds, right = here["response_s"].to_numpy(dtype=float), here["right"].to_numpy(dtype=bool)
+            (right_n, right_s), (wrong_n, wrong_s) = _median(seconds[right]), _median(seconds[~right])
+            yield LevelTimes(_number(standard), float(some[0]), float(some[-1]), right_n, right_s, wrong_n, wrong_s)
+
+
+def _median(seconds: Array) -> tuple[int, float | None]:
+    return len(seconds), float(np.median(seconds)) if len(seconds) else None
 
 
 def _answers(block: LevelBlock, opened: pd.DataFrame, bounds: tuple[float, float] | None) -> Iterator[LevelAnswers]:

@@ -16,6 +16,8 @@ from study_app.analysis.tables.study import Study, load_study
 from study_app.store.output_files import write_files
 
 Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
+OPENED: Final = ("tracks", "thresholds")
+"""Tables of levels that SPSS files are made of."""
 NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
 
 
@@ -28,7 +30,8 @@ def export(
 ) -> tuple[Path, ...]:
     """Write the tables and the codebook of a study into the folder ``to``; return the files.
 
-    Tables: responses, trials, aggregate; of a study with levels also intervals and, once its key is open, tracks.
+    Tables: responses, trials, aggregate; of a study with levels also intervals and, once its key is open, tracks
+    and thresholds.
 
     Files that are not as they were recorded are used as they are: ``warn`` receives each, and the codebook names it.
 
@@ -70,7 +73,7 @@ def export_files(study: Study, extras: Collection[Extra] = NOTHING_ELSE) -> dict
     if across is not None and "sav" in extras:
         files[_name(study, responses, "sav")] = spss.long_sav(study, responses)
         files[_name(study, across, "sav")] = spss.wide_sav(study, across, cells)
-        files |= {_name(study, one, "sav"): spss.tracks_sav(study, one) for one in tables if one.name == "tracks"}
+        files |= {_name(study, one, "sav"): spss.plain_sav(study, one) for one in tables if one.name in OPENED}
     if across is not None and "psych-ds" in extras:
         held = {_name(study, table, "csv"): table for table in dict.fromkeys((*tables, across))}
         contents = {name: files.get(name) or table_bytes(table) for name, table in held.items()}

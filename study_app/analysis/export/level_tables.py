@@ -1,71 +1,36 @@
-"""The tables of a study with levels: intervals and, once the key is open, a row per trial with what it presented."""
+"""The tables of a study with levels: intervals and, once the key is open, its trials and its thresholds."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
+import pandas as pd
+
+from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.export.delivered import JUDGED, Delivered, delivered
+from study_app.analysis.results.levels import LevelsFound
 from study_app.analysis.tables.study import Study
 from study_app.analysis.tables.tracks import OF_INTERVALS, tracks
-from study_app.store.tables.column import Column, unsealed
+from study_app.store.tables.column import Column, header, unsealed
 from study_app.store.tables.columns import INTERVALS, TRIALS_2, tables_of
+from study_app.store.tables.level_columns import OF_TRACKS, THRESHOLDS
 
 _OF_TRIAL: Final = ("study", "participant", "session", "simulated", "pilot", "group", "trial", "attempt", "block")
 _OF_BLOCK: Final = ("phase", "part", "index", "code")
 _BY_NAME: Final = {column.name: column for column in (*TRIALS_2, *INTERVALS)}
 
+_OF_PERSON: Final = tuple(_BY_NAME[name] for name in ("study", "participant", "simulated", "pilot", "group"))
+_OF_THRESHOLD: Final = (
+    "n", "threshold", "low", "high", "beyond", "width", "lapse", "reversal_mean", "target_percent", "fit_p", "drift",
+)  # fmt: skip
+TYPES: Final = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
+
 TRACKS: Final = (
     *(_BY_NAME[name] for name in (*_OF_TRIAL, *_OF_BLOCK)),
     *JUDGED,
-    Column(
-        "analysed",
-        "flag",
-        "true where the row counts and does not present the modulus of a magnitude estimation.",
-    ),
-    Column("track", "text", "What the code stands for: standard and number of the track (8/1), or the condition."),
-    Column("slot", "integer", "Position of the trial among those of its code in the session, from 1.", minimum=1),
-    _BY_NAME["catch"],
-    _BY_NAME["standard"],
-    replace(_BY_NAME["level"], name="level_asked"),
-    Column(
-        "level_delivered",
-        "number",
-        "The level at which the hand met the comparison: from the delivered values, and for a delay from the mean "
-        "errors of the frames; n/a where it was not measured.",
-        may_miss=True,
-    ),
-    Column(
-        "comparison",
-        "number",
-        "The comparison at this level, in the unit of the varied number; n/a where conditions are compared.",
-        may_miss=True,
-    ),
-    Column(
-        "arrangement",
-        "text",
-        "What the intervals presented, in order: S the standard, C the comparison; n/a if none was presented.",
-        may_miss=True,
-    ),
-    Column(
-        "comparison_interval",
-        "integer",
-        "The interval that alone presented the comparison, from 1; n/a where there is none.",
-        minimum=1,
-        may_miss=True,
-    ),
-    Column("response", "text", "The answer; n/a without one.", may_miss=True),
-    Column("value", "number", "The answer as a number, where it is one.", may_miss=True),
-    Column("right", "flag", "true if the answer was correct; n/a where no answer is.", may_miss=True),
-    Column(
-        "response_s",
-        "number",
-        "Time from the question to the first choice of an answer.",
-        "s",
-        minimum=0,
-        may_miss=True,
-    ),
+    *OF_TRACKS,
 )
 
 
@@ -79,6 +44,55 @@ def level_tables(study: Study) -> Iterator[Delivered]:
     if study.revealed:
         frame = tracks(study).rename(columns={"level": "level_asked"})
         yield delivered("tracks", (*TRACKS, *_of_intervals(study)), frame)
+        yield delivered("thresholds", (*_OF_PERSON, *THRESHOLDS), _thresholds(study, frame))
+
+
+def _thresholds(study: Study, tracks: pd.DataFrame) -> pd.DataFrame:
+    """Return a row per participant and standard, or condition that is compared, of the main blocks."""
+    groups = dict(zip(tracks["participant"], tracks["group"], strict=True))
+    rows = [
+        {
+            "study": study.name,
+            "participant": participant,
+            "simulated": study.simulated,
+            "pilot": study.pilot,
+            "group": groups[participant],
+            "block": found.block,
+            "standard": standard,
+            "condition": condition,
+            **_measured(found, participant, standard, condition),
+        }
+        for found in levels_found(study, tracks.rename(columns={"level_asked": "level"}))
+        for participant, standard, condition in _estimated(found)
+    ]
+    columns = (*_OF_PERSON, *THRESHOLDS)
+    frame = pd.DataFrame(rows, columns=list(header(columns)))
+    return frame.astype({column.name: TYPES[column.kind] for column in columns})
+
+
+def _estimated(found: LevelsFound) -> list[tuple[str | None, float | None, str | None]]:
+    """Return participant, standard and compared condition of each row; a block of ratings has none."""
+    return [
+        (one.participant, one.standard, one.comparison)
+        for one in found.sensitivities
+        if one.participant is not None and one.level is None
+    ]
+
+
+def _measured(found: LevelsFound, *which: str | float | None) -> dict[str, Any]:
+    threshold = next((one for one in found.own_thresholds if (one.participant, one.standard, None) == which), None)
+    sensitivity = next(
+        (one for one in found.sensitivities if (one.participant, one.standard, one.comparison) == which), None
+    )
+    held: dict[str, Any] = {}
+    if sensitivity is not None:
+        held = {name: getattr(sensitivity, name) for name in ("n", "d_prime", "criterion")}
+        held |= {"d_prime_model": sensitivity.model, "d_prime_other": sensitivity.other}
+        held["share_first"] = next(iter(sensitivity.shares.values()), None)
+    if threshold is not None:
+        held |= {name: getattr(threshold, name) for name in _OF_THRESHOLD}
+        held["flat_width_threshold"] = threshold.flat_width
+    return held
 
 
 def _of_intervals(study: Study) -> tuple[Column, ...]:

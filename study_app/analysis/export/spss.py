@@ -63,8 +63,8 @@ def long_sav(study: Study, table: Delivered) -> bytes:
     return _sav(study, Delivered(table.name, table.columns, frame.assign(response=answers)), coded)
 
 
-def tracks_sav(study: Study, table: Delivered) -> bytes:
-    """Return the table of tracks as a .sav file."""
+def plain_sav(study: Study, table: Delivered) -> bytes:
+    """Return a table whose numbers have no codes as a .sav file."""
     return _sav(study, table, {})
 
 

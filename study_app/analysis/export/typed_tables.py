@@ -74,7 +74,7 @@ def _may_miss(columns: tuple[Column, ...]) -> tuple[Column, ...]:
 
 
 def deliver(study: Study) -> tuple[Delivered, ...]:
-    """Return responses, trials and aggregate of a study; with levels, also its intervals and opened tracks."""
+    """Return responses, trials and aggregate of a study; with levels, also intervals, opened tracks and thresholds."""
     opened = OPENED if study.revealed else ()
     achieved = (*OPENED, ACHIEVED) if study.revealed else ()
     trials = tables_of(study.protocol_format)["trials"]

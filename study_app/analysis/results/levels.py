@@ -98,6 +98,19 @@ class SensitivityFound:
 
 
 @dataclass(frozen=True, slots=True)
+class LevelTimes:
+    """Median times to answer [s] of all participants at the levels from ``low`` to ``high`` of a standard."""
+
+    standard: float | None
+    low: float
+    high: float
+    right_n: int
+    right_s: float | None
+    wrong_n: int
+    wrong_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
 class LevelsFound:
     """A block of levels.
 
@@ -125,6 +138,7 @@ class LevelsFound:
     answers: tuple[LevelAnswers, ...] = ()
     thresholds: tuple[ThresholdFound, ...] = ()
     sensitivities: tuple[SensitivityFound, ...] = ()
+    level_times: tuple[LevelTimes, ...] = ()
     family: str | None = None
     adaptive: bool = False
 

@@ -70,19 +70,25 @@ def setting_of(block: LevelBlock, track: str) -> TrackSetting | None:
 
 def answers_of(rows: pd.DataFrame) -> list[Answer]:
     """Return the answers of one track as its method heard them: those that were not counted, too."""
-    heard = rows[rows["success"].notna() & rows["level"].notna()].sort_values("trial")
+    heard = _heard(rows)
     return list(zip(heard["level"].astype(float), heard["success"].astype(bool), strict=True))
+
+
+def _heard(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows whose answers moved their track, in order: no catch trials."""
+    moves = rows["success"].notna() & rows["level"].notna() & ~rows["catch"].fillna(False).astype(bool)
+    return rows[moves].sort_values("trial")
 
 
 def _reversals(found: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Series[Any]:
     """Return whether the direction of its track changed at each trial; missing where the method has no steps."""
     reversal = pd.Series(pd.NA, index=found.index, dtype="boolean")
     for _, rows in found.groupby(TRACK, sort=False):
-        block, heard = blocks[rows["block"].iloc[0]], rows[rows["success"].notna() & rows["level"].notna()]
+        block = blocks[rows["block"].iloc[0]]
         setting = setting_of(block, rows["track"].iloc[0])
         at = None if setting is None or block.method is None else block.method.reversals(setting, answers_of(rows))
         if at is not None:
-            places = heard.sort_values("trial").index
+            places = _heard(rows).index
             reversal[places] = False
             reversal[places[list(at)]] = True
     return reversal

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.tables.column import MISSING, Column
 from study_app.store.tables.columns import EXCLUSIONS, INTERVALS, PARTICIPANTS, RESPONSES, RESPONSES_2, TRIALS, TRIALS_2
+from study_app.store.tables.level_columns import OF_TRACKS, THRESHOLDS
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
 
 SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
@@ -34,6 +35,18 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
         "…_description-trials_data.csv, …_description-participants_data.csv",
         "what differs in trials if the protocol has format 2; participants have the group, too",
         tuple(column for column in TRIALS_2 if column not in TRIALS),
+    ),
+    (
+        "Tracks",
+        "study-…_description-tracks_data.csv",
+        "one row per trial with a design, after unblinding; what it has in addition to the columns of trials",
+        OF_TRACKS,
+    ),
+    (
+        "Thresholds",
+        "study-…_description-thresholds_data.csv",
+        "one row per participant and standard, or condition compared, after unblinding",
+        THRESHOLDS,
     ),
     ("Exclusions", "exclusions.csv", "one row per excluded session or trial", EXCLUSIONS),
     ("Samples", "recordings/trial-….parquet", "one row per tick of the servo", SAMPLES),

@@ -7,6 +7,7 @@ from typing import Final
 
 from study_app.analysis.report.html_page import heading, paragraph, table
 from study_app.analysis.results.levels import LevelsFound, SensitivityFound, ThresholdFound
+from study_app.analysis.results.words import number
 from study_app.analysis.statistics.psychometrics.goodness import SETS
 
 BEYOND: Final = {None: "", "above": "above ", "below": "below "}
@@ -26,6 +27,9 @@ def section(found: LevelsFound) -> Iterator[str]:
         yield heading(3, "Sensitivity and bias")
         yield _sensitivities(found)
         yield paragraph(_sensitivity_words(found), "soft")
+    if found.level_times:
+        yield heading(3, "Time to answer by level")
+        yield _times(found)
 
 
 def _thresholds(found: LevelsFound) -> str:
@@ -134,6 +138,26 @@ def _sensitivities(found: LevelsFound) -> str:
     )
 
 
+def _times(found: LevelsFound) -> str:
+    """Return a row per standard and level, with the median times of correct and of other answers."""
+    standards = len({one.standard for one in found.level_times}) > 1
+    return table(
+        (*(("Standard",) if standards else ()), "Level", "n right", "median [s]", "n wrong", "median [s]"),
+        [
+            [
+                *((_level(one.standard),) if standards else ()),
+                _level(one.low, 3) if one.low == one.high else f"{one.low:.3g} – {one.high:.3g}",
+                str(one.right_n),
+                number(one.right_s),
+                str(one.wrong_n),
+                number(one.wrong_s),
+            ]
+            for one in found.level_times
+        ],
+        words=0,
+    )
+
+
 def _where(one: SensitivityFound) -> str:
     if one.comparison is not None:
         return one.comparison.replace("_", " ")
@@ -146,7 +170,7 @@ def _criterion_name(found: LevelsFound) -> str:
 
 
 def _decimal(value: float | None) -> str:
-    return "–" if value is None else f"{value:.2f}".replace("-", "−")
+    return number(value)
 
 
 def _interval(one: SensitivityFound) -> str:

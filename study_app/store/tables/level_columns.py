@@ -1,0 +1,163 @@
+"""Columns of what is known of blocks of levels once the key is open: of tracks, and of thresholds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from study_app.store.tables.column import Column
+from study_app.store.tables.columns import INTERVALS
+
+_BY_NAME: Final = {column.name: column for column in INTERVALS}
+
+OF_TRACKS: Final[tuple[Column, ...]] = (
+    Column(
+        "analysed",
+        "flag",
+        "true where the row counts and does not present the modulus of a magnitude estimation.",
+    ),
+    Column("track", "text", "What the code stands for: standard and number of the track (8/1), or the condition."),
+    Column("slot", "integer", "Position of the trial among those of its code in the session, from 1.", minimum=1),
+    _BY_NAME["catch"],
+    _BY_NAME["standard"],
+    replace(_BY_NAME["level"], name="level_asked"),
+    Column(
+        "level_delivered",
+        "number",
+        "The level at which the hand met the comparison: from the delivered values, and for a delay from the mean "
+        "errors of the frames; n/a where it was not measured.",
+        may_miss=True,
+    ),
+    Column(
+        "comparison",
+        "number",
+        "The comparison at this level, in the unit of the varied number; n/a where conditions are compared.",
+        may_miss=True,
+    ),
+    Column(
+        "arrangement",
+        "text",
+        "What the intervals presented, in order: S the standard, C the comparison; n/a if none was presented.",
+        may_miss=True,
+    ),
+    Column(
+        "comparison_interval",
+        "integer",
+        "The interval that alone presented the comparison, from 1; n/a where there is none.",
+        minimum=1,
+        may_miss=True,
+    ),
+    Column("response", "text", "The answer; n/a without one.", may_miss=True),
+    Column("value", "number", "The answer as a number, where it is one.", may_miss=True),
+    Column("right", "flag", "true if the answer was correct; n/a where no answer is.", may_miss=True),
+    Column(
+        "response_s",
+        "number",
+        "Time from the question to the first choice of an answer.",
+        "s",
+        minimum=0,
+        may_miss=True,
+    ),
+    Column(
+        "reversal",
+        "flag",
+        "true if the up–down track changed its direction here; n/a where the method has no steps.",
+        may_miss=True,
+    ),
+)
+"""What a row of tracks has in addition to the trial it is about."""
+
+THRESHOLDS: Final[tuple[Column, ...]] = (
+    Column("block", "text", "Id of the block."),
+    Column(
+        "standard", "number", "The standard, in the unit of the varied number; n/a where there is none.", may_miss=True
+    ),
+    Column("condition", "text", "The condition that was compared; n/a in a block of levels.", may_miss=True),
+    Column("n", "integer", "Answers that count.", minimum=0),
+    Column(
+        "threshold",
+        "number",
+        "Level at which the psychometric function is half-way between guesses and lapses: posterior median, in the "
+        "unit of the stimulus' levels; n/a where the answers enter no such function.",
+        may_miss=True,
+    ),
+    Column("low", "number", "Lower end of the threshold's equal-tailed 95 % interval.", may_miss=True),
+    Column("high", "number", "Upper end of the threshold's equal-tailed 95 % interval.", may_miss=True),
+    Column(
+        "beyond",
+        "text",
+        "Whether the threshold lies beyond the levels that were presented; n/a: between them.",
+        levels=(("above", "above the highest"), ("below", "below the lowest")),
+        may_miss=True,
+    ),
+    Column(
+        "width",
+        "number",
+        "Posterior median of the function's width, from 5 to 95 % of its rise: in decades where levels are spaced by "
+        "their logarithm, else in the unit of the levels.",
+        minimum=0,
+        may_miss=True,
+    ),
+    Column("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1, may_miss=True),
+    Column("flat_width_threshold", "number", "The threshold under a flat prior on the width.", may_miss=True),
+    Column(
+        "reversal_mean",
+        "number",
+        "Mean of the last reversals of the up–down tracks; n/a for other methods and with too few.",
+        may_miss=True,
+    ),
+    Column(
+        "target_percent",
+        "number",
+        "Percentage of successes to which the rule of the up–down tracks converges.",
+        "%",
+        minimum=0,
+        maximum=100,
+        may_miss=True,
+    ),
+    Column(
+        "d_prime", "number", "Sensitivity over all levels presented; n/a where no answer is correct.", may_miss=True
+    ),
+    Column(
+        "d_prime_model",
+        "text",
+        "The model of d_prime, where the design has two.",
+        levels=(
+            ("differencing", "intervals are compared with each other"),
+            ("independent", "each interval is compared with known alternatives"),
+        ),
+        may_miss=True,
+    ),
+    Column("d_prime_other", "number", "Sensitivity under the other model.", may_miss=True),
+    Column(
+        "criterion",
+        "number",
+        "c of yes–no and of two-interval forced choice, k of the differencing model of same–different.",
+        may_miss=True,
+    ),
+    Column(
+        "share_first",
+        "number",
+        "Share of the first of the answers, such as “first” or “yes”.",
+        minimum=0,
+        maximum=1,
+        may_miss=True,
+    ),
+    Column(
+        "fit_p",
+        "number",
+        "p of the function's deviance among simulated sets of answers; below 0.05 the function does not fit.",
+        minimum=0,
+        maximum=1,
+        may_miss=True,
+    ),
+    Column(
+        "drift",
+        "number",
+        "Correlation of trial number and deviance residual.",
+        minimum=-1,
+        maximum=1,
+        may_miss=True,
+    ),
+)
+"""Of one row per participant and standard, or compared condition."""
