@@ -16,6 +16,8 @@ from study_app.analysis.figures.level_figure import level_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.report_figures import pictures
+from study_app.analysis.figures.track_figure import track_pictures
+from study_app.analysis.figures.weber_figure import weber_pictures
 from study_app.analysis.report import block_section, conduct_section, number_files, summary
 from study_app.analysis.report.answers import question_section
 from study_app.analysis.report.first_page.page import first_page
@@ -105,7 +107,8 @@ def _of_questions(study: Study, results: Results, failures: Failures) -> Iterato
     if results.questions:
         yield from question_pictures(study, results.questions, failures=failures)
     if results.levels:
-        yield from level_pictures(study, results.levels, failures=failures)
+        for pictures_of in (level_pictures, track_pictures, weber_pictures):
+            yield from pictures_of(study, results.levels, failures=failures)
 
 
 def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: Failures) -> dict[str, bytes]:

@@ -44,7 +44,7 @@ def section(found: LevelsFound, pictures: Sequence[Picture]) -> Iterator[str]:
     if not found.adaptive:
         for standard in sorted({one.standard for one in found.answers}, key=lambda one: one or 0.0):
             yield _of_people(found, standard)
-    yield from threshold_section.section(found)
+    yield from threshold_section.section(found, {one.name: one for one in pictures})
 
 
 def _unit(found: LevelsFound) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final
 
-from study_app.analysis.report.html_page import heading, paragraph, table
+from study_app.analysis.figures.picture import Picture
+from study_app.analysis.report.html_page import drawn, heading, paragraph, table
 from study_app.analysis.results.levels import LevelsFound, SensitivityFound, ThresholdFound
 from study_app.analysis.results.words import number
 from study_app.analysis.statistics.psychometrics.goodness import SETS
@@ -17,12 +18,14 @@ MODELS: Final = {
 }
 
 
-def section(found: LevelsFound) -> Iterator[str]:
-    """Yield thresholds, and sensitivity and bias, of a block whose key is open."""
+def section(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str]:
+    """Yield thresholds, sensitivity and bias, and times to answer of a block whose key is open."""
     if found.thresholds:
         yield heading(3, "Thresholds")
         yield _thresholds(found)
         yield paragraph(_threshold_words(found), "soft")
+        yield from drawn(pictures, f"tracks-{found.block}")
+        yield from drawn(pictures, f"weber-{found.block}")
     if found.sensitivities:
         yield heading(3, "Sensitivity and bias")
         yield _sensitivities(found)

@@ -82,6 +82,33 @@ def band(
     return np.asarray(found, float).T
 
 
+def narrowing(
+    levels: ArrayLike, places: ArrayLike, successes: ArrayLike, grid: Grid
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the ends of the threshold's 95 % interval after each answer, shape (n,) each.
+
+    Parameters
+    ----------
+    levels : (k,) array
+        The levels, in u.
+    places, successes : (n,) array
+        Which level each answer was given to, and whether it was a success, in the order of the trials.
+    grid : Grid
+        The cells and their prior.
+    """
+    psi = grid.success(levels)
+    log_success, log_failure = np.log(psi), np.log1p(-psi)
+    log_likelihood = np.zeros(grid.shape)
+    thresholds, ends = np.array(grid.thresholds), []
+    for place, right in zip(np.asarray(places, int), np.asarray(successes, bool), strict=True):
+        log_likelihood += (log_success if right else log_failure)[place]
+        weights = grid.prior * np.exp(log_likelihood - log_likelihood.max())
+        marginal = weights.sum(axis=(1, 2, 3)) / weights.sum()
+        ends.append([quantile(thresholds, marginal, share) for share in (0.025, 0.975)])
+    low, high = np.asarray(ends, float).reshape(-1, 2).T
+    return low, high
+
+
 def _median(values: ArrayLike, weights: NDArray[np.float64]) -> float:
     """Return the median of a distribution over few values, interpolated between them."""
     values = np.asarray(values, float)

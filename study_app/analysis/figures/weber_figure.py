@@ -1,0 +1,126 @@
+"""Weber fractions over standards: participants as thin lines, the group with its interval."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Final
+
+from matplotlib.axes import Axes
+
+from study_app import figure_style as style
+from study_app.analysis.figures import answer_figures
+from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
+from study_app.analysis.figures.picture import Picture
+from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.words import counted
+from study_app.analysis.tables.study import Study
+
+LEFT_PT: Final = 34.0
+RIGHT_PT: Final = 10.0
+TOP_PT: Final = 40.0
+FOOT_PT: Final = 32.0
+HEIGHT_PT: Final = 190.0
+FRACTIONS: Final = tuple(digit * 10.0**decade for decade in range(-4, 4) for digit in (1, 2, 5))
+Point = tuple[float, float, float | None, float | None]
+"""Standard, Weber fraction, and the ends of its interval."""
+
+
+def weber_pictures(
+    study: Study,
+    levels: Sequence[LevelsFound],
+    forms: Sequence[str] = style.FORMATS,
+    failures: Failures | None = None,
+) -> Iterator[Picture]:
+    """Draw the Weber fractions of every block with thresholds at two standards or more, in each of ``forms``.
+
+    A figure that fails is left out, and kept in ``failures``.
+    """
+    held = Failures() if failures is None else failures
+    for found in levels:
+        if len(weber_fractions(found, None)) < 2:
+            continue
+        name = f"weber-{found.block}"
+        drawn = held.attempt(f"figure {name}", partial(_picture, study, found, name, forms), block=found.block)
+        if not isinstance(drawn, Failure):
+            yield drawn
+
+
+def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
+    """Return the Weber fractions of a participant or, of None, of the group, by standard.
+
+    A threshold that is a difference is divided by its standard; standards of zero and levels that are values have none.
+    """
+    if found.level_kind not in {"weber", "difference"}:
+        return []
+    points = []
+    for one in found.thresholds:
+        if one.participant != participant or one.standard is None or one.standard <= 0 or one.threshold <= 0:
+            continue
+        unit = one.standard if found.level_kind == "difference" else 1.0
+        low, high = (None if end is None or end <= 0 else end / unit for end in (one.low, one.high))
+        points.append((one.standard, one.threshold / unit, low, high))
+    return points
+
+
+def _picture(study: Study, found: LevelsFound, name: str, forms: Sequence[str]) -> Picture:
+    files = {
+        form: style.file_bytes(
+            _draw(study, found, style.fonts_for(form)).figure, form, f"{study.name}: {found.title}, Weber fractions"
+        )
+        for form in forms
+    }
+    simulated = "SIMULATED participants, no people; " if study.simulated else ""
+    caption = (
+        f"{found.title}: Weber fraction of {found.vary} at the threshold, over the standard. Thin: participants; "
+        f"thick: random-effects mean with its 95 % interval. {simulated}{counted(len(found.people), 'participant')}."
+    )
+    return Picture(found.block, name, caption, files)
+
+
+@style.own_settings()
+def _draw(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
+    sheet = Sheet(style.PAGE_WIDTH_PT / 2, HEIGHT_PT, fonts)
+    sheet.heading(found.title, answer_figures.marks(study), (counted(study.n, "participant"), f"n = {study.n}"))
+    sheet.text(MARGIN_PT, 28, "Weber fraction", size=7, colour=style.TEXT_SOFT)
+    axes = sheet.axes(LEFT_PT, TOP_PT, sheet.width_pt - LEFT_PT - RIGHT_PT, sheet.height_pt - TOP_PT - FOOT_PT)
+    group = weber_fractions(found, None)
+    own = [weber_fractions(found, person) for person in found.people]
+    _frame(axes, group, own)
+    for points in own:
+        axes.plot(
+            [one[0] for one in points], [one[1] for one in points], color=style.PARTICIPANT, linewidth=0.5, alpha=0.7
+        )
+    _group(axes, group)
+    for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
+        label.set_fontproperties(sheet.font(6.5))
+    sheet.text(LEFT_PT, sheet.height_pt - 8, f"Standard of {found.vary}", size=7, colour=style.TEXT_SOFT)
+    return sheet
+
+
+def _group(axes: Axes, points: Sequence[Point]) -> None:
+    xs = [one[0] for one in points]
+    axes.plot(xs, [one[1] for one in points], marker="o", markersize=3.5, color=style.ACCENT, linewidth=1.2, zorder=3)
+    for x, _, low, high in points:
+        if low is not None and high is not None:
+            axes.plot([x, x], [low, high], color=style.ACCENT, linewidth=1.2, zorder=3)
+
+
+def _frame(axes: Axes, group: Sequence[Point], own: Sequence[Sequence[Point]]) -> None:
+    """Draw logarithmic axes: the standards below, round fractions at the left."""
+    values = [value for points in own for _, value, _, _ in points]
+    values += [value for point in group for value in point[1:] if value is not None]
+    low = max((tick for tick in FRACTIONS if tick <= min(values)), default=min(values))
+    high = min((tick for tick in FRACTIONS if tick >= max(values)), default=max(values))
+    standards = [one[0] for one in group]
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.minorticks_off()
+    margin = (standards[-1] / standards[0]) ** 0.08
+    axes.set_xlim(standards[0] / margin, standards[-1] * margin)
+    axes.set_ylim(low, high)
+    axes.set_xticks(standards, [f"{standard:g}" for standard in standards])
+    ticks = [tick for tick in FRACTIONS if low <= tick <= high]
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.hlines(ticks, *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)

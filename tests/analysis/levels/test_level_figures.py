@@ -1,0 +1,130 @@
+"""The figures of tracks and of Weber fractions, and what they are drawn from."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.thresholds import counts_of, thresholds
+from study_app.analysis.designs.track_courses import courses
+from study_app.analysis.figures.plotting import plot
+from study_app.analysis.figures.weber_figure import weber_fractions
+from study_app.analysis.results.levels import LevelsFound, ThresholdFound
+from study_app.analysis.statistics.psychometrics.posterior import fitted, narrowing
+from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.tracks import tracks
+from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.psychometric import analysis_grid, width_prior_of
+from tests.analysis.levels.test_thresholds import STIMULUS, block, rows
+from tests.compiled import needs_servo
+
+
+def found(level_kind: str, *ones: ThresholdFound) -> LevelsFound:
+    return LevelsFound("b", "Block", "2ifc", True, (), "share", "correct", level_kind=level_kind, thresholds=ones)
+
+
+def threshold(participant: str | None, standard: float | None, level: float) -> ThresholdFound:
+    return ThresholdFound(participant, standard, 3, level, level / 2, level * 2)
+
+
+def test_the_interval_after_the_last_answer_is_that_of_all_answers() -> None:
+    grid = analysis_grid(STIMULUS, default_design("2ifc"), "weibull", width_prior_of(STIMULUS))
+    own = rows({"P001": 0.2}, trials=60)
+    counts, right = counts_of(STIMULUS, own), own["success"].to_numpy(dtype=bool)
+    low, high = narrowing(counts.levels, counts.places, right, grid)
+    whole = fitted(counts.levels, counts.successes, counts.failures, grid)
+    assert (low[-1], high[-1]) == pytest.approx((whole.low, whole.high))
+    half = own.iloc[:30]
+    fewer = counts_of(STIMULUS, half)
+    first = fitted(fewer.levels, fewer.successes, fewer.failures, grid)
+    assert (low[29], high[29]) == pytest.approx((first.low, first.high))
+    assert (high - low)[-1] < 0.7 * (high - low)[0]
+
+
+def test_courses_are_in_the_order_of_the_trials_and_end_at_the_threshold() -> None:
+    frame = rows({"P001": 0.1, "P002": 0.2}, trials=40).assign(track="8/2", reversal=pd.NA)
+    one, other = courses(block(), frame.sample(frac=1, random_state=3), most=5)
+    assert (one.participant, other.participant, one.standard) == ("P001", "P002", 8.0)
+    own = frame[frame["participant"] == "P001"]
+    assert one.levels.tolist() == own["level"].tolist()
+    assert one.successes.tolist() == own["success"].tolist()
+    assert set(one.tracks) == {2}
+    assert not one.reversals.any()
+    _, estimated, _ = thresholds(block(), frame)
+    assert (one.low[-1], one.high[-1]) == pytest.approx((estimated.low, estimated.high))
+    assert len(list(courses(block(), frame, most=1))) == 1
+
+
+def test_weber_fractions_are_levels_or_differences_over_their_standards() -> None:
+    ones = [threshold(None, 4.0, 0.2), threshold(None, 8.0, 0.3), threshold("P001", 4.0, 0.1), threshold(None, 0.0, 1)]
+    assert weber_fractions(found("weber", *ones), None) == [(4.0, 0.2, 0.1, 0.4), (8.0, 0.3, 0.15, 0.6)]
+    assert weber_fractions(found("difference", *ones), None) == [
+        (4.0, 0.05, 0.025, 0.1),
+        (8.0, pytest.approx(0.0375), pytest.approx(0.01875), pytest.approx(0.075)),
+    ]
+    assert weber_fractions(found("difference", *ones), "P001") == [(4.0, 0.025, 0.0125, 0.05)]
+    assert weber_fractions(found("value", *ones), None) == []
+
+
+@pytest.fixture(scope="module")
+def plotted(opened_adaptive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    to = tmp_path_factory.mktemp("plots")
+    plot(opened_adaptive, to)
+    return to
+
+
+def words_in(svg: Path) -> list[str]:
+    return [
+        re.sub(r"<[^>]+>", "", one).strip() for one in re.findall(r"<text[^>]*>.*?</text>", svg.read_text(), re.DOTALL)
+    ]
+
+
+@pytest.mark.slow
+@needs_servo
+def test_adaptive_blocks_have_a_panel_for_each_participant_and_standard(plotted: Path) -> None:
+    for name, panels in (("tracks-staircase", 6), ("tracks-quest", 3)):
+        for form in ("png", "svg", "pdf", "txt"):
+            assert (plotted / f"{name}.{form}").stat().st_size > 0
+        words = words_in(plotted / f"{name}.svg")
+        assert sum(word in {"P001", "P002", "P003"} for word in words) == panels
+        assert words.count("standard 4") == (3 if name == "tracks-staircase" else 0)
+    assert "Rings: reversals" in (plotted / "tracks-staircase.txt").read_text()
+    assert "Rings" not in (plotted / "tracks-quest.txt").read_text()
+
+
+@pytest.mark.slow
+@needs_servo
+def test_every_answer_has_a_mark_and_every_reversal_a_ring(opened_adaptive: Path, plotted: Path) -> None:
+    opened = tracks(load_study(opened_adaptive))
+    own = opened[opened["block"] == "staircase"]
+    svg = (plotted / "tracks-staircase.svg").read_text()
+    _, *parts = re.split(r'<g id="(\w+)_\d+">', re.sub(r"<defs>.*?</defs>", "", svg, flags=re.DOTALL))
+    marks = sum(
+        part.count("<use ") + part.count("<path ")
+        for name, part in zip(parts[::2], parts[1::2], strict=True)
+        if name == "PathCollection"
+    )
+    assert marks == len(own) + int(own["reversal"].sum())
+
+
+@pytest.mark.slow
+@needs_servo
+def test_weber_fractions_are_drawn_where_there_are_two_standards(opened_adaptive: Path, plotted: Path) -> None:
+    assert (plotted / "weber-staircase.png").exists()
+    assert not (plotted / "weber-quest.png").exists()
+    assert {"4", "8", "Weber fraction"} < set(words_in(plotted / "weber-staircase.svg"))
+    (block_found,) = (one for one in levels_found(load_study(opened_adaptive)) if one.block == "staircase")
+    assert [point[0] for point in weber_fractions(block_found, "P002")] == [4.0, 8.0]
+    assert np.all([point[1] > 0 for point in weber_fractions(block_found, None)])
+
+
+@pytest.mark.slow
+@needs_servo
+def test_constant_stimuli_have_no_figure_of_tracks(opened_levels: Path, tmp_path: Path) -> None:
+    assert not [path for path in plot(opened_levels, tmp_path) if path.name.startswith("tracks-")]
+    assert (tmp_path / "weber-viscosity.png").exists()
