@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from study_app import __version__
 from study_app.analysis.figures.captions import people_a_setting
 from study_app.analysis.findings import all_findings
+from study_app.analysis.report.answers.level_methods import level_methods
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.words import counted, listed, said_of_presentations, settings_noun
 from study_app.analysis.tables.measures import QUARTILES
@@ -21,7 +22,10 @@ def methods(study: Study, results: Results) -> str:
 def _sentences(study: Study, results: Results) -> Iterator[str]:
     blocks = [found for found in results.blocks if found.n]
     yield _sample(study)
+    yield from level_methods(study.levels, results.levels)
     if not blocks:
+        if results.levels:
+            yield _program()
         return
     yield _presented(study, results)
     quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
@@ -34,7 +38,11 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
         for finding in all_findings():
             yield from finding.methods(found, results)
     yield from _common(results, blocks)
-    yield f"Sessions and analysis: liquid-study {__version__}."
+    yield _program()
+
+
+def _program() -> str:
+    return f"Sessions and analysis: liquid-study {__version__}."
 
 
 def _sample(study: Study) -> str:

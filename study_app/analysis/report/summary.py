@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from study_app.analysis.findings import all_findings
+from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.item_test import Tested
 from study_app.analysis.results.words import counted, lead, listed, missing, name, short
@@ -47,6 +48,7 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
         lines += _untested(found)
         lines += _mixed_up(found, results)
         lines += [sentence for finding in all_findings() for sentence in finding.limits(found)]
+    lines += [sentence for found in results.levels for sentence in level_limits(found)]
     return tuple(lines)
 
 

@@ -91,6 +91,11 @@ class Design(Table):
         return self.item or (self.kind if self.kind[:1].isalpha() else f"choice_{self.kind}")
 
     @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return self.kind
+
+    @property
     def wording(self) -> str:
         """The name of its question among the program's own words."""
         return self.kind

@@ -91,6 +91,11 @@ class Method(Table):
         """Its kind."""
         return self.kind
 
+    @property
+    def paper_name(self) -> str:
+        """What a paper calls it, with its source."""
+        return self.kind
+
     @abstractmethod
     def presentations(self, stimulus: Stimulus) -> int:
         """Return how many comparisons one track presents at most."""

@@ -17,6 +17,11 @@ class Abx(Design):
     kind: Literal["abx"] = "abx"
 
     @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return "ABX"
+
+    @property
     def answers(self) -> tuple[str, ...]:
         """Like the first, like the second."""
         return ("like_first", "like_second")

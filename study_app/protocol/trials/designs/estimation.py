@@ -25,6 +25,11 @@ class Estimation(Design):
         return self.modulus
 
     @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return "magnitude estimation"
+
+    @property
     def answers(self) -> tuple[str, ...]:
         """None: the reply is a number."""
         return ()

@@ -18,6 +18,8 @@ from study_app.protocol.trials.design import (
 if TYPE_CHECKING:
     from study_app.psychophysics.detection import Sensitivity
 
+NUMBERS = {2: "two", 3: "three", 4: "four"}
+
 
 class ForcedChoice(Design):
     """The answer is the interval that held the comparison.
@@ -32,6 +34,11 @@ class ForcedChoice(Design):
     def wording(self) -> str:
         """The same question whatever the number of intervals."""
         return "forced_choice"
+
+    @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return f"{NUMBERS[int(self.kind[0])]}-interval forced choice"
 
     @property
     def answers(self) -> tuple[str, ...]:

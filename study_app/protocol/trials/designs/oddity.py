@@ -17,6 +17,11 @@ class Oddity(Design):
     kind: Literal["oddity"] = "oddity"
 
     @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return "oddity (triangle test)"
+
+    @property
     def answers(self) -> tuple[str, ...]:
         """The intervals, by their place in time."""
         return ORDINALS[:3]

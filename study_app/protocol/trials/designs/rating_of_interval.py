@@ -21,6 +21,11 @@ class Rated(Design):
     adaptive: ClassVar[bool] = False
 
     @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return "ratings"
+
+    @property
     def answers(self) -> tuple[str, ...]:
         """None: the reply is a point of the scale."""
         return ()

@@ -18,6 +18,11 @@ class SameDifferent(Design):
     adaptive: ClassVar[bool] = False
 
     @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return "same–different"
+
+    @property
     def answers(self) -> tuple[str, ...]:
         """Same, different."""
         return ("same", "different")

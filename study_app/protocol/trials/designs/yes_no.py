@@ -26,6 +26,11 @@ class YesNo(Design):
     success_name: ClassVar[str] = "yes"
 
     @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return "yes–no"
+
+    @property
     def answers(self) -> tuple[str, ...]:
         """Yes, no."""
         return ("yes", "no")

@@ -27,6 +27,11 @@ class Constant(Method):
         default=20, description="How often each level is presented."
     )
 
+    @property
+    def paper_name(self) -> str:
+        """What a paper calls it."""
+        return "the method of constant stimuli"
+
     def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
         """Return the levels that are presented, in the order written."""
         return stimulus.spaced(self.levels) if isinstance(self.levels, int) else self.levels

@@ -65,6 +65,12 @@ class QuestPlus(Adaptive):
         if self.family == "weibull" and stimulus.spacing == "linear":
             yield "family", '"weibull" is a function of the logarithm of a level', 'spacing = "log", or "normal"'
 
+    @property
+    def paper_name(self) -> str:
+        """What a paper calls it, with its source."""
+        what, prins = ("the threshold", "; Prins 2013") if self.learn == "threshold" else ("all parameters", "")
+        return f"QUEST+, which minimises the expected entropy of {what} (Watson 2017{prins})"
+
     def target(self, guess: float | None, success: str) -> str | None:
         """Return the percentage of the threshold."""
         return None if guess is None else f"threshold at {50 * (1 + guess):.3g} % {success}"

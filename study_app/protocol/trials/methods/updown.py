@@ -65,10 +65,21 @@ class UpDown(Adaptive):
         return f"converges to {self.target_percent:.1f} % {success}"
 
     @property
+    def paper_name(self) -> str:
+        """What a paper calls it, with its source."""
+        return (
+            f"weighted up–down tracks ({self.rule}, steps down {self._ratio:.4g} of those up; García-Pérez 1998), "
+            f"which converge to {self.target_percent:.1f} %"
+        )
+
+    @property
     def target_percent(self) -> float:
         """The percentage to which the rule converges."""
-        ratio = self._published_ratio if self.ratio is None else self.ratio
-        return 100 * converges_to(int(self.rule[0]), ratio)
+        return 100 * converges_to(int(self.rule[0]), self._ratio)
+
+    @property
+    def _ratio(self) -> float:
+        return self._published_ratio if self.ratio is None else self.ratio
 
     @property
     def _published_ratio(self) -> float:
@@ -107,7 +118,7 @@ class UpDown(Adaptive):
         return Staircase(
             down_after=int(self.rule[0]),
             step_up=(high - low) / 10 if self.step_up is None else stimulus.coordinate(self.step_up),
-            ratio=self._published_ratio if self.ratio is None else self.ratio,
+            ratio=self._ratio,
             low=low,
             high=high,
             begin=high if first is None else stimulus.coordinate(first),

@@ -1,0 +1,53 @@
+"""What the thresholds of a block of levels cannot show, a sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
+
+from study_app.analysis.results.levels import LevelsFound, ThresholdFound
+from study_app.analysis.results.words import counted, listed
+from study_app.analysis.statistics.random_effects import FEWEST
+
+SHIFT: Final = 0.1
+"""A prior that shifts a threshold by a larger share of it is named."""
+FEW_ANSWERS: Final = 40
+"""The fewest answers for which the coverage of the intervals was tested."""
+MOST_NAMED: Final = 6
+
+
+def level_limits(found: LevelsFound) -> Iterator[str]:
+    """Yield the limits of a block's thresholds; none where it has no threshold."""
+    own = found.own_thresholds
+    if not own:
+        return
+    kinds: tuple[tuple[Callable[[ThresholdFound], bool], str], ...] = (
+        (_shifted, f"the prior of the width shifts a threshold by more than {100 * SHIFT:.0f} %: too few answers"),
+        (lambda one: one.beyond == "above", "a threshold lies above the highest level presented; how far is not known"),
+        (lambda one: one.beyond == "below", "a threshold lies below the lowest level presented; how far is not known"),
+        (lambda one: not one.fits, "the function does not fit the answers, so that a threshold may be biased"),
+        (lambda one: one.drifts, "answers became better or worse over the trials, which one threshold does not show"),
+        (lambda one: one.n < FEW_ANSWERS, f"fewer than {FEW_ANSWERS} answers, so that intervals are wide"),
+    )
+    for applies, words in kinds:
+        if some := [one for one in own if applies(one)]:
+            yield f"{found.title}: {words} ({_named(found, some)})."
+    people = len({one.participant for one in own})
+    if people < FEWEST:
+        yield (
+            f"{found.title}: {counted(people, 'participant')}; below {FEWEST} the group has no interval, since "
+            "differences between people are not known."
+        )
+    yield f"{found.title}: motors are audible and were not masked: participants may have used their sound."
+
+
+def _shifted(one: ThresholdFound) -> bool:
+    return one.flat_width is not None and abs(one.flat_width - one.threshold) > SHIFT * abs(one.threshold)
+
+
+def _named(found: LevelsFound, some: Sequence[ThresholdFound]) -> str:
+    """Return whose thresholds they are: at each standard where there are several, at most `MOST_NAMED` by name."""
+    if len(some) > MOST_NAMED:
+        return f"{len(some)} of {len(found.own_thresholds)} thresholds"
+    several = len({one.standard for one in found.own_thresholds}) > 1
+    return listed([f"{one.participant} at {one.standard:g}" if several else str(one.participant) for one in some])

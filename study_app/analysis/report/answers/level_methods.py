@@ -1,0 +1,62 @@
+"""The sentences of the methods paragraph about blocks with a design: design, method, function, prior, estimator."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.words import listed
+from study_app.analysis.statistics.psychometrics.goodness import SETS
+from study_app.analysis.statistics.random_effects import FEWEST
+from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.protocol.trials.psychometric import ANALYSIS_LAPSES, width_prior_of
+
+FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
+LEVELS: Final = {"weber": "Weber fractions", "difference": "differences", "value": "values"}
+
+
+def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsFound]) -> Iterator[str]:
+    """Yield the sentences about blocks whose key is open and that have answers."""
+    by_id = {block.id: block for block in blocks}
+    opened = [found for found in levels if found.revealed and found.answers]
+    for found in opened:
+        yield from _of_block(by_id[found.block], found)
+    if any(found.thresholds for found in opened):
+        yield (
+            "Thresholds are posterior medians over a grid with equal-tailed 95 % intervals, from all counted answers "
+            "at the levels delivered to the hand. The deviance was compared with that of "
+            f"{SETS} simulated sets of answers, and drift is the correlation of trial number and deviance residual "
+            "(Wichmann & Hill 2001). Group means are random-effects means with the between-person variance of Paule "
+            f"and Mandel (1982) and, from {FEWEST} participants on, the interval of Hartung and Knapp (2001)."
+        )
+    if any(one.d_prime is not None for found in opened for one in found.sensitivities):
+        yield (
+            "Sensitivity is d′ from rates with the log-linear correction (Hautus 1995), by the model of each design "
+            "(Macmillan & Creelman 2005)."
+        )
+
+
+def _of_block(block: LevelBlock, found: LevelsFound) -> Iterator[str]:
+    stimulus = block.stimulus
+    if stimulus is None:
+        yield f"In “{found.title}” conditions were compared by {block.design.paper_name}."
+        return
+    standards = sorted({one.standard for one in found.answers if one.standard is not None})
+    against = f" of {listed([f'{one:g}' for one in standards])} {stimulus.unit}".rstrip() if standards else ""
+    kind = LEVELS[stimulus.level_kind]
+    low, high = stimulus.levels
+    chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"
+    yield (
+        f"In “{found.title}” {stimulus.vary} was judged by {block.design.paper_name}, at {kind}{against} from {low:g} "
+        f"to {high:g}{chosen}."
+    )
+    if found.thresholds and found.family is not None:
+        median, factor = width_prior_of(stimulus)
+        log = stimulus.spacing == "log"
+        yield (
+            f"A {FAMILIES[found.family]} function of the {'logarithm of the ' if log else ''}level was fitted, with a "
+            f"flat prior on the threshold, a log-normal one on the width (median {median:.3g} "
+            f"{'decades' if log else 'units of the level'}, factor {factor:.3g}) and lapse rates up to "
+            f"{100 * max(ANALYSIS_LAPSES):.0f} %."
+        )

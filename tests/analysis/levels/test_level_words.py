@@ -1,0 +1,126 @@
+"""What the report says of thresholds in words: what they cannot show, and the methods paragraph."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.report.answers.level_limits import level_limits
+from study_app.analysis.report.answers.level_methods import level_methods
+from study_app.analysis.results.levels import LevelAnswers, LevelsFound, ThresholdFound
+from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.analysis.tables.study import load_study
+from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
+from study_app.protocol.trials.methods.constant import Constant
+from study_app.protocol.trials.methods.questplus import QuestPlus
+from study_app.protocol.trials.methods.updown import UpDown
+from study_app.protocol.trials.stimuli import Stimulus
+from tests.compiled import needs_servo
+
+GOOD = ThresholdFound(
+    "P001", 8.0, 100, 0.2, 0.15, 0.27, width=1.4, lapse=0.01, guess=0.5, flat_width=0.205, fit_p=0.4, drift=0.05
+)
+MOTORS = "Block: motors are audible and were not masked: participants may have used their sound."
+
+
+def found(*ones: ThresholdFound, standards: tuple[float, ...] = (8.0,)) -> LevelsFound:
+    group = [ThresholdFound(None, standard, 3, 0.2, None, None) for standard in standards]
+    answers = tuple(LevelAnswers("P001", standard, 0.2, 9.0, 5, 1, 3, 0.6, 0.2, 0.9) for standard in standards)
+    return LevelsFound(
+        "b", "Block", "2ifc", True, (), "share", "correct", vary="damping_nspm", level_kind="weber", spacing="log",
+        answers=answers, thresholds=(*group, *ones), family="weibull",
+    )  # fmt: skip
+
+
+def people(*changed: ThresholdFound) -> list[ThresholdFound]:
+    return [*changed, *(replace(GOOD, participant=f"P10{number}") for number in range(3))]
+
+
+def test_good_thresholds_have_one_limit() -> None:
+    assert list(level_limits(found(*people()))) == [MOTORS]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"flat_width": 0.23}, "the prior of the width shifts a threshold by more than 10 %"),
+        ({"flat_width": 0.17}, "the prior of the width shifts a threshold by more than 10 %"),
+        ({"beyond": "above"}, "a threshold lies above the highest level presented"),
+        ({"beyond": "below"}, "a threshold lies below the lowest level presented"),
+        ({"fit_p": 0.049}, "the function does not fit the answers"),
+        ({"drift": -0.3}, "answers became better or worse over the trials"),
+        ({"n": 39}, "fewer than 40 answers"),
+    ],
+)
+def test_each_limit_names_whose_threshold_it_is(changes: dict[str, float | str], words: str) -> None:
+    first, *rest = level_limits(found(*people(replace(GOOD, **changes))))  # type: ignore[arg-type]  # any field
+    assert first.startswith(f"Block: {words}")
+    assert first.endswith("(P001).")
+    assert rest == [MOTORS]
+
+
+def test_several_standards_are_named_and_many_thresholds_counted() -> None:
+    two = found(*people(replace(GOOD, fit_p=0.01)), replace(GOOD, standard=4.0), standards=(4.0, 8.0))
+    assert "(P001 at 8)" in next(iter(level_limits(two)))
+    many = [replace(GOOD, participant=f"P{number:03}", n=10) for number in range(9)]
+    assert "(9 of 9 thresholds)" in next(iter(level_limits(found(*many))))
+
+
+def test_two_participants_give_no_group_interval() -> None:
+    *_, few, motors = level_limits(found(GOOD, replace(GOOD, participant="P002")))
+    assert (
+        few
+        == "Block: two participants; below 3 the group has no interval, since differences between people are not known."
+    )
+    assert motors == MOTORS
+
+
+def test_a_block_without_thresholds_has_no_such_limits() -> None:
+    assert list(level_limits(replace(found(), thresholds=()))) == []
+
+
+STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        (QuestPlus(), "QUEST+, which minimises the expected entropy of the threshold (Watson 2017; Prins 2013)"),
+        (QuestPlus(learn="all"), "QUEST+, which minimises the expected entropy of all parameters (Watson 2017)"),
+        (
+            UpDown(rule="3down1up"),
+            "(3down1up, steps down 0.7393 of those up; García-Pérez 1998), which converge to 83.2 %",
+        ),
+        (Constant(), "the method of constant stimuli"),
+    ],
+)
+def test_methods_name_design_method_function_and_prior(method: QuestPlus | UpDown | Constant, words: str) -> None:
+    block = LevelBlock("b", "Block", "main", default_design("2ifc"), STIMULUS, (), method)
+    first, second, third = level_methods([block], [found(GOOD)])
+    assert first.startswith(
+        "In “Block” damping_nspm was judged by two-interval forced choice, at Weber fractions of 8 N·s/m"
+    )
+    assert words in first
+    assert second == (
+        "A Weibull function of the logarithm of the level was fitted, with a flat prior on the threshold, a log-normal "
+        "one on the width (median 1.4 decades, factor 1.5) and lapse rates up to 5 %."
+    )
+    for name in ("Wichmann & Hill 2001", "Paule and Mandel (1982)", "Hartung and Knapp (2001)", "posterior medians"):
+        assert name in third
+
+
+def test_every_design_has_a_name_for_a_paper() -> None:
+    names = {kind: default_design(kind).paper_name for kind in DESIGN_KINDS if kind != "rating"}
+    assert names["4ifc"] == "four-interval forced choice"
+    assert names["samedifferent"] == "same–different"
+    assert all(name not in {"2ifc", "samedifferent", "yesno", "abx"} for name in names.values())
+
+
+@pytest.mark.slow
+@needs_servo
+def test_a_sealed_block_says_nothing_of_its_levels(sealed_levels: Path) -> None:
+    study = load_study(sealed_levels)
+    assert list(level_methods(study.levels, levels_found(study))) == []
