@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from study_app.analysis.findings import all_findings
+from study_app.analysis.report.answers.level_r_script import level_lines
 from study_app.analysis.report.number_files import tests
 from study_app.analysis.report.r_syntax import r_vector
 from study_app.analysis.results.block_results import BlockFound, Results
@@ -21,7 +22,7 @@ START: Final = """\
 
 answers <- read.csv("{table}", colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
 answers <- answers[answers$counted == "true", ]
-answers$response <- as.numeric(answers$response)
+answers$response <- {numeric}
 differing <- 0
 compared <- 0
 
@@ -107,6 +108,9 @@ hits <- function(what, block, items, codes, right, hits) {{
 
 """
 
+NUMBERS: Final = "as.numeric(answers$response)"
+TEXTS: Final = "suppressWarnings(as.numeric(answers$response))  # answers to other questions may be texts"
+
 END: Final = """
 cat(compared, "of {numbers} numbers compared\\n")
 if (compared == 0) quit(status = 1)
@@ -121,9 +125,13 @@ def r_script(study: Study, results: Results) -> str:
     """Return the script."""
     table = f"study-{study.name}_description-responses_data.csv"
     calls = [line for found in results.blocks if found.n for line in _calls(found)]
-    return (
-        START.format(table=table, exact=EXACT_UP_TO) + "\n".join(calls) + "\n" + END.format(numbers=_numbers(results))
+    of_levels, compared = level_lines(study, results.levels)
+    start = START.format(
+        table=table,
+        exact=EXACT_UP_TO,
+        numeric=TEXTS if study.protocol_format > 1 else NUMBERS,
     )
+    return start + "\n".join([*calls, *of_levels]) + "\n" + END.format(numbers=_numbers(results) + compared)
 
 
 def _numbers(results: Results) -> int:
