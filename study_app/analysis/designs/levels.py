@@ -27,6 +27,11 @@ from study_app.protocol.trials.design import Reply
 SUMMARIES: Final[dict[Reply, Summary]] = {"choice": "share", "rating": "mean", "number": "geometric mean"}
 """How the answers at a level are summarised, by the reply that the design asks for."""
 
+READ: Final = (
+    *("participant", "session", "trial", "block", "code", "track", "standard", "level", "level_delivered"),
+    *("comparison", "arrangement", "analysed", "response", "value", "success", "right", "response_s", "reversal"),
+)
+"""The columns of tracks that are read here."""
 MOST_LEVELS: Final = 8
 """Rows of times to answer at a standard; of more levels, neighbours share a row."""
 
@@ -41,6 +46,7 @@ def levels_found(study: Study, rows: pd.DataFrame | None = None) -> tuple[Levels
         return ()
     timed = answers_timed(study)
     opened = rows if rows is not None else tracks(study) if study.revealed else None
+    opened = None if opened is None else opened[list(READ)]  # groups of few columns are made in less time
     bounds = {one.where.id: one.bounds for one in study.others.questions}
     return tuple(_block(one, timed[timed["block"] == one.id], opened, bounds.get(one.id)) for one in main)
 

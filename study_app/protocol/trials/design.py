@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Protocol, TypeAlias
 
 from pydantic import Field
@@ -188,6 +189,7 @@ def to_arrangements(answers: Counted, arrangements: Collection[int], given: str)
 ORDINALS = ("first", "second", "third", "fourth")
 
 
+@lru_cache
 def one_differs(count: int, among: bool) -> tuple[Arrangement, ...]:
     """Return the arrangements of ``count`` intervals of which one alone is ``among``."""
     return tuple(tuple((at == odd) is among for at in range(count)) for odd in range(count))

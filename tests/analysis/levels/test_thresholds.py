@@ -174,6 +174,12 @@ def test_a_function_that_does_not_fit_and_answers_that_drift_are_said_to() -> No
     late = plain.assign(success=plain["success"] & (plain["trial"] > 120)).astype({"success": "boolean"})
     _, later = thresholds(block(), late)
     assert later.drifts
+    _, shuffled = thresholds(block(), late.sample(frac=1, random_state=2))
+    assert shuffled.drift == later.drift
+    second = late.assign(session=["02" if trial <= 200 else "01" for trial in late["trial"]])
+    _, turned = thresholds(block(), second)
+    assert turned.drift is not None
+    assert turned.drift < 0
 
 
 def tracks_of_staircases(method: UpDown, trials: int) -> pd.DataFrame:
