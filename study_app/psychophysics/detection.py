@@ -34,7 +34,7 @@ _erfc = np.vectorize(math.erfc, otypes=[float])
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
-    """d′ and bias from the answers of one observer.
+    """Sensitivity d′ and bias, from the answers of one observer.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
 
     Parameters
     ----------
-    noise, signal : (n,) and (m,) array
+    noise, signal : array
         The ratings of the lowest level, and of another one. AUC is the Mann–Whitney share of pairs in which the
         second is higher, ties counting half, with the log-linear correction over the pairs.
     """

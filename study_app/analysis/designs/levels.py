@@ -28,7 +28,7 @@ SUMMARIES: Final[dict[Reply, Summary]] = {"choice": "share", "rating": "mean", "
 """How the answers at a level are summarised, by the reply that the design asks for."""
 
 READ: Final = (
-    *("participant", "session", "trial", "block", "code", "track", "standard", "level", "level_delivered"),
+    *("participant", "session", "trial", "block", "code", "track", "catch", "standard", "level", "level_delivered"),
     *("comparison", "arrangement", "analysed", "response", "value", "success", "right", "response_s", "reversal"),
 )
 """The columns of tracks that are read here."""

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.designs.track_courses import Flags, TrackCourse, courses
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.figures.level_figure import COLOURS, COLUMNS, GAP_PT, HEAD_PT, LEFT_PT, LEVELS, ROW_GAP_PT
+from study_app.analysis.figures.level_figure import COLOURS, COLUMNS, GAP_PT, HEAD_PT, LEFT_PT, ROW_GAP_PT, level_words
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.results.levels import LevelsFound
@@ -86,7 +86,7 @@ def _draw(study: Study, found: LevelsFound, shown: Sequence[TrackCourse], fonts:
     height = HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + FOOT_PT + 14
     sheet = Sheet(style.PAGE_WIDTH_PT, height, fonts)
     sheet.heading(f"{found.title}: tracks", answer_figures.marks(study), (counted(study.n, "participant"),))
-    sheet.text(MARGIN_PT, 28, f"{LEVELS[found.level_kind]}{found.vary}", size=7, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, 28, level_words(found), size=7, colour=style.TEXT_SOFT)
     width = (sheet.width_pt - LEFT_PT - MARGIN_PT - (COLUMNS - 1) * GAP_PT) / COLUMNS
     standards = len({one.standard for one in shown}) > 1
     ends = _ends(found, shown)

@@ -73,7 +73,7 @@ def _picture(study: Study, found: LevelsFound, name: str, forms: Sequence[str]) 
     }
     simulated = "SIMULATED participants, no people; " if study.simulated else ""
     caption = (
-        f"{found.title}: Weber fraction of {found.vary} at the threshold, over the standard. Thin: participants; "
+        f"{found.title}: Weber fraction of {found.quantity} at the threshold, over the standard. Thin: participants; "
         f"thick: random-effects mean with its 95 % interval. {simulated}{counted(len(found.people), 'participant')}."
     )
     return Picture(found.block, name, caption, files)
@@ -95,7 +95,8 @@ def _draw(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
     _group(axes, group)
     for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
         label.set_fontproperties(sheet.font(6.5))
-    sheet.text(LEFT_PT, sheet.height_pt - 8, f"Standard of {found.vary}", size=7, colour=style.TEXT_SOFT)
+    below = f"Standard of {found.quantity}" + (f" [{found.unit}]" if found.unit else "")
+    sheet.text(LEFT_PT, sheet.height_pt - 8, below, size=7, colour=style.TEXT_SOFT)
     return sheet
 
 

@@ -28,7 +28,10 @@ from study_app.session.simulated.design_observer import Comparison
 from study_app.validation.thresholds.planted import Planted
 
 PEOPLE: Final = 10
-COLUMNS: Final = ("participant", "block", "standard", "level", "level_delivered", "analysed", "success")
+COLUMNS: Final = (
+    "participant", "session", "block", "code", "track", "trial", "catch", "standard", "level", "level_delivered",
+    "analysed", "success",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +135,11 @@ def _rows(one: Planted, key: Key, person: str, seed: int) -> Iterator[tuple[Any,
         heard.append(
             Heard(answered.trial, answered.code, answered.level, answered.success, answered.correct, due.catch)
         )
-        yield person, block.id, due.standard, due.level, due.level, True, answered.success
+        track = key.codes[block.id][trial.code]
+        yield (
+            *(person, 1, block.id, trial.code, track, trial.number, due.catch),
+            *(due.standard, due.level, due.level, True, answered.success),
+        )
 
 
 def keyed_draw(key: Key, person: str, trial: int) -> Any:

@@ -30,7 +30,8 @@ def found(*ones: ThresholdFound, standards: tuple[float, ...] = (8.0,)) -> Level
     group = [ThresholdFound(None, standard, 3, 0.2, None, None) for standard in standards]
     answers = tuple(LevelAnswers("P001", standard, 0.2, 9.0, 5, 1, 3, 0.6, 0.2, 0.9) for standard in standards)
     return LevelsFound(
-        "b", "Block", "2ifc", True, (), "share", "correct", vary="damping_nspm", level_kind="weber", spacing="log",
+        "b", "Block", "2ifc", True, (), "share", "correct", vary="damping_nspm", quantity="damping", unit="N·s/m",
+        level_kind="weber", spacing="log",
         answers=answers, thresholds=(*group, *ones), family="weibull",
     )  # fmt: skip
 
@@ -101,7 +102,7 @@ def test_methods_name_design_method_function_and_prior(method: QuestPlus | UpDow
     block = LevelBlock("b", "Block", "main", default_design("2ifc"), STIMULUS, (), method)
     first, second, third = level_methods([block], [found(GOOD)])
     assert first.startswith(
-        "In “Block” damping_nspm was judged by two-interval forced choice, at Weber fractions of 8 N·s/m"
+        "In “Block” damping was judged by two-interval forced choice, at Weber fractions of 8 N·s/m"
     )
     assert words in first
     assert second == (

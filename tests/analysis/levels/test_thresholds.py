@@ -90,6 +90,7 @@ def test_levels_that_are_evenly_spaced_have_widths_and_thresholds_in_their_unit(
         ],
         columns=["participant", "block", "standard", "level", "level_delivered", "analysed", "success"],
     ).astype({"level_delivered": "Float64", "success": "boolean"})
+    frame = frame.assign(session="01", trial=range(1, len(frame) + 1))
     _, one = thresholds(block(stimulus=stimulus), frame)
     assert one.beyond == beyond
     assert one.threshold == pytest.approx(planted, rel=0.03)
@@ -193,7 +194,7 @@ def tracks_of_staircases(method: UpDown, trials: int) -> pd.DataFrame:
         right = bool(draw.random() < success("weibull", math.log10(level), math.log10(0.15), 1.4, 0.5, 0.01))
         heard[number].append(Heard(trial, f"A{number}", level, right, right))
         found.append(("P001", "01", trial, "b", 8.0, level, level, True, right, f"A{number}", f"8/{number}"))
-    frame = pd.DataFrame(found, columns=[*NAMES, "code", "track"])
+    frame = pd.DataFrame(found, columns=[*NAMES, "code", "track"]).assign(catch=False)
     return frame.astype({"level_delivered": "Float64", "success": "boolean"})
 
 

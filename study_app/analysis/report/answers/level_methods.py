@@ -43,12 +43,12 @@ def _of_block(block: LevelBlock, found: LevelsFound) -> Iterator[str]:
         yield f"In “{found.title}” conditions were compared by {block.design.paper_name}."
         return
     standards = sorted({one.standard for one in found.answers if one.standard is not None})
-    against = f" of {listed([f'{one:g}' for one in standards])} {stimulus.unit}".rstrip() if standards else ""
+    against = f" of {listed([f'{one:g}' for one in standards])} {found.unit}".rstrip() if standards else ""
     kind = LEVELS[stimulus.level_kind]
     low, high = stimulus.levels
     chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"
     yield (
-        f"In “{found.title}” {stimulus.vary} was judged by {block.design.paper_name}, at {kind}{against} from {low:g} "
+        f"In “{found.title}” {found.quantity} was judged by {block.design.paper_name}, at {kind}{against} from {low:g} "
         f"to {high:g}{chosen}."
     )
     if found.thresholds and found.family is not None:

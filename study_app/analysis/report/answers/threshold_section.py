@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Final
 
+from study_app.analysis.figures.level_figure import level_words
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
 from study_app.analysis.results.levels import LevelsFound, SensitivityFound, ThresholdFound
@@ -41,7 +42,7 @@ def _thresholds(found: LevelsFound) -> str:
     percent = _target_percent(found)
     return table(
         (
-            *(("Standard",) if standards else ()),
+            *((f"Standard{_unit(found)}",) if standards else ()),
             "Participant",
             "n",
             "threshold",
@@ -69,6 +70,10 @@ def _thresholds(found: LevelsFound) -> str:
         ],
         words=int(not standards),
     )
+
+
+def _unit(found: LevelsFound) -> str:
+    return f" [{found.unit}]" if found.unit else ""
 
 
 def _target_percent(found: LevelsFound) -> float | None:
@@ -99,9 +104,9 @@ def _threshold_words(found: LevelsFound) -> str:
         else f" The mean of reversals is the classical estimate of an up–down track, at {percent:.1f} % {found.counts}."
     )
     return (
-        f"A threshold is the level at which the {found.family} function is half-way between guesses and lapses{at}: "
-        f"posterior median with an equal-tailed 95 % interval, from all counted answers, at the levels delivered to "
-        f"the hand. The width, from 5 to 95 % of the rise [{width}], has a log-normal prior; the next column is the "
+        f"A threshold is the level ({level_words(found)}) at which the {found.family} function is half-way between "
+        f"guesses and lapses{at}: posterior median with an equal-tailed 95 % interval, from all counted "
+        f"answers, at the levels delivered to the hand. The width, from 5 to 95 % of the rise [{width}], has a log-normal prior; the next column is the "
         f"threshold under a flat one. “Above” and “below” mark thresholds beyond the levels presented. The group is "
         f"the random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from three participants on."
         f"{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of trial "
@@ -145,7 +150,14 @@ def _times(found: LevelsFound) -> str:
     """Return a row per standard and level, with the median times of correct and of other answers."""
     standards = len({one.standard for one in found.level_times}) > 1
     return table(
-        (*(("Standard",) if standards else ()), "Level", "n right", "median [s]", "n wrong", "median [s]"),
+        (
+            *((f"Standard{_unit(found)}",) if standards else ()),
+            "Level",
+            "n right",
+            "median [s]",
+            "n wrong",
+            "median [s]",
+        ),
         [
             [
                 *((_level(one.standard),) if standards else ()),

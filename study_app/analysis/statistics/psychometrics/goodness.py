@@ -26,8 +26,8 @@ def deviances(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> Array:
 
     Parameters
     ----------
-    successes, n : (…, k) array
-        Successes and answers at each level.
+    successes, n : array
+        Successes and answers at each level, shape (…, k).
     expected : (k,) array
         The function's shares, strictly between 0 and 1.
     """
