@@ -54,6 +54,25 @@ def test_of_levels_that_promise_the_same_the_lowest_is_taken():
     assert search_of(flat, between, "threshold").next((0, 0, 0, 0), (0, 0, 0, 0)) == 0
 
 
+def test_entropies_that_differ_by_rounding_are_equal(monkeypatch):
+    monkeypatch.setattr(Search, "expected_entropy", lambda *_: np.array([2.0, 1.0 + 1e-12, 1.0, 1.0 + 1e-6]))
+    assert Search(RUNNING, LEVELS[:4]).next((0,) * 4, (0,) * 4) == 1
+
+
+def test_the_level_of_noise_trials_is_never_chosen():
+    nothing = (0, 0)
+    levels = (math.log10(0.1), LOW - 3)  # the second promises nothing
+    assert Search(RUNNING, levels).next(nothing, nothing) == 0
+    assert Search(RUNNING, levels, noise=True).next(nothing, nothing) == 1
+
+
+def test_the_interval_holds_95_percent():
+    low, high = Search(RUNNING, LEVELS).interval(np.zeros(31), np.zeros(31))
+    span = (HIGH - LOW) * 41 / 40  # the prior is flat over cells, of which half a one lies beyond each end
+    assert (high - low) / span == pytest.approx(0.95)
+    assert low + high == pytest.approx(LOW + HIGH)
+
+
 def test_posterior_and_levels_are_those_of_the_questplus_package():
     """With flat priors and joint entropy; its normal function has a mean and a standard deviation."""
     package = pytest.importorskip("questplus")

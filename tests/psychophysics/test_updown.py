@@ -41,6 +41,12 @@ def test_reversals_are_the_levels_at_which_the_direction_changed():
     assert one.reversals(answers) == pytest.approx([0.6, 1.0, 0.8])
 
 
+def test_a_reversal_counts_across_successes_that_are_too_few_for_a_step():
+    one = staircase(down_after=2, begin=0.0)
+    answers = climb(one, [True, True, True, False, True, True])  # down, nothing, up, nothing, down
+    assert one.reversals(answers) == pytest.approx([answers[3][0], answers[5][0]])
+
+
 def test_the_mean_leaves_out_the_first_two_reversals_and_those_at_an_end_of_the_domain():
     one = staircase(down_after=1, step_up=0.2, ratio=1.0)
     answers = climb(one, [True, False] * 3)  # reversals 0.8, 1.0, 0.8, 1.0, 0.8: those at 1.0 lie at the end

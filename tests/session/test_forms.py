@@ -115,6 +115,16 @@ def test_retracted_answer_is_missing_again(walked: Walked) -> None:
         walked.do(Submitted)
 
 
+def test_an_answer_that_was_retracted_and_given_again_has_the_first_onset_and_no_change(walked: Walked) -> None:
+    walked.do(ItemShown, "age")
+    shown_s = walked.clock
+    walked.do(Chosen, "age", 20)
+    walked.do(Retracted, "age")
+    walked.do(Chosen, "age", 21)
+    answer = walked.state.answers["age"]
+    assert (answer.onset_s, answer.first_s, answer.changes, answer.value) == (shown_s, walked.clock, 0, 21)
+
+
 @pytest.mark.parametrize(
     ("item", "value", "sentence"),
     [

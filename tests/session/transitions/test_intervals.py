@@ -167,6 +167,7 @@ def test_practice_ends_with_its_criterion_and_what_is_left_is_passed_over_with_i
     assert [line.get("trial", line.get("page")) for line in passed] == [3, 4, "rest", 5, 6]
     assert [line["page"] for line in lines if line["event"] == "page_shown"] == ["rest"]
     assert sum(line["event"] == "responses" for line in lines) == 2 + 12
+    assert [line["trial"] for line in lines if line["event"] == "feedback_shown"] == [1, 2], "in practice alone"
 
 
 def test_a_break_is_skipped_only_where_nothing_was_presented_since_the_page_before() -> None:

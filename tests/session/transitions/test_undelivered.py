@@ -64,6 +64,11 @@ def test_an_interval_that_was_not_delivered_is_rested_after_and_comes_again_from
     state, commands = advance(state, TimeUp(31.6))
     assert (state.phase, state.interval) == (Phase.TASK, 1)
     assert written(commands) == ["interval_started"]
+    state, commands = advance(state, done(40.0))
+    page = shown(commands)
+    assert isinstance(page, TaskPage)
+    assert page.interval is not None
+    assert (state.phase, page.interval.announced) == (Phase.RESTING, "Next: the second")
 
 
 def test_the_first_interval_that_fails_ends_the_attempt() -> None:

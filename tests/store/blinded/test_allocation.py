@@ -16,6 +16,7 @@ from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.trial_features import Feelings
+from study_app.store.blinded import allocation
 from study_app.store.blinded.allocation import allocate, allocated, claims, session_protocol
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.blinded.unblinding import unblind
@@ -218,6 +219,30 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     with begun(study.path, "P005") as store:
         assert store.lines[0]["entry"] == 4
     assert errors() == ""
+
+
+def test_a_changed_entry_is_refused_and_not_allocated_anew(tmp_path: Path) -> None:
+    study = StudyFolder(tmp_path / "s")
+    with begun(study.path, "P001") as store:
+        key = store.key
+    path = study.allocation(1)
+    held = json.loads(path.read_text())
+    path.write_text(json.dumps(held | {"sealed": held["sealed"][:-2] + "00"}))
+    for what in (allocate, allocated):
+        with pytest.raises(StoreError, match="was changed: restore it from a copy"):
+            what(study, key, "P001")
+
+
+def test_a_claimed_entry_is_on_the_disk_before_it_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with begun(tmp_path / "s", "P001") as store:
+        key = store.key
+    synced: list[Path] = []
+    monkeypatch.setattr(allocation, "sync_folder", synced.append)
+    study = StudyFolder(tmp_path / "s")
+    allocate(study, key, "P002", waits=False)
+    assert synced == []
+    allocate(study, key, "P003")
+    assert synced == [study.allocated]
 
 
 def test_an_entry_of_a_session_is_never_assigned_again(tmp_path: Path) -> None:

@@ -101,6 +101,26 @@ def test_what_was_changed_or_moved_does_not_open(change: dict[str, Any]) -> None
         opened([START, ended(MEASURED) | change], key())
 
 
+def of_interval(event: str, interval: int | None, **fields: Any) -> dict[str, Any]:
+    place = {"trial": 3, "attempt": 1} | ({} if interval is None else {"interval": interval})
+    return {"n": 2, "event": event, **sealed(START, event, place | fields, key())}
+
+
+def test_what_is_sealed_of_an_interval_does_not_open_as_that_of_another_or_of_its_trial() -> None:
+    first = of_interval("interval_ended", 1, force_mean_n=0.5)
+    assert opened([START, first], key())[1]["force_mean_n"] == 0.5
+    for moved in (first | {"interval": 2}, first | {"event": "trial_ended"}, first | {"event": "trial_started"}):
+        with pytest.raises(StoreError, match="does not open"):
+            opened([START, moved], key())
+
+
+def test_values_of_another_type_are_not_taken_from_a_text_that_the_key_sealed() -> None:
+    forged = of_interval("interval_ended", 1, force_mean_n="0.5", duration_s=2.0)
+    there = opened([START, forged], key())[1]
+    assert there["duration_s"] == 2.0
+    assert "force_mean_n" not in there
+
+
 def test_it_opens_with_its_own_key_alone() -> None:
     with pytest.raises(StoreError, match="does not open"):
         opened([START, ended(MEASURED)], key(bytes([1] * 32)))
