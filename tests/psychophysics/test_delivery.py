@@ -81,6 +81,12 @@ def test_a_hand_that_hardly_moves_has_no_damping() -> None:
         assert (damping(-8.0 * moved.velocity_mps, moved) is None) == rests
 
 
+def test_a_motion_lacks_the_first_and_the_last_20_ms_alone() -> None:
+    t_s, position_m = swing()
+    moved = motion(t_s, position_m, 1 / RATE_HZ)
+    assert moved.times_s == pytest.approx(t_s[20:-20])
+
+
 def test_a_motion_is_judged_from_a_time_on() -> None:
     moved = motion(*swing(), 1 / RATE_HZ)
     later = moved.after(moved.times_s[700])
