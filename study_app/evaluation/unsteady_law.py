@@ -1,31 +1,49 @@
-"""Unsteady drag by the letter of its law: plain numpy, what ``haptics.kernels.effects.unsteady_drag`` must equal.
+"""Unsteady drag by the letter of its law: what ``haptics.kernels.effects.unsteady_drag`` must equal.
 
-Written from the law's equations, with exact exponentials for every step, and with the acceleration given. It shares no
-code and no constants with the kernel.
+Written from the law's equations, with exact exponentials for every step, and with the acceleration and the constants
+given. It shares no code and no constants with the kernel.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from study_app.haptics.kernels.compiled import workings
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Scene
 
-RATES_PER_S = np.array([0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902])
-WEIGHTS_RPS = np.array([0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937])
+RATES_PER_S: Final = np.array([0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902])
+WEIGHTS_RPS: Final = np.array([0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937])
 
 
+class Constants(NamedTuple):
+    """The constants of the law that ``liquid-study cfd --refit`` fits to the fluid solver: c_m, c_y, c_z, β and R₀."""
+
+    c_m: float
+    c_y: float
+    c_z: float
+    beta: float
+    r_0: float
+
+
+CONSTANTS: Final = Constants(c_m=0.281, c_y=0.873, c_z=3.29, beta=2.86, r_0=12.7)
+
+
+@workings
 def over_stokes(reynolds: float) -> float:
-    """Return φ, the steady drag as a multiple of Stokes' drag."""
+    """Return φ, the steady drag as a multiple of Stokes drag."""
     if reynolds == 0:
         return 1.0
     oseen = 3 / 16 * reynolds / (1 + 0.450 * math.sqrt(reynolds))
     return 1 + oseen + 0.486 / 24 * reynolds / (1 + math.pow(4040 / reynolds, 0.70))
 
 
-def unsteady_n(scene: Scene, w_mps: Floats, acceleration_mps2: Floats, interval_s: Floats) -> Floats:
+def unsteady_n(
+    scene: Scene, w_mps: Floats, acceleration_mps2: Floats, interval_s: Floats, constants: Constants = CONSTANTS
+) -> Floats:
     """Return the force (n, 3) [N] in the scene's first liquid, at rest and everywhere.
 
     Parameters
@@ -38,30 +56,41 @@ def unsteady_n(scene: Scene, w_mps: Floats, acceleration_mps2: Floats, interval_
         Their derivatives (n, 3) [m/s²].
     interval_s : Floats
         Times (n,) since the tick before [s].
+    constants : Constants
+        Of the law; by default those of the program.
     """
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     density_kg_m3, viscosity_pa_s = liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan
-    nu_m2ps = viscosity_pa_s / density_kg_m3
     stokes_nspm = 3 * math.pi * viscosity_pa_s * diameter_m
+    beyond_w = late_mps(w_mps, acceleration_mps2, interval_s, diameter_m, viscosity_pa_s / density_kg_m3, constants)
+    added_kg = 0.5 * density_kg_m3 * scene.body.volume_m3
+    return -stokes_nspm * (w_mps + beyond_w) - added_kg * acceleration_mps2
 
-    def reynolds(velocity_mps: Floats) -> float:
-        return float(np.linalg.norm(velocity_mps)) * diameter_m / nu_m2ps
 
-    z = np.array(w_mps[0])
-    y = (over_stokes(reynolds(z)) - 1) * z
-    m = np.zeros((len(RATES_PER_S), 3))
-    force_n = np.empty_like(w_mps)
-    for k, (w, dw, dt) in enumerate(zip(w_mps, acceleration_mps2, interval_s, strict=True)):
-        u_mps = math.hypot(*w, *z)
-        overtaking = float(np.clip(1 - (w @ z) / (z @ z), 0, 1)) if z.any() else 0.0
+@workings
+def late_mps(
+    w_mps: Floats, acceleration_mps2: Floats, interval_s: Floats, diameter_m: float, nu_m2ps: float, of: Constants
+) -> Floats:
+    """Return y + h (n, d) [m/s]: the excess drag and the history over Stokes drag per speed, in d dimensions."""
+    found = np.empty_like(w_mps)
+    z = w_mps[0].copy()
+    y = (over_stokes(math.sqrt((z**2).sum()) * diameter_m / nu_m2ps) - 1) * z
+    m = np.zeros((len(RATES_PER_S), len(z)))
+    for k in range(len(w_mps)):
+        w, dw, dt = w_mps[k], acceleration_mps2[k], interval_s[k]
+        z2 = (z**2).sum()
+        u_mps = math.sqrt((w**2).sum() + z2)
+        overtaking = min(max(1 - (w * z).sum() / z2, 0.0), 1.0) if z2 > 0 else 0.0
         re_u = u_mps * diameter_m / nu_m2ps
-        e = w - 2.8 * re_u / (re_u + 13) * overtaking * z
-        y = y - np.expm1(-1.2 * u_mps / diameter_m * dt) * (over_stokes(reynolds(e)) * e - w - y)
-        z = z - np.expm1(-4.5 * u_mps / diameter_m * dt) * (w - z)
-        decay_per_s = RATES_PER_S + 0.38 * u_mps / diameter_m
-        gained_s = -np.expm1(-decay_per_s * dt) / decay_per_s
-        m = np.exp(-decay_per_s * dt)[:, np.newaxis] * m + np.outer(gained_s, dw)
-        remembered = WEIGHTS_RPS @ m + (2 * math.sqrt(dt) - WEIGHTS_RPS @ gained_s) * dw
-        h = diameter_m / (2 * math.sqrt(math.pi * nu_m2ps)) * remembered
-        force_n[k] = -stokes_nspm * (w + y + h) - 0.5 * density_kg_m3 * scene.body.volume_m3 * dw
-    return force_n
+        e = w - of.beta * re_u / (re_u + of.r_0) * overtaking * z
+        phi = over_stokes(math.sqrt((e**2).sum()) * diameter_m / nu_m2ps)
+        y = y - math.expm1(-of.c_y * u_mps / diameter_m * dt) * (phi * e - w - y)
+        z = z - math.expm1(-of.c_z * u_mps / diameter_m * dt) * (w - z)
+        remembered = 2 * math.sqrt(dt) * dw
+        for i in range(len(RATES_PER_S)):
+            decay_per_s = RATES_PER_S[i] + of.c_m * u_mps / diameter_m
+            gained_s = -math.expm1(-decay_per_s * dt) / decay_per_s
+            m[i] = math.exp(-decay_per_s * dt) * m[i] + gained_s * dw
+            remembered = remembered + WEIGHTS_RPS[i] * (m[i] - gained_s * dw)
+        found[k] = y + diameter_m / (2 * math.sqrt(math.pi * nu_m2ps)) * remembered
+    return found

@@ -14,21 +14,29 @@ from study_app.cli.progress import progress
 @click.option(
     "--solve",
     is_flag=True,
-    help="Solve the flow again instead of using the stored tables: about 5 minutes on one core, 15 on a busy one; "
+    help="Solve the flow again instead of using the stored tables: about 12 minutes on one core, 30 on a busy one; "
     "needs the extra cfd (pip install ngsolve, 350 MB).",
 )
+@click.option(
+    "--refit",
+    is_flag=True,
+    help="Fit the constants of unsteady drag to all solved motions, and print the error of each motion with them and "
+    "when it is left out of the fit: about two minutes.",
+)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; default: print.")
-def cfd(to: Path | None, *, solve: bool) -> None:
+def cfd(to: Path | None, *, solve: bool, refit: bool) -> None:
     """Fit models of honey and glycerin to the force of a fluid solver; report the remaining error.
 
     A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
-    minute.
+    minute. Further motions, such as oscillations and a reversal, serve --refit.
     """
     from study_app.store.output_files import make_folder
     from study_app.validation.cfd.fits import fit_all
+    from study_app.validation.cfd.law_fit import refit as refit_all
+    from study_app.validation.cfd.law_fit import refit_markdown
     from study_app.validation.cfd.model_comparison import fits_markdown, steady_markdown, write
     from study_app.validation.cfd.solver import solve as solve_all
-    from study_app.validation.cfd.stored_flows import steady, stored
+    from study_app.validation.cfd.stored_flows import steady, stored, training
 
     if solve and to is None:
         raise click.UsageError("--solve needs --to: the folder for the solver's tables")
@@ -36,10 +44,15 @@ def cfd(to: Path | None, *, solve: bool) -> None:
         make_folder(to)
     with progress(lambda text: click.echo(text, err=True)) as show:
         solved = solve_all(to, show) if solve and to is not None else ()
-        tables, drag = stored(to if solve else None), steady(to if solve else None)
-        fits = fit_all(tables, show)
+        source = to if solve else None
+        tables, drag = stored(source), steady(source)
+        found = refit_all((*tables, *training(source)), show) if refit else None
+        fits = fit_all(tables, show) if found is None else ()
     for written in solved:
         click.echo(written)
+    if found is not None:
+        click.echo(refit_markdown(found))
+        return
     if to is None:
         click.echo(f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}")
         return

@@ -21,7 +21,8 @@ from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Effect, Given, Liquid, Scene
 from study_app.haptics.runtime.offline import simulate
-from study_app.validation.cfd.cases import RAMP, STOP, Case
+from study_app.validation.cfd.cases import Case
+from study_app.validation.cfd.profiles import RAMP, STOP
 from study_app.validation.cfd.stored_flows import Table
 
 RATE_HZ: Final = 1000.0

@@ -36,7 +36,8 @@ class Grid:
     """How far the mesh goes ahead of, behind and aside of the ball, and how long its edges are, in diameters.
 
     ``ball`` is the longest edge on the ball, ``near`` within two diameters of it and five behind; there the wake has
-    four times that, the rest of the liquid ``far``.
+    four times that, the rest of the liquid ``far``. For a ball that goes back and forth, ``symmetric``, it is ahead as
+    it is behind.
     """
 
     ahead: float
@@ -45,6 +46,7 @@ class Grid:
     ball: float
     near: float
     far: float
+    symmetric: bool = False
 
 
 def library() -> Any:
@@ -78,6 +80,7 @@ class Flow:
 
     def __init__(self, grid: Grid) -> None:
         self._ng = ng = library()
+        self.grid = grid
         self._mesh = mesh = _mesh(grid)
         walls = "ball|ahead|aside"
         along, across = (ng.H1(mesh, order=ORDER, dirichlet=it) for it in (walls, f"{walls}|axis"))
@@ -213,7 +216,7 @@ def _mesh(grid: Grid) -> Any:
         return WorkPlane().MoveTo(-ahead, 0).Rectangle(long, high).Face() - ball
 
     ball = WorkPlane().Circle(0, 0, 0.5).Face()
-    near, wake = box(2, 7, 2), box(4, 24, 4)
+    near, wake = (box(5, 10, 2), box(20, 40, 4)) if grid.symmetric else (box(2, 7, 2), box(4, 24, 4))
     wake -= near
     far = box(grid.ahead, grid.ahead + grid.behind, grid.aside) - near - wake
     for part, longest in ((near, grid.near), (wake, 4 * grid.near), (far, grid.far)):

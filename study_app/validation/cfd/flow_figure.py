@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from study_app import figure_style as style
-from study_app.validation.cfd.cases import STOP
 from study_app.validation.cfd.fits import MODELS, Fitted, even
+from study_app.validation.cfd.profiles import STOP
 from study_app.validation.cfd.stored_flows import Table
 
 WIDTH_PT: Final = 85 / 25.4 * 72

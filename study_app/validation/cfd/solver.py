@@ -1,4 +1,4 @@
-"""Solve every case, check what comes out, and store it: about four minutes of one core's time, with the extra ``cfd``.
+"""Solve every case, check what comes out, and store it: about ten minutes of one core's time, with the extra ``cfd``.
 
 Every motion is solved three times: as it is; on a coarser grid with steps twice as long; and without convection, where
 the exact force is known. A solution that misses one of the two by more than is permitted is not stored.
@@ -18,17 +18,21 @@ from study_app.errors import StudyError
 from study_app.haptics.model.motion import Floats
 from study_app.store.atomic import write_file
 from study_app.store.output_files import make_folder
-from study_app.validation.cfd.cases import END, RAMP, STOP, Case, cases, linear_drags, moments, speed
+from study_app.validation.cfd.cases import Case, cases, training_cases
 from study_app.validation.cfd.flow import ORDER, Flow, Grid, library
-from study_app.validation.cfd.stored_flows import MOTION, STEADY, STEADY_FILE, notes_of, text
+from study_app.validation.cfd.stored_flows import MOTION, STEADY, STEADY_FILE, TRAINING_FOLDER, notes_of, text
 from study_app.validation.computer import machine
 
 COMMAND: Final = "liquid-study cfd --solve"
 GRID: Final = Grid(ahead=40, behind=80, aside=40, ball=0.1, near=0.4, far=8)
 COARSE: Final = Grid(ahead=40, behind=80, aside=40, ball=0.14, near=0.6, far=10)
+BOTH_WAYS: Final = Grid(ahead=40, behind=40, aside=40, ball=0.1, near=0.4, far=8, symmetric=True)
+BOTH_WAYS_COARSE: Final = Grid(ahead=40, behind=40, aside=40, ball=0.14, near=0.6, far=10, symmetric=True)
 WIDE: Final = Grid(ahead=80, behind=160, aside=80, ball=0.07, near=0.25, far=16)
 WIDE_COARSE: Final = Grid(ahead=80, behind=160, aside=80, ball=0.1, near=0.4, far=16)
 STEP: Final = 0.005
+FAST_REYNOLDS: Final = 50.0
+"""Above, steps are half as long: on the coarse grid, where they are twice as long, the flow would blow up."""
 REYNOLDS: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 PERMITTED: Final = 0.02
@@ -44,32 +48,42 @@ def solve(to: Path, tell: Callable[[str], None]) -> tuple[Path, ...]:
         NGSolve is not installed, a solution is not good enough, or a file cannot be written.
     """
     library()
-    make_folder(to)
     written = []
-    flow, coarse = Flow(GRID), Flow(COARSE)
-    for case in cases():
-        tell(f"{case.liquid_id} at {case.speed_mps:g} m/s, Re {case.reynolds:.3g} ...")
-        path = to / f"{case.name}.csv"
-        write_file(path, motion_table(case, flow, coarse))
-        written.append(path)
+    for solved, folder, grid, coarse_grid in (
+        (cases(), to, GRID, COARSE),
+        (training_cases(), to / TRAINING_FOLDER, BOTH_WAYS, BOTH_WAYS_COARSE),
+    ):
+        make_folder(folder)
+        flow, coarse = Flow(grid), Flow(coarse_grid)
+        for case in solved:
+            tell(f"{case.liquid_id}, {case.title}, Re {case.reynolds:.3g} ...")
+            path = folder / f"{case.name}.csv"
+            write_file(path, motion_table(case, flow, coarse, STEP if case.reynolds <= FAST_REYNOLDS else STEP / 2))
+            written.append(path)
     tell(f"steady drag at Re {REYNOLDS[0]:g} to {REYNOLDS[-1]:g} ...")
     write_file(to / STEADY_FILE, steady_table())
     return (*written, to / STEADY_FILE)
 
 
 def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = STEP) -> bytes:
-    """Return the file of one case: start, even motion, stop.
+    """Return the file of one case, with a row for every `STEP` or ``step``, whichever is longer.
 
     Raises
     ------
     StudyError
         The solution differs too much from the coarse one or, without convection, from the exact one.
     """
-    times, rough = moments(step), moments(2 * step)
+    profile = case.profile
+    times, rough = profile.moments(step), profile.moments(2 * step)
+
+    def speed(t: float) -> float:
+        return float(profile.speed(np.array([t]))[0])
+
     began_s = time.process_time()
     drag = flow.unsteady(case.reynolds, times, speed)
     took_s = time.process_time() - began_s
-    linear, exact = flow.unsteady(case.reynolds, times, speed, convection=False), linear_drags(times, case.reynolds)
+    linear = flow.unsteady(case.reynolds, times, speed, convection=False)
+    exact = profile.linear_drags(times, case.reynolds)
     by_grid = np.interp(times, rough, coarse.unsteady(case.reynolds, rough, speed)) - drag
     checks = {
         "from_coarse": _check(case, "the coarse solution", by_grid, drag, times),
@@ -77,19 +91,20 @@ def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = STEP) -> by
     }
     steps = f"{step:g}, {2 * step:g}, {4 * step:g} D/U: the longer, the longer after start and stop"
     notes = {
-        "title": f"stop at {case.speed_mps:g} m/s",
+        "title": case.title,
         **notes_of(case),
-        "motion": f"start within {RAMP:g} D/U, stop from {STOP:g} D/U on, end at {END:g} D/U",
+        "motion": profile.description,
         "reynolds": f"{case.reynolds:.6g}",
         **_made(),
-        "method": f"axisymmetric, order {ORDER}, {flow.unknowns} unknowns, {GRID}, steps {steps}",
+        "method": f"axisymmetric, order {ORDER}, {flow.unknowns} unknowns, {flow.grid}, steps {steps}",
         "from_coarse": f"{checks['from_coarse']} ({coarse.unknowns} unknowns, steps twice as long)",
         "from_exact": f"{checks['from_exact']} (convection off; Stokes, added mass and Basset)",
         "computing": "time of one core, one thread, per second of motion",
-        "computing_s_per_s": f"{took_s / (END * case.unit_s):.3g}",
+        "computing_s_per_s": f"{took_s / (profile.end * case.unit_s):.3g}",
     }
-    velocity_mps = case.speed_mps * np.array([speed(t) for t in times.tolist()])
-    return text(notes, dict(zip(MOTION, (times * case.unit_s, velocity_mps, 0.0 - drag * case.unit_n), strict=True)))
+    columns = (times * case.unit_s, case.speed_mps * profile.speed(times), 0.0 - drag * case.unit_n)
+    every = max(1, round(STEP / step))
+    return text(notes, dict(zip(MOTION, (it[::every] for it in columns), strict=True)))
 
 
 def steady_table() -> bytes:
@@ -112,14 +127,16 @@ def steady_table() -> bytes:
 def _check(case: Case, what: str, difference: Floats, force: Floats, times: Floats) -> str:
     """Return the greatest differences, while the ball accelerates and otherwise, as shares of the greatest force."""
     size = np.abs(difference) / np.abs(force).max()
-    ramps = (times <= 2 * RAMP) | ((times >= STOP) & (times <= STOP + 2 * RAMP))
+    ramps = case.profile.near_steps(times)
     worst = float(size.max())
     if not worst <= PERMITTED:
         raise StudyError(
-            f"{case.liquid_id} at {case.speed_mps:g} m/s differs from {what} by {worst:.1%} of the greatest force, "
+            f"{case.liquid_id}, {case.title}, differs from {what} by {worst:.1%} of the greatest force, "
             f"more than {PERMITTED:.0%}: nothing is stored"
         )
-    return f"at most {size[ramps].max():.2%} of the greatest force at start and stop, {size[~ramps].max():.3%} else"
+    return (
+        f"at most {size[ramps].max():.2%} of the greatest force near steps of the speed, {size[~ramps].max():.3%} else"
+    )
 
 
 def _made() -> dict[str, str]:

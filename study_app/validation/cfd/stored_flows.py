@@ -15,12 +15,14 @@ from study_app.errors import StudyError
 from study_app.haptics.model.motion import Floats
 from study_app.store.tables.csv_files import csv_text_of
 from study_app.validation.cfd.cases import Case
+from study_app.validation.cfd.profiles import PROFILES, STOPPING
 
 MOTION: Final = ("t_s", "velocity_mps", "force_n")
 """Along one axis; the force on the ball, so against the motion at first."""
 STEADY: Final = ("reynolds", "drag_coefficient", "drag_coefficient_coarse", "drag_coefficient_narrow")
 """C_d, the same on a coarser grid, and in a box of half the size."""
 STEADY_FILE: Final = "steady.csv"
+TRAINING_FOLDER: Final = "training"
 OF_THE_MODEL: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "computing_s_per_s")
 """The notes of a table of `MOTION` by which models are compared with it."""
 _OF_THE_CASE: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "speed_mps")
@@ -36,7 +38,9 @@ class Table:
     @property
     def case(self) -> Case:
         """What was solved, by the notes of a table of `MOTION`."""
-        return Case(self.notes["liquid"], *(float(self.notes[name]) for name in _OF_THE_CASE))
+        profile = PROFILES[self.notes.get("profile", STOPPING.name)]
+        density_kg_m3, viscosity_pa_s, diameter_m, speed_mps = (float(self.notes[name]) for name in _OF_THE_CASE)
+        return Case(self.notes["liquid"], density_kg_m3, viscosity_pa_s, diameter_m, speed_mps, profile)
 
 
 def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats], digits: int = 7) -> bytes:
@@ -51,6 +55,7 @@ def notes_of(case: Case) -> dict[str, str]:
     values = (case.density_kg_m3, case.viscosity_pa_s, case.diameter_m, case.speed_mps)
     return {
         "liquid": case.liquid_id,
+        "profile": case.profile.name,
         **{name: f"{value:.6g}" for name, value in zip(_OF_THE_CASE, values, strict=True)},
     }
 
@@ -63,7 +68,21 @@ def stored(folder: Traversable | None = None) -> tuple[Table, ...]:
     StudyError
         There is none, or one cannot be understood.
     """
-    place = folder or _package()
+    return _motions(folder or _package())
+
+
+def training(folder: Traversable | None = None) -> tuple[Table, ...]:
+    """Return the tables of the motions that constants are fitted to besides those of `stored`.
+
+    Raises
+    ------
+    StudyError
+        There is none, or one cannot be understood.
+    """
+    return _motions((folder or _package()) / TRAINING_FOLDER)
+
+
+def _motions(place: Traversable) -> tuple[Table, ...]:
     names = place.iterdir() if place.is_dir() else ()
     files = sorted((it for it in names if it.name.endswith("mmps.csv")), key=lambda it: it.name)
     if not files:

@@ -4,14 +4,15 @@ With w the velocity relative to the liquid, ν = µ/ρ, and vectors w, y, z, e, 
 
     F  = −3πµD (w + y + h) − ½ρV dw/dt
     u  = √(|w|² + |z|²)                                 speed of convection: of the ball, or of its wake after a stop
-    z' = 4.5 u/D (w − z)                                velocity of the wake behind the ball
-    e  = w − 2.8 Re_u/(Re_u + 13) o z                   velocity that the ball meets, Re_u = uD/ν, with
+    z' = c_z u/D (w − z)                                velocity of the wake behind the ball
+    e  = w − β Re_u/(Re_u + R₀) o z                     velocity that the ball meets, Re_u = uD/ν, with
     o  = min(max(1 − w·z/|z|², 0), 1)                   how far the wake overtakes it or meets it; 0 where z = 0
-    y' = 1.2 u/D (φ(|e|) e − w − y)                     drag beyond Stokes', built up over a way; φ: `finite_reynolds`
-    h  = D/(2√(πν)) Σ b_i m_i,  m_i' = dw/dt − (k_i + 0.38 u/D) m_i   history, carried away with the flow
+    y' = c_y u/D (φ(|e|) e − w − y)                     drag beyond Stokes', built up over a way; φ: `finite_reynolds`
+    h  = D/(2√(πν)) Σ b_i m_i,  m_i' = dw/dt − (k_i + c_m u/D) m_i   history, carried away with the flow
 
 The exponentials are 1/√t within 1.5 % from 1 ms to 30 s. As Re → 0, F is that of Stokes, the added mass and Basset.
-The constants are fitted to this project's fluid solver at Re 0.3 to 100; `docs/unsteady-drag.md` says how well. Each
+The constants are fitted to this project's fluid solver at Re 0.3 to 100 by ``liquid-study cfd --refit``, which says
+how well. Each
 tick costs the same, and a step is stable however long it is.
 """
 
@@ -27,11 +28,11 @@ from study_app.haptics.model import laws
 from study_app.haptics.model.effects.unsteady_drag import EXPONENTIALS
 from study_app.haptics.model.layout import Record
 
-MEMORY_LOSS = 0.38  # c_m
-EXCESS_GAIN = 1.2  # c_y
-WAKE_GAIN = 4.5  # c_z
-OVERTAKING = 2.8  # β
-OVERTAKING_REYNOLDS = 13.0  # R₀
+MEMORY_LOSS = 0.281  # c_m
+EXCESS_GAIN = 0.873  # c_y
+WAKE_GAIN = 3.29  # c_z
+OVERTAKING = 2.86  # β
+OVERTAKING_REYNOLDS = 12.7  # R₀
 RATES_PER_S = (0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902)  # k_i
 WEIGHTS_RPS = (0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937)  # b_i [1/√s]
 SHORT = 4.0  # up to here `_mean` needs no exp

@@ -1,0 +1,152 @@
+"""The constants of unsteady drag by least squares over solved motions, and the errors of motions left out of the fit.
+
+What is fitted is the law by the letter, along motions whose speed and acceleration are known exactly: the constants are
+then those of the flow, and no delay of a tick or of a velocity estimator is fitted into them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from study_app.errors import StudyError
+from study_app.evaluation.unsteady_law import CONSTANTS, Constants, late_mps
+from study_app.haptics.model.motion import Floats
+from study_app.validation.cfd.fits import MODELS, judge
+from study_app.validation.cfd.stored_flows import Table
+
+STEP: Final = 0.005
+"""Interval between the rows that are compared [D/U]."""
+BEGIN: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, beta=1.0, r_0=5.0)
+"""Where the search begins: the orders of magnitude."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionError:
+    """RMS error as a share of the RMS force, and greatest error as a share of the greatest force, of one motion.
+
+    ``fitted`` with the constants fitted to all motions, ``left_out`` with those fitted to all others, ``program`` with
+    the program's own constants in its tick at 1 kHz. Each is (RMS, greatest).
+    """
+
+    table: Table
+    fitted: tuple[float, float]
+    left_out: tuple[float, float]
+    program: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """The constants by all motions, and the errors of each motion."""
+
+    constants: Constants
+    errors: tuple[MotionError, ...]
+
+
+class _Solved:
+    """One solved motion on even times, in the units of its liquid."""
+
+    def __init__(self, table: Table) -> None:
+        case = table.case
+        t = np.arange(0.0, case.profile.end, STEP)
+        self._case = case
+        self._w_mps = case.profile.speed(t)[:, np.newaxis] * case.speed_mps
+        self._dw_mps2 = case.profile.acceleration(t)[:, np.newaxis] * (case.speed_mps / case.unit_s)
+        self._interval_s = np.full(len(t), STEP * case.unit_s)
+        t_s, _, force_n = table.columns.values()
+        self._force_n = np.interp(t * case.unit_s, t_s, force_n)
+        stokes_nspm = 3 * math.pi * case.viscosity_pa_s * case.diameter_m
+        added_kg = case.density_kg_m3 * math.pi / 12 * case.diameter_m**3
+        self._stokes_nspm = stokes_nspm
+        self._prompt_n = -stokes_nspm * self._w_mps[:, 0] - added_kg * self._dw_mps2[:, 0]
+
+    def residuals(self, constants: Constants) -> Floats:
+        """Return the errors (n,), whose sum of squares is the square of the RMS share."""
+        error_n = self._error_n(constants)
+        return error_n / math.sqrt(float((self._force_n**2).sum()))
+
+    def errors(self, constants: Constants) -> tuple[float, float]:
+        """Return the RMS and the greatest error as shares of the RMS and the greatest force."""
+        share = math.sqrt(float((self.residuals(constants) ** 2).sum()))
+        return share, float(np.abs(self._error_n(constants)).max() / np.abs(self._force_n).max())
+
+    def _error_n(self, constants: Constants) -> Floats:
+        case = self._case
+        nu_m2ps = case.viscosity_pa_s / case.density_kg_m3
+        late = late_mps(self._w_mps, self._dw_mps2, self._interval_s, case.diameter_m, nu_m2ps, constants)
+        error_n: Floats = self._prompt_n - self._stokes_nspm * late[:, 0] - self._force_n
+        return error_n
+
+
+def refit(tables: Sequence[Table], tell: Callable[[str], None] = lambda _: None) -> Refit:
+    """Return the constants by all tables, each of equal weight, and each table's errors when it is left out.
+
+    Raises
+    ------
+    StudyError
+        There are fewer than two tables, or a search does not end.
+    """
+    if len(tables) < 2:
+        raise StudyError(f"{len(tables)} solved motion(s): a fit that leaves one out needs at least two")
+    solved = [_Solved(it) for it in tables]
+    tell(f"fitting the constants to {len(tables)} motions ...")
+    constants = _fit(solved, BEGIN)
+    (program,) = [it for it in MODELS if it.effects == ("unsteady_drag",)]
+    errors = []
+    for table, one in zip(tables, solved, strict=True):
+        tell(f"... without {table.case.liquid_id}, {table.notes['title']} ...")
+        others = _fit([it for it in solved if it is not one], constants)
+        judged = judge(program, table, {})
+        as_run = (judged.share, judged.worst_n / float(np.abs(table.columns["force_n"]).max()))
+        errors.append(MotionError(table, one.errors(constants), one.errors(others), as_run))
+    return Refit(constants, tuple(errors))
+
+
+def fit_constants(tables: Sequence[Table]) -> Constants:
+    """Return the constants by all tables, each of equal weight.
+
+    Raises
+    ------
+    StudyError
+        The search does not end.
+    """
+    return _fit([_Solved(it) for it in tables], BEGIN)
+
+
+def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
+    """Search in the logarithms, so that constants stay positive."""
+
+    def residuals(logs: Floats) -> Floats:
+        constants = Constants(*np.exp(logs).tolist())
+        return np.concatenate([it.residuals(constants) for it in solved])
+
+    found = least_squares(residuals, np.log(begin), diff_step=1e-4, xtol=1e-6, ftol=1e-9)
+    if not found.success:
+        raise StudyError(f"no constants were found: {found.message}")
+    return Constants(*np.exp(found.x).tolist())
+
+
+def refit_markdown(found: Refit) -> str:
+    """Return the constants and the errors as Markdown."""
+    lines = ["| constant | fitted | in the program |", "|---|---:|---:|"]
+    lines += [
+        f"| {name} | {fitted:.3g} | {own:g} |"
+        for name, fitted, own in zip(Constants._fields, found.constants, CONSTANTS, strict=True)
+    ]
+    lines += [
+        "",
+        "RMS error as a share of the RMS force (greatest error as a share of the greatest force)",
+        "",
+        "| motion | liquid | Re | fitted to all | left out of the fit | program, 1 kHz |",
+        "|---|---|---:|---:|---:|---:|",
+    ]
+    for it in sorted(found.errors, key=lambda one: one.table.case.reynolds):
+        shares = " | ".join(f"{rms:.1%} ({most:.1%})" for rms, most in (it.fitted, it.left_out, it.program))
+        case = it.table.case
+        lines.append(f"| {case.title} | {case.liquid_id} | {case.reynolds:.3g} | {shares} |")
+    return "\n".join(lines)
