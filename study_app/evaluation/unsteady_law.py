@@ -29,7 +29,7 @@ class Constants(NamedTuple):
     r_0: float
 
 
-CONSTANTS: Final = Constants(c_m=0.281, c_y=0.873, c_z=3.29, beta=2.86, r_0=12.7)
+CONSTANTS: Final = Constants(c_m=0.281, c_y=0.873, c_z=3.29, beta=2.86, r_0=12.8)
 
 
 @workings

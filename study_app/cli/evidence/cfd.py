@@ -33,7 +33,7 @@ def cfd(to: Path | None, *, solve: bool, refit: bool) -> None:
     from study_app.store.output_files import make_folder
     from study_app.validation.cfd.fits import fit_all
     from study_app.validation.cfd.law_fit import refit as refit_all
-    from study_app.validation.cfd.law_fit import refit_markdown
+    from study_app.validation.cfd.law_fit import refit_markdown, write_refit
     from study_app.validation.cfd.model_comparison import fits_markdown, steady_markdown, write
     from study_app.validation.cfd.solver import solve as solve_all
     from study_app.validation.cfd.stored_flows import steady, stored, training
@@ -50,8 +50,12 @@ def cfd(to: Path | None, *, solve: bool, refit: bool) -> None:
         fits = fit_all(tables, show) if found is None else ()
     for written in solved:
         click.echo(written)
-    if found is not None:
+    if found is not None and to is None:
         click.echo(refit_markdown(found))
+        return
+    if found is not None and to is not None:
+        for written in write_refit(found, to):
+            click.echo(written)
         return
     if to is None:
         click.echo(f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -17,8 +18,10 @@ from scipy.optimize import least_squares
 from study_app.errors import StudyError
 from study_app.evaluation.unsteady_law import CONSTANTS, Constants, late_mps
 from study_app.haptics.model.motion import Floats
+from study_app.store.atomic import write_file
+from study_app.store.tables.csv_files import csv_text_of
 from study_app.validation.cfd.fits import MODELS, judge
-from study_app.validation.cfd.stored_flows import Table
+from study_app.validation.cfd.stored_flows import LEFT_OUT, LEFT_OUT_FILE, Table
 
 STEP: Final = 0.005
 """Interval between the rows that are compared [D/U]."""
@@ -30,11 +33,12 @@ BEGIN: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, beta=1.0, r_0=5.0)
 class MotionError:
     """RMS error as a share of the RMS force, and greatest error as a share of the greatest force, of one motion.
 
-    ``fitted`` with the constants fitted to all motions, ``left_out`` with those fitted to all others, ``program`` with
-    the program's own constants in its tick at 1 kHz. Each is (RMS, greatest).
+    ``fitted`` with the constants fitted to all motions, ``left_out`` with those fitted to all others, ``others``, and
+    ``program`` with the program's own constants in its tick at 1 kHz. Each is (RMS, greatest).
     """
 
     table: Table
+    others: Constants
     fitted: tuple[float, float]
     left_out: tuple[float, float]
     program: tuple[float, float]
@@ -103,7 +107,7 @@ def refit(tables: Sequence[Table], tell: Callable[[str], None] = lambda _: None)
         others = _fit([it for it in solved if it is not one], constants)
         judged = judge(program, table, {})
         as_run = (judged.share, judged.worst_n / float(np.abs(table.columns["force_n"]).max()))
-        errors.append(MotionError(table, one.errors(constants), one.errors(others), as_run))
+        errors.append(MotionError(table, others, one.errors(constants), one.errors(others), as_run))
     return Refit(constants, tuple(errors))
 
 
@@ -129,6 +133,21 @@ def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
     if not found.success:
         raise StudyError(f"no constants were found: {found.message}")
     return Constants(*np.exp(found.x).tolist())
+
+
+def write_refit(found: Refit, to: Path) -> tuple[Path, ...]:
+    """Write constants and errors as Markdown, and the constants without each motion as CSV, into a folder.
+
+    Raises
+    ------
+    StoreError
+        A file cannot be written.
+    """
+    rows = [[it.table.case.name, *(f"{value:.6g}" for value in it.others)] for it in found.errors]
+    files = {LEFT_OUT_FILE: csv_text_of([LEFT_OUT, *rows]), "refit.md": f"{refit_markdown(found)}\n"}
+    for name, text in files.items():
+        write_file(to / name, text.encode())
+    return tuple(to / name for name in files)
 
 
 def refit_markdown(found: Refit) -> str:

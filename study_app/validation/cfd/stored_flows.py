@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from study_app.errors import StudyError
+from study_app.evaluation.unsteady_law import Constants
 from study_app.haptics.model.motion import Floats
 from study_app.store.tables.csv_files import csv_text_of
 from study_app.validation.cfd.cases import Case
@@ -23,6 +24,9 @@ STEADY: Final = ("reynolds", "drag_coefficient", "drag_coefficient_coarse", "dra
 """C_d, the same on a coarser grid, and in a box of half the size."""
 STEADY_FILE: Final = "steady.csv"
 TRAINING_FOLDER: Final = "training"
+LEFT_OUT: Final = ("motion", *Constants._fields)
+"""The constants of unsteady drag that are fitted to all motions but one, for each motion."""
+LEFT_OUT_FILE: Final = "left_out.csv"
 OF_THE_MODEL: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "computing_s_per_s")
 """The notes of a table of `MOTION` by which models are compared with it."""
 _OF_THE_CASE: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "speed_mps")
@@ -80,6 +84,28 @@ def training(folder: Traversable | None = None) -> tuple[Table, ...]:
         There is none, or one cannot be understood.
     """
     return _motions((folder or _package()) / TRAINING_FOLDER)
+
+
+def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
+    """Return the constants of unsteady drag fitted without a motion, by the name of its case; often none.
+
+    Raises
+    ------
+    StudyError
+        The file cannot be understood.
+    """
+    file = (folder or _package()) / LEFT_OUT_FILE
+    if not file.is_file():
+        return {}
+    try:
+        header, *rows = csv.reader(file.read_text(encoding="utf-8").splitlines())
+        if tuple(header) != LEFT_OUT:
+            raise ValueError(f"its columns are {','.join(header)}, not {','.join(LEFT_OUT)}")  # noqa: TRY301
+        return {name: Constants(*map(float, values)) for name, *values in rows}
+    except (OSError, ValueError, TypeError) as error:
+        raise StudyError(
+            f"{file.name} cannot be used ({error}): make it again with liquid-study cfd --refit --to DIR"
+        ) from error
 
 
 def _motions(place: Traversable) -> tuple[Table, ...]:
