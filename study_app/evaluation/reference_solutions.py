@@ -17,6 +17,7 @@ from scipy.interpolate import PchipInterpolator
 
 from study_app.evaluation.hand_motions import along_x, stroke, vectors_x
 from study_app.evaluation.reference_model import respond
+from study_app.evaluation.unsteady_law import Constants
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Liquid, Scene
 
@@ -70,6 +71,7 @@ class Truth:
     """A truth by its name on tables and figures; ``source`` says where it is from.
 
     ``computing_s`` is what a fluid solver took for a second of the motion, with the machine it ran on; else None.
+    ``left_out`` are the constants of unsteady drag that were fitted without this truth; None where it is in no fit.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Truth:
     cases: tuple[Case, ...]
     computing_s: float | None = None
     machine: str = ""
+    left_out: Constants | None = None
 
 
 def definition(scene: Scene, motion: Motion) -> Truth:

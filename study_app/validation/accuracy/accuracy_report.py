@@ -86,8 +86,9 @@ _WHAT: Final = (
     "Times are computing times of one thread: medians over repeats, in one interleaved run, of the median and the 99th "
     "percentile of batches of 1,000 ticks; what other programs take is left out. RMS error in % of the RMS of the true "
     "force, greatest in % of the greatest. Direction: RMS angle where the true force is felt. Fewer ticks a second: "
-    "the error of the force alone, not what they cost in stability. ● no model is both faster, in times of real time, "
-    "and truer, each against the truth that it misses most; ◎ what the gate chooses, and the program runs."
+    "the error of the force alone, not what they cost in stability. Unsteady drag meets each motion of the fluid "
+    "solver with constants fitted to the other motions. ● no model is both faster, in times of real time, and truer, "
+    "each against the truth that it misses most; ◎ what the gate chooses, and the program runs."
 )
 _HEADINGS: Final = (
     "",

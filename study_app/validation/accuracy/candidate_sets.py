@@ -9,7 +9,15 @@ from study_app.haptics.model.effects.drag import REFERENCE
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws import Law
 from study_app.haptics.model.scene import Effect, Estimator, Ewma, Foaw, Given, Line, Raw, Scene
-from study_app.validation.accuracy.candidates import InterpretedRung, LinearRung, ListRung, Rung, TickRung, given
+from study_app.validation.accuracy.candidates import (
+    InterpretedRung,
+    LinearRung,
+    ListRung,
+    Rung,
+    TickRung,
+    UnsteadyRung,
+    given,
+)
 from study_app.validation.accuracy.naive_wake import NumpyTail, PlainTail
 
 SLOWER = (2, 4, 10)
@@ -105,7 +113,7 @@ def physical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
     for effect in ("added_mass", "history"):
         carried = (*carried, effect)
         rungs.append(_carrying(exact, REFERENCE, carried))
-    rungs.append(TickRung("unsteady drag", "unsteady drag", "effects", with_effects(exact, "unsteady_drag")))
+    rungs.append(UnsteadyRung("unsteady drag", "unsteady drag", "effects", with_effects(exact, "unsteady_drag")))
     gated = resolve(_only(scene, scene.liquids[0].model_copy(update={"effects": "auto"}))).liquids[0]
     carried = tuple(it for it in _WORDS if it in gated.effects)
     if "unsteady_drag" in gated.effects:

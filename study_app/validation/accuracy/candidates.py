@@ -16,6 +16,8 @@ import numpy as np
 
 from study_app.evaluation.hand_motions import COUNT_M
 from study_app.evaluation.reference_model import lowered
+from study_app.evaluation.reference_solutions import Truth
+from study_app.evaluation.unsteady_law import unsteady_n
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.effects.drag import resistance
 from study_app.haptics.kernels.safety import new_safety
@@ -81,6 +83,10 @@ class Rung(ABC):
         self.take(0, self.ticks)
         return np.repeat(self.force_n, self.every, axis=0)[: len(motion.t_s)]
 
+    def forces_against(self, truth: Truth) -> list[Floats]:
+        """Return the forces along the motions of a truth, each (n, 3) [N]."""
+        return [self.forces(case.motion) for case in truth.cases]
+
     @abstractmethod
     def _begin(self) -> None:
         """Allocate what a run needs."""
@@ -110,6 +116,22 @@ class TickRung(Rung):
     def memory_bytes(self) -> int:
         """Size of the model."""
         return sum(rows.nbytes for rows in _packed(self.scene).arrays)
+
+
+class UnsteadyRung(TickRung):
+    """Unsteady drag; against a solved motion of the fit, with constants that are fitted without that motion."""
+
+    def forces_against(self, truth: Truth) -> list[Floats]:
+        """Return the forces, as `Rung.forces_against`; by the letter where a motion is left out of the fit."""
+        if truth.left_out is None:
+            return super().forces_against(truth)
+        found = []
+        for case in truth.cases:
+            self.begin(case.motion)
+            w, interval_s = self._velocity_mps, np.full(self.ticks, 1 / self.rate_hz)
+            dw = np.diff(w, axis=0, prepend=w[:1]) * self.rate_hz
+            found.append(unsteady_n(self.scene, w, dw, interval_s, truth.left_out))
+        return found
 
 
 class LinearRung(Rung):

@@ -162,7 +162,7 @@ def _rows(
     for rung in rungs:
         tell(f"{kind}: {rung.name}")
         for truth in against:
-            error = error_of([rung.forces(it.motion) for it in truth.cases], truth)
+            error = error_of(rung.forces_against(truth), truth)
             chosen = rung is choice
             rows.append(Row(kind, scene.liquids[0].id, truth.name, rung, error, unknown, rung.memory_bytes, chosen))
     return rows

@@ -23,8 +23,10 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
     """
     liquid = scene.liquids[0]
     ours = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
+    tables = (*stored_flows.stored(folder), *(stored_flows.training() if folder is None else ()))
+    without = stored_flows.left_out() if folder is None else {}
     found = []
-    for table in stored_flows.stored(folder):
+    for table in tables:
         notes = table.notes
         *of, computing_s = (float(notes[name]) for name in stored_flows.OF_THE_MODEL)
         if not np.allclose(of, ours, rtol=0.01, atol=0):
@@ -40,5 +42,6 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
         )
         source = f"fluid solver: {notes.get('command', 'unknown command')}"
         title = notes.get("title", "a solved flow")
-        found.append(Truth(title, source, (case,), computing_s, notes.get("machine", "")))
+        left_out = without.get(table.case.name) if folder is None else None
+        found.append(Truth(title, source, (case,), computing_s, notes.get("machine", ""), left_out))
     return tuple(found)

@@ -6,6 +6,7 @@ import itertools
 import math
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from study_app.evaluation.expected_error import error_report, expected, physical
 from study_app.evaluation.force_error import ROUNDING, Error, error_of
 from study_app.evaluation.hand_motions import stir, stroke
 from study_app.evaluation.reference_solutions import Case, Truth
+from study_app.evaluation.unsteady_law import CONSTANTS
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.effects.wake import Wake
@@ -28,8 +30,10 @@ from study_app.protocol.load import load_scene
 from study_app.validation.accuracy import candidate_sets
 from study_app.validation.accuracy.accuracy_figure import LABEL_PT, draw, duration, spread
 from study_app.validation.accuracy.accuracy_report import COLUMNS, csv_text, markdown, write
-from study_app.validation.accuracy.candidates import LinearRung, ListRung, TickRung
+from study_app.validation.accuracy.candidates import LinearRung, ListRung, TickRung, UnsteadyRung
 from study_app.validation.accuracy.comparison import FINE_S, Accuracy, Row, Time, accuracy, front, race, worst
+from study_app.validation.cfd import stored_flows
+from study_app.validation.cfd.solver_truths import solver_truths
 from tests.haptics.scenes import COMPILED
 
 pytestmark = pytest.mark.slow
@@ -139,14 +143,37 @@ def test_the_gates_choice_is_marked_once_a_ladder_and_keeps_the_target_where_all
 
 
 @compiled
-@pytest.mark.parametrize("truth", ["stop at 0.2 m/s", "stop at 0.6 m/s"])
+@pytest.mark.parametrize("truth", ["stop at 0.104 m/s", "stop at 0.2 m/s", "stop at 0.6 m/s"])
 def test_after_a_sudden_stop_only_unsteady_drag_keeps_the_target(found, truth):
     errors = {row.rung.name: row.error for row in found.rows if row.truth == truth}
     finite = errors.pop("unsteady drag")
     assert finite.rms < 0.04 < finite.target
     (chosen,) = [row.error for row in found.rows if row.truth == truth and row.chosen]
     assert chosen.rms == min(error.rms for error in errors.values())
-    assert chosen.target < chosen.rms < 0.2 < errors["Haider–Levenspiel + added mass"].rms < errors["constant C_d"].rms
+    drag_and_mass = errors["Haider–Levenspiel + added mass"]
+    assert chosen.target < chosen.rms < 0.8 * drag_and_mass.rms < 0.8 * errors["constant C_d"].rms
+
+
+@compiled
+def test_unsteady_drag_is_within_the_target_of_a_motion_left_out_of_its_fit(found):
+    errors = {row.rung.name: row.error.rms for row in found.rows if row.truth == "multi-sine at 0.0311 m/s"}
+    assert errors.pop("unsteady drag") < 0.02 < min(errors.values())
+
+
+@compiled
+def test_the_constants_of_a_motion_left_out_are_those_that_are_used():
+    scene = REAL.model_copy(
+        update={"liquids": (HONEY.model_copy(update={"effects": ("unsteady_drag",)}),), "format": 2}
+    )
+    rung = UnsteadyRung("unsteady drag", "unsteady drag", "effects", scene.model_copy(update={"velocity": Given()}))
+    truths = solver_truths(scene)
+    assert all(it.left_out is not None for it in truths)
+    own, (truth, *_) = tuple(stored_flows.left_out().values()), truths
+    assert truth.left_out in own
+    (program,), (without,) = (rung.forces_against(replace(truth, left_out=it)) for it in (None, truth.left_out))
+    assert 1e-4 < np.abs(without - program).max() / np.abs(program).max() < 0.05
+    (same,) = rung.forces_against(replace(truth, left_out=CONSTANTS))
+    np.testing.assert_allclose(same, program, atol=1e-3 * np.abs(program).max())
 
 
 @compiled
@@ -174,7 +201,7 @@ def test_the_table_becomes_files(found, tmp_path):
         assert float(row["times_real_time"]) == pytest.approx(float(row["ticks_per_s"]) / float(row["rate_hz"]), 1e-5)
     text = markdown(found)
     assert found.machine in text
-    assert text.count("◎") == 1 + 1 + 5  # the legend, and the choice against each truth
+    assert text.count("◎") == 1 + 1 + 7  # the legend, and the choice against each truth
     assert "**stop at 0.6 m/s**: fluid solver: liquid-study cfd --solve." in text
     assert written[2].read_bytes().startswith(b"\x89PNG")
 

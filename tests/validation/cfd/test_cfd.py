@@ -172,7 +172,12 @@ def test_steady_drag_is_what_was_published_and_independent_of_the_grid():
 def test_truths_find_the_tables_of_their_liquid():
     honey = load_scene("physical_liquids", "honey")
     found = solver_truths(honey)
-    assert [it.name for it in found] == ["stop at 0.2 m/s", "stop at 0.6 m/s"]
+    assert [it.name for it in found] == [
+        "stop at 0.2 m/s",
+        "stop at 0.6 m/s",
+        "stop at 0.104 m/s",
+        "multi-sine at 0.0311 m/s",
+    ]
     assert all(it.computing_s is not None and it.computing_s > 0 for it in found)
 
 
