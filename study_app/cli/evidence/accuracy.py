@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from study_app.haptics.model.scene import Scene
 
 DEFAULT_PATH = "stir"
+REAL = "physical2"
 
 
 @click.command()
@@ -27,13 +28,23 @@ DEFAULT_PATH = "stir"
     metavar="PATH",
     help="Motion CSV, or a programmed path: stir, circle, reverse, reach …",
 )
+@click.option(
+    "--liquids",
+    "every",
+    is_flag=True,
+    help="Compare the liquids of FILE instead, each with its own model: how true its force is, up to which speed, and "
+    "what a tick costs; default: physical2.",
+)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for table and figure; default: print.")
-def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) -> None:
+def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, *, every: bool) -> None:
     """Compare accuracy and computation time of the models of a liquid.
 
-    FILE is a protocol or scene file; default: rek2024 and physical_liquids.
-    Wakes are compared with their definition, models of a real liquid with experiments and exact solutions.
+    FILE is a protocol or scene file; default: rek2024 and physical2.
+    Wakes are compared with their definition, models of a real liquid with experiments, exact solutions and a solver.
     """
+    if every:
+        _survey(scene, liquid, to)
+        return
     from study_app.store.output_files import make_folder
     from study_app.validation.accuracy.accuracy_report import markdown
     from study_app.validation.accuracy.accuracy_report import write as write_all
@@ -56,14 +67,31 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) 
         click.echo(written)
 
 
+def _survey(file: str | None, liquid: str | None, to: Path | None) -> None:
+    """Print or write how true the force of every liquid of a file is."""
+    from study_app.protocol.load import load_scenes
+    from study_app.store.output_files import make_folder
+    from study_app.validation.accuracy.liquid_survey import survey, survey_markdown, write_survey
+
+    if liquid is not None:
+        raise click.UsageError("--liquids compares all liquids of a file: leave out --liquid")
+    if to is not None:
+        make_folder(to)
+    with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
+        found = survey(load_scenes(file or REAL), show)
+    if not found:
+        raise click.UsageError(f"{file}: no liquid has a viscosity, so there is no physical reference to compare with")
+    click.echo(survey_markdown(found) if to is None else write_survey(found, to))
+
+
 def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
     """Return the scene whose definition is followed, the one whose liquid is real, and what is missing."""
     from study_app.protocol.load import load_scene, load_scenes
 
     if scene is None and liquid is None:
-        return load_scene("rek2024", "water"), load_scene("physical_liquids", "honey"), ()
+        return load_scene("rek2024", "water"), load_scene(REAL, "honey"), ()
     if scene is None:
-        thesis, real = load_scenes("rek2024"), load_scenes("physical_liquids")
+        thesis, real = load_scenes("rek2024"), load_scenes(REAL)
         if liquid in thesis or liquid in real:
             return thesis.get(liquid or ""), real.get(liquid or ""), ()
         known = ", ".join(dict.fromkeys([*thesis, *real]))

@@ -171,9 +171,12 @@ class _Panel:
             least = min(100 * it.error.rms for it in self._rows if it.rung is row.rung)
             axes.plot([row.ns_per_ms] * 2, [least, 100 * row.error.rms], color=style.TEXT_SOFT, linewidth=0.6, zorder=3)
         self._label(axes, shown)
-        for ns in self._solved if not self._numerical else ():
-            axes.axvline(ns, ymax=SOLVER_HIGH, color=style.TEXT_SOFT, linewidth=0.8)
-            foot = (ns, axes.get_ylim()[0])
+        if self._solved and not self._numerical:
+            least, greatest = min(self._solved), max(self._solved)
+            axes.axvspan(
+                least, greatest, 0, SOLVER_HIGH, facecolor=style.GRID, edgecolor=style.TEXT_SOFT, linewidth=0.8
+            )
+            foot = (least, axes.get_ylim()[0])
             axes.annotate("fluid solver", foot, (-2, 3), rotation=90, ha="right", va="bottom", **offset)
 
     def _rounding(self, axes: Axes, main: Axes) -> None:

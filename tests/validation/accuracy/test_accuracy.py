@@ -226,8 +226,11 @@ def test_the_figure_names_every_model_inside_its_column(found):
 def test_a_solvers_time_is_drawn_where_a_table_is_stored(found):
     solver = Truth("start and stop", "fluid solver", (), computing_s=17.0)
     figure = draw(Accuracy(found.rows, (*found.truths, solver), (), found.machine, found.motion))
-    drawn = [text.xy[0] for axes in figure.axes for text in axes.texts if text.get_text() == "fluid solver"]
-    assert max(drawn) == pytest.approx(17e6)
+    (drawn,) = [text.xy[0] for axes in figure.axes for text in axes.texts if text.get_text() == "fluid solver"]
+    (box,) = [it.get_extents() for it in figure.axes[-1].patches]
+    least, greatest = figure.axes[-1].transData.inverted().transform(box)[:, 0]
+    assert greatest == pytest.approx(17e6)
+    assert least == pytest.approx(drawn) == pytest.approx(1e6 * min(it.computing_s or 99 for it in found.truths))
     assert figure.axes[-1].get_xlim()[1] > 1.7e10 / 1e3
 
 
