@@ -76,7 +76,7 @@ def _of_one(scene: Scene, index: int) -> tuple[float, float, float, str]:
     motion = stroke(speed_mps, rate_per_s, CYCLES, alone.rate_hz)
     if "unsteady_drag" in kept:
         true_n = _unsteady_n(alone, motion, speed_mps, rate_per_s)
-        against = "the law of unsteady drag, which is within 4 % of a fluid solver at Re 2 to 36, and buoyancy"
+        against = "the law of unsteady drag, which is within 8 % of a fluid solver at Re 0.3 to 100, and buoyancy"
     elif liquid.viscosity_pa_s is not None and liquid.drag.law != "linear" and not {"wake", "local_wake"} & set(kept):
         true_n = physical_n(alone, speed_mps, rate_per_s, motion.t_s)
         against = "drag by experiments, added mass, buoyancy and the history of creeping flow (an upper bound)"

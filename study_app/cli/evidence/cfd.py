@@ -14,7 +14,7 @@ from study_app.cli.progress import progress
 @click.option(
     "--solve",
     is_flag=True,
-    help="Solve the flow again instead of using the stored tables: about 12 minutes on one core, 30 on a busy one; "
+    help="Solve the flow again instead of using the stored tables: 20 minutes on one core, an hour on a busy one; "
     "needs the extra cfd (pip install ngsolve, 350 MB).",
 )
 @click.option(
@@ -36,7 +36,7 @@ def cfd(to: Path | None, *, solve: bool, refit: bool) -> None:
     from study_app.validation.cfd.law_fit import refit_markdown, write_refit
     from study_app.validation.cfd.model_comparison import fits_markdown, steady_markdown, write
     from study_app.validation.cfd.solver import solve as solve_all
-    from study_app.validation.cfd.stored_flows import steady, stored, training
+    from study_app.validation.cfd.stored_flows import held_out, steady, stored, training
 
     if solve and to is None:
         raise click.UsageError("--solve needs --to: the folder for the solver's tables")
@@ -46,7 +46,7 @@ def cfd(to: Path | None, *, solve: bool, refit: bool) -> None:
         solved = solve_all(to, show) if solve and to is not None else ()
         source = to if solve else None
         tables, drag = stored(source), steady(source)
-        found = refit_all((*tables, *training(source)), show) if refit else None
+        found = refit_all((*tables, *training(source)), held_out(source), show) if refit else None
         fits = fit_all(tables, show) if found is None else ()
     for written in solved:
         click.echo(written)

@@ -19,7 +19,7 @@ from study_app.haptics.model.scene import Liquid, Scene
 from study_app.store.atomic import write_file
 from study_app.validation.accuracy import candidate_sets
 from study_app.validation.cfd.solver_truths import solver_truths
-from study_app.validation.cfd.stored_flows import stored, training
+from study_app.validation.cfd.stored_flows import held_out, stored, training
 
 NO_TRUTH_REYNOLDS: Final = 1000.0
 """Above, no solution or measurement of an unsteady motion is known to this program."""
@@ -137,7 +137,7 @@ def write_survey(found: tuple[Surveyed, ...], to: Path) -> Path:
 
 def survey_markdown(found: tuple[Surveyed, ...]) -> str:
     """Return liquids, and drag laws over the Reynolds number, as Markdown."""
-    highest = max(it.case.reynolds for it in (*stored(), *training()))
+    highest = max(it.case.reynolds for it in (*stored(), *training(), *held_out()))
     lines = [f"| {' | '.join(_HEADINGS)} |", f"|---|---:|---|{'---:|' * (len(_HEADINGS) - 3)}"]
     for it in found:
         least, greatest = it.solver_reynolds

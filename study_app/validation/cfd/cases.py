@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -37,6 +38,14 @@ TRAINING: Final = (
 They are besides those of `cases`, with which alone the constants are not determined: those have no motion that goes
 back through its own wake.
 """
+HELD_OUT: Final = (
+    (OSCILLATION_KC4, "honey", 3.0),
+    (OSCILLATION_KC5, "gear_oil", 60.0),
+    (REVERSAL, "honey", 2.0),
+    (REVERSAL, "gear_oil", 60.0),
+    (STOPPING, "gear_oil", 60.0),
+)
+"""Motions as those of `TRAINING` that no fit uses: the constants are tested by them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +105,17 @@ def cases() -> tuple[Case, ...]:
 
 def training_cases() -> tuple[Case, ...]:
     """Return the motions of `TRAINING`."""
+    return _by_reynolds(TRAINING)
+
+
+def held_out_cases() -> tuple[Case, ...]:
+    """Return the motions of `HELD_OUT`."""
+    return _by_reynolds(HELD_OUT)
+
+
+def _by_reynolds(motions: Sequence[tuple[VelocityProfile, str, float]]) -> tuple[Case, ...]:
     found = []
-    for profile, liquid_id, reynolds in TRAINING:
+    for profile, liquid_id, reynolds in motions:
         one = _case(liquid_id, 1e-3)
         found.append(_case(liquid_id, 1e-3 * reynolds / one.reynolds, profile))
     return tuple(found)

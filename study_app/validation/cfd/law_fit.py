@@ -33,13 +33,14 @@ BEGIN: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, beta=1.0, r_0=5.0)
 class MotionError:
     """RMS error as a share of the RMS force, and greatest error as a share of the greatest force, of one motion.
 
-    ``fitted`` with the constants fitted to all motions, ``left_out`` with those fitted to all others, ``others``, and
-    ``program`` with the program's own constants in its tick at 1 kHz. Each is (RMS, greatest).
+    ``fitted`` with the constants fitted to all motions, None of a motion that is held out of the fit; ``left_out`` with
+    those fitted to all other motions, ``others``; ``program`` with the program's own constants in its tick at 1 kHz.
+    Each is (RMS, greatest).
     """
 
     table: Table
     others: Constants
-    fitted: tuple[float, float]
+    fitted: tuple[float, float] | None
     left_out: tuple[float, float]
     program: tuple[float, float]
 
@@ -87,8 +88,12 @@ class _Solved:
         return error_n
 
 
-def refit(tables: Sequence[Table], tell: Callable[[str], None] = lambda _: None) -> Refit:
+def refit(
+    tables: Sequence[Table], held_out: Sequence[Table] = (), tell: Callable[[str], None] = lambda _: None
+) -> Refit:
     """Return the constants by all tables, each of equal weight, and each table's errors when it is left out.
+
+    The errors of the tables that are ``held_out`` come last.
 
     Raises
     ------
@@ -100,15 +105,20 @@ def refit(tables: Sequence[Table], tell: Callable[[str], None] = lambda _: None)
     solved = [_Solved(it) for it in tables]
     tell(f"fitting the constants to {len(tables)} motions ...")
     constants = _fit(solved, BEGIN)
-    (program,) = [it for it in MODELS if it.effects == ("unsteady_drag",)]
     errors = []
     for table, one in zip(tables, solved, strict=True):
         tell(f"... without {table.case.liquid_id}, {table.notes['title']} ...")
         others = _fit([it for it in solved if it is not one], constants)
-        judged = judge(program, table, {})
-        as_run = (judged.share, judged.worst_n / float(np.abs(table.columns["force_n"]).max()))
-        errors.append(MotionError(table, others, one.errors(constants), one.errors(others), as_run))
+        errors.append(MotionError(table, others, one.errors(constants), one.errors(others), _as_run(table)))
+    errors += [MotionError(it, constants, None, _Solved(it).errors(constants), _as_run(it)) for it in held_out]
     return Refit(constants, tuple(errors))
+
+
+def _as_run(table: Table) -> tuple[float, float]:
+    """Return the errors of the program's tick."""
+    (program,) = [it for it in MODELS if it.effects == ("unsteady_drag",)]
+    judged = judge(program, table, {})
+    return judged.share, judged.worst_n / float(np.abs(table.columns["force_n"]).max())
 
 
 def fit_constants(tables: Sequence[Table]) -> Constants:
@@ -143,7 +153,7 @@ def write_refit(found: Refit, to: Path) -> tuple[Path, ...]:
     StoreError
         A file cannot be written.
     """
-    rows = [[it.table.case.name, *(f"{value:.6g}" for value in it.others)] for it in found.errors]
+    rows = [[it.table.case.name, *(f"{value:.6g}" for value in it.others)] for it in found.errors if it.fitted]
     files = {LEFT_OUT_FILE: csv_text_of([LEFT_OUT, *rows]), "refit.md": f"{refit_markdown(found)}\n"}
     for name, text in files.items():
         write_file(to / name, text.encode())
@@ -165,7 +175,8 @@ def refit_markdown(found: Refit) -> str:
         "|---|---|---:|---:|---:|---:|",
     ]
     for it in sorted(found.errors, key=lambda one: one.table.case.reynolds):
-        shares = " | ".join(f"{rms:.1%} ({most:.1%})" for rms, most in (it.fitted, it.left_out, it.program))
+        errors = (it.fitted, it.left_out, it.program)
+        shares = " | ".join("held out" if one is None else f"{one[0]:.1%} ({one[1]:.1%})" for one in errors)
         case = it.table.case
         lines.append(f"| {case.title} | {case.liquid_id} | {case.reynolds:.3g} | {shares} |")
     return "\n".join(lines)

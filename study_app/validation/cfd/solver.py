@@ -1,4 +1,4 @@
-"""Solve every case, check what comes out, and store it: about ten minutes of one core's time, with the extra ``cfd``.
+"""Solve every case, check what comes out, and store it: about 20 minutes of one core's time, with the extra ``cfd``.
 
 Every motion is solved three times: as it is; on a coarser grid with steps twice as long; and without convection, where
 the exact force is known. A solution that misses one of the two by more than is permitted is not stored.
@@ -18,9 +18,17 @@ from study_app.errors import StudyError
 from study_app.haptics.model.motion import Floats
 from study_app.store.atomic import write_file
 from study_app.store.output_files import make_folder
-from study_app.validation.cfd.cases import Case, cases, training_cases
+from study_app.validation.cfd.cases import Case, cases, held_out_cases, training_cases
 from study_app.validation.cfd.flow import ORDER, Flow, Grid, library
-from study_app.validation.cfd.stored_flows import MOTION, STEADY, STEADY_FILE, TRAINING_FOLDER, notes_of, text
+from study_app.validation.cfd.stored_flows import (
+    HELD_OUT_FOLDER,
+    MOTION,
+    STEADY,
+    STEADY_FILE,
+    TRAINING_FOLDER,
+    notes_of,
+    text,
+)
 from study_app.validation.computer import machine
 
 COMMAND: Final = "liquid-study cfd --solve"
@@ -52,6 +60,7 @@ def solve(to: Path, tell: Callable[[str], None]) -> tuple[Path, ...]:
     for solved, folder, grid, coarse_grid in (
         (cases(), to, GRID, COARSE),
         (training_cases(), to / TRAINING_FOLDER, BOTH_WAYS, BOTH_WAYS_COARSE),
+        (held_out_cases(), to / HELD_OUT_FOLDER, BOTH_WAYS, BOTH_WAYS_COARSE),
     ):
         make_folder(folder)
         flow, coarse = Flow(grid), Flow(coarse_grid)

@@ -23,7 +23,8 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
     """
     liquid = scene.liquids[0]
     ours = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
-    tables = (*stored_flows.stored(folder), *(stored_flows.training() if folder is None else ()))
+    more = (*stored_flows.training(), *stored_flows.held_out()) if folder is None else ()
+    tables = (*stored_flows.stored(folder), *more)
     without = stored_flows.left_out() if folder is None else {}
     found = []
     for table in tables:

@@ -24,6 +24,7 @@ STEADY: Final = ("reynolds", "drag_coefficient", "drag_coefficient_coarse", "dra
 """C_d, the same on a coarser grid, and in a box of half the size."""
 STEADY_FILE: Final = "steady.csv"
 TRAINING_FOLDER: Final = "training"
+HELD_OUT_FOLDER: Final = "held_out"
 LEFT_OUT: Final = ("motion", *Constants._fields)
 """The constants of unsteady drag that are fitted to all motions but one, for each motion."""
 LEFT_OUT_FILE: Final = "left_out.csv"
@@ -84,6 +85,17 @@ def training(folder: Traversable | None = None) -> tuple[Table, ...]:
         There is none, or one cannot be understood.
     """
     return _motions((folder or _package()) / TRAINING_FOLDER)
+
+
+def held_out(folder: Traversable | None = None) -> tuple[Table, ...]:
+    """Return the tables of the motions that no fit uses.
+
+    Raises
+    ------
+    StudyError
+        There is none, or one cannot be understood.
+    """
+    return _motions((folder or _package()) / HELD_OUT_FOLDER)
 
 
 def left_out(folder: Traversable | None = None) -> dict[str, Constants]:

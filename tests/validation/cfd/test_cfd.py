@@ -25,13 +25,14 @@ from tests.haptics.scenes import COMPILED as IS_COMPILED
 COMPILED = pytest.mark.skipif(not IS_COMPILED, reason="fits need the compiled tick")
 PACKAGE = resources.files("study_app.validation.cfd")
 NAMES = tuple(it.name for it in cases.cases())
-CASES = (*cases.cases(), *cases.training_cases())
+CASES = (*cases.cases(), *cases.training_cases(), *cases.held_out_cases())
 COARSE = flow.Grid(ahead=15, behind=30, aside=15, ball=0.2, near=0.8, far=6)
 
 
 @pytest.fixture(scope="module")
 def stored():
-    return {it.case.name: it for it in (*stored_flows.stored(), *stored_flows.training())}
+    tables = (*stored_flows.stored(), *stored_flows.training(), *stored_flows.held_out())
+    return {it.case.name: it for it in tables}
 
 
 @pytest.fixture(scope="module")
@@ -177,6 +178,8 @@ def test_truths_find_the_tables_of_their_liquid():
         "stop at 0.6 m/s",
         "stop at 0.104 m/s",
         "multi-sine at 0.0311 m/s",
+        "oscillation, KC 4 at 0.311 m/s",
+        "reversal at 0.207 m/s",
     ]
     assert all(it.computing_s is not None and it.computing_s > 0 for it in found)
 

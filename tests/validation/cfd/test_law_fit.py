@@ -11,8 +11,8 @@ from study_app.errors import StudyError
 from study_app.evaluation.unsteady_law import CONSTANTS, Constants, unsteady_n
 from study_app.haptics.kernels.effects import unsteady_drag
 from study_app.haptics.model.scene import Liquid, Scene
-from study_app.validation.cfd import law_fit, stored_flows
-from study_app.validation.cfd.cases import TRAINING
+from study_app.validation.cfd import fits, law_fit, stored_flows
+from study_app.validation.cfd.cases import HELD_OUT, TRAINING
 from study_app.validation.cfd.stored_flows import MOTION, Table
 from tests.haptics.scenes import COMPILED
 
@@ -72,20 +72,32 @@ def test_the_stored_constants_without_a_motion_are_those_that_a_fit_gives(tmp_pa
         stored_flows.left_out(tmp_path)
 
 
+def test_the_program_meets_motions_that_no_fit_used():
+    (model,) = [it for it in fits.MODELS if it.effects == ("unsteady_drag",)]
+    shares = {it.case.name: fits.judge(model, it, {}).share for it in stored_flows.held_out()}
+    assert not set(shares) & {it.case.name for it in (*stored_flows.stored(), *stored_flows.training())}
+    assert sum(shares.values()) <= 0.04 * len(shares)
+    assert shares.pop("reversal-gear_oil-347mmps") <= 0.08  # through its own wake the law is least true
+    assert max(shares.values()) <= 0.05
+
+
 def test_one_motion_is_too_few():
     with pytest.raises(StudyError, match=r"1 solved motion"):
         law_fit.refit(stored_flows.training()[:1])
 
 
 @pytest.mark.nightly
+@pytest.mark.timeout(900)
 def test_each_motion_left_out_of_the_fit_is_met():
-    """Within 5.1 %, but for the only reversal and the only stop at Re 100: they are stored as what the fit needs."""
+    """Within 5.1 %, but for reversals at Re 10 and 60 and for the only stop at Re 100."""
     done = CliRunner().invoke(commands, ["cfd", "--refit"])
     assert done.exit_code == 0, done.output
     rows = [line.split(" | ") for line in done.stdout.splitlines() if "m/s |" in line]
-    assert len(rows) == len(TRAINING) + len(stored_flows.stored())
+    assert len(rows) == len(TRAINING) + len(stored_flows.stored()) + len(HELD_OUT)
+    assert sum(row[3] == "held out" for row in rows) == len(HELD_OUT)
     left_out = {(row[0].strip("| "), row[1]): float(row[4].split("%")[0]) for row in rows}
     needed = {name for name, percent in left_out.items() if not percent <= 5.1}
-    assert needed == {("reversal at 0.164 m/s", "glycerin"), ("stop at 0.578 m/s", "gear_oil")}
-    assert max(left_out.values()) < 6
+    reversals = {("reversal at 0.164 m/s", "glycerin"), ("reversal at 0.347 m/s", "gear_oil")}
+    assert needed == {*reversals, ("stop at 0.578 m/s", "gear_oil")}
+    assert max(left_out.values()) < 8
     assert all(math.isfinite(percent) for percent in left_out.values())
