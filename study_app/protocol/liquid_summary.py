@@ -30,7 +30,7 @@ def warnings(protocol: Protocol) -> tuple[str, ...]:
     return (
         *_alike(protocol, felt),
         *_clipped(felt),
-        *_lawless(protocol),
+        *_lawless(protocol, felt),
         *_practised(protocol),
         *_told_by_size(protocol),
     )
@@ -72,20 +72,25 @@ def _clipped(felt: dict[str, Steady]) -> Iterator[str]:
             )
 
 
-def _lawless(protocol: Protocol) -> Iterator[str]:
+def _lawless(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
     """Yield the liquids with a viscosity whose drag does not depend on it, and how wrong that is."""
     for name in protocol.liquids:
         scene = protocol.scene_of(name)
         (liquid,) = scene.liquids
-        if liquid.viscosity_pa_s is None or "drag" not in liquid.effects or liquid.drag.law != "constant":
+        if liquid.viscosity_pa_s is None:
             continue
         speed_mps = met_mps(scene, liquid, scene.scale * HAND_MPS)
         named_n, true_n = (resistance_n(scene, liquid, speed_mps, law) for law in ("constant", REFERENCE))
+        if "drag" in liquid.effects and liquid.drag.law == "constant":
+            why, instead = "its constant drag coefficient ignores it", f'drag = {{ law = "{REFERENCE}" }}'
+        elif felt[name].drag_n == 0.0:
+            named_n, why, instead = 0.0, "its effects leave out drag", 'name "drag" among them'
+        else:
+            continue
         if abs(named_n - true_n) > max(scene.accuracy.relative * true_n, scene.accuracy.absolute_n):
             yield (
-                f"{name} has a viscosity, but its constant drag coefficient ignores it: at {HAND_MPS:g} m/s of the "
-                f"hand its drag is {named_n:.2f} instead of {true_n:.2f} N, an error of {abs(named_n - true_n):.2f} N: "
-                f'write effects = "auto" or drag = {{ law = "{REFERENCE}" }}'
+                f"{name} has a viscosity, but {why}: at {HAND_MPS:g} m/s of the hand its drag is {named_n:.2f} instead "
+                f'of {true_n:.2f} N, an error of {abs(named_n - true_n):.2f} N: write effects = "auto" or {instead}'
             )
 
 

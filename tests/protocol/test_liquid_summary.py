@@ -100,6 +100,17 @@ def test_a_constant_coefficient_in_a_viscous_liquid_is_warned_of_with_its_error(
     assert not any("ignores it" in warning for warning in warnings(dense("1400\nviscosity_pa_s = 1e-3")))
 
 
+@pytest.mark.parametrize(("effects", "warned"), [("buoyancy", True), ("drag", False)])
+def test_a_viscous_liquid_without_drag_is_warned_of_with_its_error(effects, warned):
+    law = '\ndrag = { law = "haider-levenspiel" }'
+    study = dense(f'1400\nviscosity_pa_s = 10\neffects = ["{effects}"]{law if effects == "drag" else ""}')
+    found = [warning for warning in warnings(study) if warning.startswith("thick has a viscosity")]
+    assert bool(found) == warned
+    for warning in found:
+        true_n = resistance_n(study.scene_of("thick"), study.liquids["thick"].alone, 1.0, LAWS[1])
+        assert f"leave out drag: at 0.1 m/s of the hand its drag is 0.00 instead of {true_n:.2f} N" in warning
+
+
 def test_every_liquid_has_its_table_of_effects():
     lines = effects(PHYSICAL)
     headings = [line.split(":")[0] for line in lines if line and not line.startswith(" ")]
