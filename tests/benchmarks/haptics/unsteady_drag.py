@@ -15,16 +15,22 @@ MODELS = {"no effect": (), "apart": ("drag", "added_mass", "history"), "unsteady
 GLYCERIN = Liquid(id="glycerin", density_kg_m3=1261, viscosity_pa_s=1.41, drag=Drag(law="haider-levenspiel"))
 
 
-def main() -> None:
-    """Print nanoseconds a tick of each beyond a tick without effects, and their ratio."""
+def costs_ns(batches: int) -> tuple[float, float]:
+    """Return what the effects apart and unsteady drag take beyond a tick without effects [ns], medians of batches."""
     liquids = {name: GLYCERIN.model_copy(update={"effects": effects}) for name, effects in MODELS.items()}
     benches = {name: Bench(Scene(scale=3, liquids=(liquid,))) for name, liquid in liquids.items()}
-    for _ in range(300):
+    for _ in range(batches):
         for bench in benches.values():
             bench.batch()
     rest_ns, apart_ns, law_ns = (statistics.median(bench.costs_ns) for bench in benches.values())
-    print(f"drag, added mass and history {apart_ns - rest_ns:.0f} ns, unsteady drag {law_ns - rest_ns:.0f} ns a tick")
-    print(f"ratio {(law_ns - rest_ns) / (apart_ns - rest_ns):.2f}")
+    return apart_ns - rest_ns, law_ns - rest_ns
+
+
+def main() -> None:
+    """Print nanoseconds a tick of each beyond a tick without effects, and their ratio."""
+    apart_ns, law_ns = costs_ns(300)
+    print(f"drag, added mass and history {apart_ns:.0f} ns, unsteady drag {law_ns:.0f} ns a tick")
+    print(f"ratio {law_ns / apart_ns:.2f}")
 
 
 if __name__ == "__main__":
