@@ -105,10 +105,11 @@ def _threshold_words(found: LevelsFound) -> str:
     )
     return (
         f"A threshold is the level ({level_words(found)}) at which the {found.family} function is half-way between "
-        f"guesses and lapses{at}: posterior median with an equal-tailed 95 % interval, from all counted "
-        f"answers, at the levels delivered to the hand. The width, from 5 to 95 % of the rise [{width}], has a log-normal prior; the next column is the "
-        f"threshold under a flat one. “Above” and “below” mark thresholds beyond the levels presented. The group is "
-        f"the random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from three participants on."
+        f"guesses and lapses{at}: posterior median with an equal-tailed 95 % interval, from all counted answers, at "
+        f"the levels delivered to the hand. The width, from 5 to 95 % of the rise [{width}], has a log-normal prior; "
+        f"the next column is the threshold under a flat one. “Above” and “below” mark thresholds beyond the levels "
+        f"presented. The group is the random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from "
+        f"three participants on."
         f"{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of trial "
         f"number and deviance residual, with “!” beyond 2/√n."
     )
