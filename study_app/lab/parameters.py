@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from study_app.errors import StudyError
 from study_app.haptics.model.effect import LEAST, MOST, Effect, Parameter, Value
 from study_app.haptics.model.effects import EFFECTS, NAMED
+from study_app.haptics.model.estimators import ESTIMATORS
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.liquid import Liquid
 from study_app.haptics.model.scene import Given, Scene
@@ -46,13 +47,7 @@ _CHOICES: Final = {
         _P(
             "velocity.kind",
             "Estimator",
-            choices=(
-                ("kalman", "Kalman"),
-                ("ewma", "EWMA (thesis)"),
-                ("line", "Line"),
-                ("foaw", "Adaptive window"),
-                ("raw", "Raw difference"),
-            ),
+            choices=tuple((it.name, it.label) for it in ESTIMATORS if it.of_device),
         ),
         _P(
             "knee.law",

@@ -13,7 +13,7 @@ import numpy as np
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.effect import Fields
 from study_app.haptics.model.effects import EFFECTS
-from study_app.haptics.model.estimators.kalman_records import KALMAN_STATE
+from study_app.haptics.model.estimators import ESTIMATORS
 
 Record: TypeAlias = Any  # one row of a recarray: fields as attributes, compiled or not
 
@@ -106,13 +106,6 @@ REGION_EVERYWHERE = 0
 REGION_BOX = 1
 REGION_CYLINDER = 2
 
-ESTIMATOR_EWMA = 0
-ESTIMATOR_GIVEN = 1
-ESTIMATOR_LINE = 2
-ESTIMATOR_FOAW = 3
-ESTIMATOR_RAW = 4
-ESTIMATOR_KALMAN = 5
-
 KNEE_NONE = 0
 KNEE_SQRT = 1
 KNEE_SQUARE = 2
@@ -126,7 +119,7 @@ PARAMETERS = np.dtype(
         ("effects", np.int64),  # bits of the effects that any of them asks for
         ("radius_m", np.float64),  # of the body
         ("weight_n", np.float64),  # of the body
-        ("estimator", np.int64),  # ESTIMATOR_*
+        ("estimator", np.int64),  # code of `estimators`
         (
             "log_keep_per_s",
             np.float64,
@@ -179,7 +172,7 @@ STATE = np.dtype(
         ("window_held", np.int64),  # how many samples are in it
         ("weight", np.float64),  # of the newest difference, for an interval of ``weighted_s``
         ("weighted_s", np.float64),
-        ("kalman", KALMAN_STATE),
+        *((it.name, record_type(it.state)) for it in ESTIMATORS if it.state is not None),
         ("estimate_mps", np.float64, (3,)),  # the estimator's own velocity, before the knee
         ("velocity_mps", np.float64, (3,)),  # after the knee
         ("wake_mps", np.float64, (3,)),  # of the last listed liquid that acts, as used by drag

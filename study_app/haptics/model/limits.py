@@ -13,7 +13,8 @@ from typing import Final, NamedTuple
 
 from study_app.errors import StudyError
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.scene import Ewma, Given, Kalman, Velocity
+from study_app.haptics.model.estimators import NAMED
+from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Velocity
 
 SLOWEST_HZ: Final = 500.0
 """Slower servos are for trying out: what participants would feel there is the limits rather than the liquids."""
@@ -49,11 +50,11 @@ class DampingLimits(NamedTuple):
 class Entry(NamedTuple):
     """One line of the table: a velocity estimator, a tick period and a delay, and the limits of such a loop.
 
-    ``alpha`` is that of "ewma"; None for the others.
+    ``parameter`` is the weight of "ewma" and the samples of "line" and "foaw"; None for the others.
     """
 
     estimator: str
-    alpha: float | None
+    parameter: float | None
     period_s: float
     delay_ticks: int
     limits: DampingLimits
@@ -67,11 +68,10 @@ def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS)
 def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> DampingLimits:
     """Return the limits of a loop with a tick period [s], a delay [ticks] and a velocity estimator.
 
-    Between two entries of the table, of periods as of alphas, the worse one counts, and of delays the next longer;
-    beyond the fastest, less in the ratio of the periods. Windows stand in the table as they come; one that is set to
-    smooth less also has the limit of the raw difference. A given velocity has no estimator; it is taken as the thesis'
-    own, "ewma". The entries of "kalman" hold where the delay is one tick longer or shorter than believed,
-    and while EWMA stands in for the filter.
+    Between two entries of the table, of periods as of parameters, the worse one counts, and of delays the next longer;
+    beyond the fastest, less in the ratio of the periods. An adaptive window of smaller tolerance than usual also has
+    the limit of the raw difference. A given velocity has no estimator; it is taken as the thesis' own, "ewma". The
+    entries of "kalman" hold where the delay is one tick longer or shorter than believed, and while EWMA stands in.
 
     Raises
     ------
@@ -98,22 +98,22 @@ def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity = _THES
 
 
 def _rows(velocity: Velocity) -> tuple[tuple[str, float | None], ...]:
-    """Return estimator and alpha of the entries that bound this estimator."""
-    if isinstance(velocity, Ewma | Given):
-        alpha = getattr(velocity, "alpha", _THESIS.alpha)
-        known = sorted({entry.alpha for entry in table() if entry.alpha is not None})
-        below = max((it for it in known if it <= alpha), default=known[0])
-        return ("ewma", below), ("ewma", min(it for it in known if it >= alpha))
-    usual = type(velocity)()
-    noisier = getattr(velocity, "samples", 0) < getattr(usual, "samples", 0) or (
-        getattr(velocity, "tolerance_m", 0.0) < getattr(usual, "tolerance_m", 0.0)
-    )
-    return ((velocity.kind, None), ("raw", None)) if noisier else ((velocity.kind, None),)
+    """Return estimator and parameter of the entries that bound this estimator."""
+    if isinstance(velocity, Given):
+        velocity = _THESIS
+    kind = NAMED[velocity.kind]
+    if kind.parameter is None:
+        return ((kind.name, None),)
+    value = getattr(velocity, kind.parameter)
+    below = max((it for it in kind.measured if it <= value), default=kind.measured[0])
+    found = (kind.name, below), (kind.name, min(it for it in kind.measured if it >= value))
+    noisier = isinstance(velocity, Foaw) and velocity.tolerance_m < Foaw().tolerance_m
+    return (*found, ("raw", None)) if noisier else found
 
 
 def _neighbours(row: tuple[str, float | None], period_s: float, delay_ticks: int) -> list[DampingLimits]:
     """Return the limits of an estimator at the next longer delay, at the next slower and the next faster rate."""
-    known = [it for it in table() if (it.estimator, it.alpha) == row and it.delay_ticks >= delay_ticks]
+    known = [it for it in table() if (it.estimator, it.parameter) == row and it.delay_ticks >= delay_ticks]
     delay_ticks = min((entry.delay_ticks for entry in known), default=0)
     periods_s = {entry.period_s for entry in known}
     slower_s = [known_s for known_s in periods_s if known_s >= period_s * (1 - _SAME)]
@@ -131,7 +131,7 @@ def table() -> tuple[Entry, ...]:
         return tuple(
             Entry(
                 row["estimator"],
-                float(row["alpha"]) if row["alpha"] else None,
+                float(row["parameter"]) if row["parameter"] else None,
                 float(row["period_ms"]) * 1e-3,
                 int(row["delay_ticks"]),
                 DampingLimits(float(row["drag_nspm"]), float(row["inertia_nspm"])),

@@ -12,9 +12,15 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
+from study_app.haptics.model.estimators.ewma import Ewma
+from study_app.haptics.model.estimators.foaw import Foaw
+from study_app.haptics.model.estimators.given import Given
+from study_app.haptics.model.estimators.kalman import Kalman
+from study_app.haptics.model.estimators.lead import Lead
+from study_app.haptics.model.estimators.line import MAX_WINDOW, Line
+from study_app.haptics.model.estimators.raw import Raw
 from study_app.haptics.model.liquid import MAX_LIQUIDS, Box, Cylinder, Effect, Everywhere, Liquid, Region
 from study_app.haptics.model.ranges import (
-    Alpha,
     Coordinate,
     DensityKgM3,
     DiameterM,
@@ -42,6 +48,7 @@ __all__ = [
     "Given",
     "Kalman",
     "Knee",
+    "Lead",
     "Line",
     "Liquid",
     "MotionBox",
@@ -53,8 +60,6 @@ __all__ = [
 
 RateHz: TypeAlias = Annotated[float, within(50, 5000, "below, no servo is stable; above, no tick fits")]
 SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a stroke of 60 mm is then 0.6 mm to 6 m in the scene")]
-
-MAX_WINDOW = 16
 
 FADE_S = 0.05
 HAND_SPEED_MPS = 0.3
@@ -75,62 +80,8 @@ class Body(Frozen):
         return math.pi / 6 * self.diameter_m**3
 
 
-class Ewma(Frozen):
-    """Exponentially weighted velocity; ``alpha`` is the weight of the newest difference at 1 kHz.
-
-    The default. [choice] `Line` has less lag and less noise while the hand leads (7.0 ms and 0.64 mm/s against 9.5 ms
-    and 1.37 mm/s), but at 1 kHz with one tick of delay a free handle of 0.1 kg is stable only to 23 N·s/m with it, and
-    to 71 with this: its lag is all delay, a filter's mostly a lower gain where a loop would oscillate. Honey asks for
-    31, light oil for 55 at 8 N.
-    """
-
-    kind: Literal["ewma"] = "ewma"
-    alpha: Alpha = 0.1
-
-
-class Line(Frozen):
-    """The slope of the least-squares line through the newest ``samples`` positions."""
-
-    kind: Literal["line"] = "line"
-    samples: int = Field(default=15, ge=2, le=MAX_WINDOW)
-
-
-class Foaw(Frozen):
-    """The slope of the longest line that misses no position by more than ``tolerance_m`` (``velocity``).
-
-    First-order adaptive windowing: at most ``samples`` positions, fewer where the motion bends. The tolerance is in the
-    hand frame, by default one count of the Falcon's encoders.
-    """
-
-    kind: Literal["foaw"] = "foaw"
-    samples: int = Field(default=16, ge=2, le=MAX_WINDOW)
-    tolerance_m: Annotated[float, within(0, 0.01, "10 mm is a third of a hand's stroke")] = 38e-6
-
-
-class Kalman(Frozen):
-    """A Kalman filter that knows the force just sent and learns the mass it moves (`kalman`).
-
-    Encoder count, delay and least mass come from the device. Where it does not measure its delay, and while the filter
-    is in trouble, the velocity is that of `Ewma` as it comes.
-    """
-
-    kind: Literal["kalman"] = "kalman"
-
-
-class Raw(Frozen):
-    """The newest difference of positions over its time, as it is."""
-
-    kind: Literal["raw"] = "raw"
-
-
-class Given(Frozen):
-    """The velocity comes with the motion: for recorded or programmed motions, never for a device."""
-
-    kind: Literal["given"] = "given"
-
-
-Estimator: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Raw, Field(discriminator="kind")]
-Velocity: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Raw | Given, Field(discriminator="kind")]
+Estimator: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Lead | Raw, Field(discriminator="kind")]
+Velocity: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Lead | Raw | Given, Field(discriminator="kind")]
 
 
 class Knee(Frozen):

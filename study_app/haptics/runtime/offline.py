@@ -15,7 +15,8 @@ from study_app.haptics.kernels.safety import guard, new_safety
 from study_app.haptics.kernels.sample_validation import clamp, place
 from study_app.haptics.kernels.tick import step_model, write_sample
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
-from study_app.haptics.model.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
+from study_app.haptics.model.estimators.given import CODE as GIVEN
+from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.limits import damping_limits
 from study_app.haptics.model.motion import Motion, read
 from study_app.haptics.model.scene import Given, Scene
@@ -100,7 +101,7 @@ def _run(model: Any, safety: Record, samples: Any, t_s: Any) -> None:
         sample = samples[k]
         interval_s = clamp(t_s[k] - t_s[k - 1]) if k > 0 else parameters.period_s
         place(state, sample.position_m[0], sample.position_m[1], sample.position_m[2])
-        if parameters.estimator == ESTIMATOR_GIVEN:
+        if parameters.estimator == GIVEN:
             for axis in range(3):
                 state.estimate_mps[axis] = sample.velocity_mps[axis]
         safety.tick_s = interval_s

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -11,9 +10,9 @@ import numpy as np
 from study_app.errors import StudyError
 from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import MOST_DELAY, UNKNOWN, Dynamics
-from study_app.haptics.model.effect import GRAVITY_MPS2, TAIL_RATE_HZ
+from study_app.haptics.model.effect import GRAVITY_MPS2
 from study_app.haptics.model.effects import EFFECTS
-from study_app.haptics.model.estimators.response import KALMAN_LAG_S
+from study_app.haptics.model.estimators import NAMED as ESTIMATORS
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.limits import (
     CUT_INERTIA_SHARE,
@@ -23,7 +22,7 @@ from study_app.haptics.model.limits import (
     damping_limits,
     slew_limit_n,
 )
-from study_app.haptics.model.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Foaw, Given, Kalman, Line, Scene
+from study_app.haptics.model.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Given, Kalman, Scene
 from study_app.haptics.runtime.scene_records import (
     KINDS,
     EffectRows,
@@ -35,14 +34,6 @@ from study_app.haptics.runtime.scene_records import (
     rows_needed,
 )
 
-_ESTIMATORS = {
-    "ewma": layout.ESTIMATOR_EWMA,
-    "given": layout.ESTIMATOR_GIVEN,
-    "line": layout.ESTIMATOR_LINE,
-    "foaw": layout.ESTIMATOR_FOAW,
-    "raw": layout.ESTIMATOR_RAW,
-    "kalman": layout.ESTIMATOR_KALMAN,
-}
 _KNEES = {"none": layout.KNEE_NONE, "sqrt": layout.KNEE_SQRT, "square": layout.KNEE_SQUARE}
 
 
@@ -69,7 +60,7 @@ def elements_needed(scene: Scene) -> int:
 
 def window_needed(scene: Scene) -> int:
     """Return how many samples the velocity estimator keeps: none for those that do not look back."""
-    return scene.velocity.samples if isinstance(scene.velocity, Line | Foaw) else 0
+    return ESTIMATORS[scene.velocity.kind].samples(scene.velocity)
 
 
 def pack(
@@ -207,17 +198,9 @@ def _fill_constants(model: Model, scene: Scene, limits: Sequence[DampingLimits],
     parameters.liquids = len(scene.liquids)
     parameters.radius_m = scene.body.diameter_m / 2
     parameters.weight_n = scene.body.density_kg_m3 * scene.body.volume_m3 * GRAVITY_MPS2
-    parameters.estimator = _ESTIMATORS[scene.velocity.kind]
+    parameters.estimator = ESTIMATORS[scene.velocity.kind].code
     parameters.window_samples = window_needed(scene)
-    if isinstance(scene.velocity, Ewma | Kalman):
-        alpha = scene.velocity.alpha if isinstance(scene.velocity, Ewma) else Ewma().alpha
-        keep = 1 - alpha
-        parameters.log_keep_per_s = TAIL_RATE_HZ * math.log(keep) if keep > 0 else -math.inf
-        parameters.fallback_lag_s = keep / (alpha * TAIL_RATE_HZ)
-        is_ewma = isinstance(scene.velocity, Ewma)
-        parameters.filter_lag_s = parameters.fallback_lag_s if is_ewma else KALMAN_LAG_S
-    elif isinstance(scene.velocity, Foaw):
-        parameters.tolerance_m = scene.velocity.tolerance_m * scene.scale
+    ESTIMATORS[scene.velocity.kind].fill(parameters, scene.velocity, scene.scale)
     parameters.knee_law = _KNEES[scene.knee.law]
     parameters.knee_threshold_mps = scene.knee.threshold_mps
     parameters.slope_limit_nspm = [limit.drag_nspm / scene.scale for limit in limits]

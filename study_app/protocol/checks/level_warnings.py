@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from study_app.haptics.model.estimators.response import fastest_hz
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
+from study_app.protocol.checks.estimator_response import fastest_hz
 from study_app.protocol.checks.pace import ends, highest_damping
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.tracks import design_of, method_of, tracks_of

@@ -11,12 +11,12 @@ from itertools import product
 from typing import Final
 
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
-from study_app.haptics.model.estimators.response import fastest_hz, passed_share
 from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
+from study_app.protocol.checks.estimator_response import fastest_hz, passed_share
 from study_app.protocol.model import Follow, Protocol, Reach
 from study_app.protocol.quantities import quantity
 from study_app.protocol.source.problems import Fault

@@ -24,7 +24,8 @@ from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.kernels.vector import norm, subtract
 from study_app.haptics.model.effects.drag import resistance_n
-from study_app.haptics.model.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
+from study_app.haptics.model.estimators.given import CODE as GIVEN
+from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.limits import DampingLimits
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Given, Scene
@@ -228,7 +229,7 @@ def _tick(model: Any, safety: Record, sample: Record, motion: Any, k: int) -> No
     sample.fresh = 1
     for axis in range(3):
         sample.position_m[axis] = hand_m[k, axis]
-    if model.parameters[0].estimator == ESTIMATOR_GIVEN:
+    if model.parameters[0].estimator == GIVEN:
         for axis in range(3):
             state.estimate_mps[axis] = velocity_mps[k, axis]
     tick(model, safety, sample)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -13,16 +13,16 @@ from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick_schedule import new_schedule
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.estimators import NAMED as ESTIMATORS
+from study_app.haptics.model.estimators import lead
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.limits import INERTIA_SHARE, DampingLimits, Entry
-from study_app.haptics.model.scene import Body, Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity
+from study_app.haptics.model.scene import Body, Ewma, Foaw, Kalman, Knee, Lead, Line, Liquid, Scene, Velocity
 from study_app.haptics.runtime.pack import pack
 from study_app.validation.stability.closed_loop import LOOP, STROKE, TRACE, begin, run
-from study_app.validation.stability.stability_cases import ESTIMATORS
 
 PERIODS_S: Final = (0.5e-3, 1e-3, 2e-3, 4e-3)
 DELAYS: Final = (0, 1, 2, 3, 4)
-ALPHAS: Final = (0.005, 0.02, 0.05, 0.1, 0.12, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0)
 FREE_HANDLE_KG: Final = 0.1
 FRICTION_NSPM: Final = 0.5
 
@@ -101,7 +101,13 @@ def passive_nspm(friction_nspm: float, period_s: float = NOMINAL_S, delay: int =
 
 def measured_estimators() -> tuple[Velocity, ...]:
     """Return the estimators that the table has entries of."""
-    return (*(Ewma(alpha=alpha) for alpha in ALPHAS), *(it for it in ESTIMATORS.values() if it.kind != "ewma"))
+    found: tuple[Any, ...] = tuple(
+        kind.model(**({} if kind.parameter is None else {kind.parameter: value}))
+        for kind in ESTIMATORS.values()
+        if kind.of_device
+        for value in kind.measured or (None,)
+    )
+    return found
 
 
 def measure_limits(velocities: Iterable[Velocity] | None = None) -> Iterator[Entry]:
@@ -113,14 +119,16 @@ def measure_limits(velocities: Iterable[Velocity] | None = None) -> Iterator[Ent
                 drag = _limit_nspm(velocity, period_s, delay, felt=felt)
                 inertia = (FELT_INERTIA_SHARE if felt else INERTIA_SHARE) * drag
                 limits = DampingLimits(_rounded_down(drag), _rounded_down(inertia))
-                yield Entry(velocity.kind, getattr(velocity, "alpha", None), period_s, delay, limits)
+                parameter = ESTIMATORS[velocity.kind].parameter
+                value = None if parameter is None else float(getattr(velocity, parameter))
+                yield Entry(velocity.kind, value, period_s, delay, limits)
 
 
 def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) -> float:
     """Return the limit of drag: a share of the boundary, less where that is noisy or the filter may be mistaken.
 
-    The raw difference passes a count of the encoder on whole, "ewma" its weight. A window has a fixed number of
-    samples: in a faster loop it is shorter, its slope noisier in the same ratio.
+    The raw difference passes a count of the encoder on whole, the others as `_weight` says. A window has a fixed number
+    of samples: in a faster loop it is shorter, its slope noisier in the same ratio.
     """
     fast = period_s < NOMINAL_S
     if velocity.kind in WINDOWS and fast:
@@ -131,10 +139,9 @@ def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) 
         limits.append(FELT_NSPM)
     if fast:
         limits.append(FAST_KALMAN_NSPM if isinstance(velocity, Kalman) else FAST_NSPM)
-    if isinstance(velocity, Raw | Ewma):
-        alpha = velocity.alpha if isinstance(velocity, Ewma) else 1.0
-        limits.append(COUNT_N * period_s / COUNT_M / _weight(alpha, period_s))
-    if isinstance(velocity, Kalman):
+    if not isinstance(velocity, Kalman):
+        limits.append(COUNT_N * period_s / COUNT_M / _newest_weight(velocity, period_s))
+    else:
         wrong = (it for it in (delay - 1, delay + 1) if it <= MOST_DELAY)
         limits += [boundary_nspm(velocity, period_s, it, believed=delay) for it in wrong]
         limits.append(FELT_SHARE * boundary_nspm(Ewma(), period_s, delay))
@@ -146,6 +153,19 @@ def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) 
 def _weight(alpha: float, period_s: float) -> float:
     """Return the weight of the newest difference in a loop of this period."""
     return float(1.0 - (1.0 - alpha) ** (period_s / NOMINAL_S))
+
+
+def _newest_weight(velocity: Velocity, period_s: float) -> float:
+    """Return how much of a count's speed an estimator takes on at once: 6/(n(n + 1)) of a slope through n samples."""
+    match velocity:
+        case Ewma():
+            return _weight(velocity.alpha, period_s)
+        case Lead():
+            return _weight(lead.ALPHA, period_s) * (1.0 + lead.LEAD_S / lead.SMOOTHING_S)
+        case Line() | Foaw():
+            return 6.0 / (velocity.samples * (velocity.samples + 1))
+        case _:
+            return 1.0
 
 
 def _rounded_down(value: float) -> float:

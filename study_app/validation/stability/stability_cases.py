@@ -10,7 +10,8 @@ from typing import Any, Final
 
 from study_app.errors import StudyError
 from study_app.haptics.model.effects.drag import DAMPING_NSPM, Drag
-from study_app.haptics.model.scene import Ewma, Foaw, Kalman, Line, Liquid, Raw, Scene, Velocity
+from study_app.haptics.model.estimators import ESTIMATORS as KINDS
+from study_app.haptics.model.scene import Liquid, Scene
 from study_app.protocol.load import load
 
 REACHES: Final = "reaches"
@@ -70,13 +71,7 @@ RANGES: Final[Mapping[str, tuple[float, float]]] = {
 }
 """What a case may be made of; the sweep's own choices lie within."""
 
-ESTIMATORS: Final[Mapping[str, Velocity]] = {
-    "ewma": Ewma(),
-    "kalman": Kalman(),
-    "line": Line(),
-    "foaw": Foaw(),
-    "raw": Raw(),
-}
+ESTIMATORS: Final[Mapping[str, Any]] = {it.name: it.model() for it in KINDS if it.of_device}
 
 
 @dataclass(frozen=True, slots=True)

@@ -193,11 +193,11 @@ def write_limits(file: Path, tell: Tell | None = None) -> None:
     StoreError
         The file cannot be written.
     """
-    rows: list[Sequence[Any]] = [("estimator", "alpha", "period_ms", "delay_ticks", "drag_nspm", "inertia_nspm")]
+    rows: list[Sequence[Any]] = [("estimator", "parameter", "period_ms", "delay_ticks", "drag_nspm", "inertia_nspm")]
     lines = len(measured_estimators()) * len(PERIODS_S) * len(DELAYS[1:])
-    for name, alpha, period_s, delay, (drag, inertia) in measure_limits():
-        weight = "" if alpha is None else f"{alpha:g}"
-        rows.append((name, weight, f"{period_s * 1e3:g}", delay, f"{drag:g}", f"{inertia:g}"))
+    for name, value, period_s, delay, (drag, inertia) in measure_limits():
+        parameter = "" if value is None else f"{value:g}"
+        rows.append((name, parameter, f"{period_s * 1e3:g}", delay, f"{drag:g}", f"{inertia:g}"))
         if tell is not None:
             tell(len(rows) - 1, lines)
     write_file(file, csv_text_of(rows).encode())

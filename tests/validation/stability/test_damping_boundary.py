@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.limits import damping_limits, table
-from study_app.haptics.model.scene import Ewma, Kalman, Line
+from study_app.haptics.model.scene import Ewma, Kalman, Lead, Line
 from study_app.validation.stability.damping_boundary import boundary_nspm, measure_limits, passive_nspm
 from tests.haptics.scenes import COMPILED
 
@@ -108,12 +109,20 @@ def test_what_is_proved_passive_is_stable(delay, friction_nspm):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("velocity", [Ewma(), Ewma(alpha=0.2), Kalman()], ids=str)
+@pytest.mark.parametrize("velocity", [Ewma(), Ewma(alpha=0.2), Kalman(), Lead(), Line(samples=5)], ids=str)
 def test_the_shipped_table_is_the_one_that_is_measured(velocity):
     """The first lines of some estimators; the whole is remade by a command."""
-    shipped = [it for it in table() if (it.estimator, it.alpha) == (velocity.kind, getattr(velocity, "alpha", None))]
+    name = NAMED[velocity.kind].parameter
+    value = None if name is None else getattr(velocity, name)
+    shipped = [it for it in table() if (it.estimator, it.parameter) == (velocity.kind, value)]
+    assert len(shipped) == 16
     for one, measured in zip(shipped[:6], measure_limits([velocity]), strict=False):
-        assert one[:4] == (measured.estimator, measured.alpha, pytest.approx(measured.period_s), measured.delay_ticks)
+        assert one[:4] == (
+            measured.estimator,
+            measured.parameter,
+            pytest.approx(measured.period_s),
+            measured.delay_ticks,
+        )
         assert one.limits == pytest.approx(measured.limits, rel=0.02, abs=0.11)
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import clear, copy, square
-from study_app.haptics.model.layout import ESTIMATOR_KALMAN, Record
+from study_app.haptics.model.estimators import kalman
+from study_app.haptics.model.layout import Record
 
 NOTHING_MPS2 = 1e-30
 
@@ -55,7 +56,7 @@ def storing_square(parameters: Record, mass: Record, local: Record, tracks: Reco
     ½ m w_s² + ∫m τ w_s'² dt: what can come back is that of w_s = w - τ w_s', which at a reversal is not 0 when w is.
     With the other estimators their own storage, of a longer lag, covers the difference.
     """
-    if parameters.estimator != ESTIMATOR_KALMAN:
+    if parameters.estimator != kalman.CODE:
         return float(square(local.motion_mps))
     lag_s, square_m2ps2 = 1.0 / mass.filter_per_s, 0.0
     for axis in range(3):

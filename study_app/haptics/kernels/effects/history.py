@@ -18,7 +18,8 @@ from typing import Any
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import clear, square
 from study_app.haptics.model.effects.history import EXPONENTIALS
-from study_app.haptics.model.layout import ESTIMATOR_KALMAN, Record
+from study_app.haptics.model.estimators import kalman
+from study_app.haptics.model.layout import Record
 
 TIMES = (0.1, 0.3, 1.0, 3.0, 10.0, 40.0, 190.0, 1000.0, 6500.0, 50000.0)  # t̃_i
 WEIGHTS = (
@@ -80,7 +81,7 @@ def basset_force(
 @part
 def _storing_square(parameters: Record, local: Record, tracks: Record) -> float:
     """Return the square of the velocity [m²/s²] by which it holds energy: smoothed, as of the added mass."""
-    if parameters.estimator != ESTIMATOR_KALMAN:
+    if parameters.estimator != kalman.CODE:
         return float(square(local.motion_mps))
     square_m2ps2 = 0.0
     for axis in range(3):

@@ -23,7 +23,7 @@ from study_app.haptics.model.layout import Record
 
 JERK_M2PS5: Final = 0.5
 JERK_OF_SPEED_PS3: Final = 4000.0
-JERK_OF_ACCELERATION_PS: Final = 20.0
+JERK_OF_ACCELERATION_PS: Final = 12.0
 TIMING_S: Final = 20e-6
 """Standard deviation of a sample's time."""
 CORNER_RADPS: Final = 2.0 * math.pi * 6.0

@@ -7,18 +7,10 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.estimators.kalman import begin_filter, filter_velocity
+from study_app.haptics.kernels.estimators.lead import add_lead, begin_lead
 from study_app.haptics.kernels.vector import clear, copy, norm, square
-from study_app.haptics.model.layout import (
-    ESTIMATOR_EWMA,
-    ESTIMATOR_FOAW,
-    ESTIMATOR_GIVEN,
-    ESTIMATOR_KALMAN,
-    ESTIMATOR_LINE,
-    ESTIMATOR_RAW,
-    KNEE_SQRT,
-    KNEE_SQUARE,
-    Record,
-)
+from study_app.haptics.model.estimators import ewma, foaw, given, kalman, lead, line, raw
+from study_app.haptics.model.layout import KNEE_SQRT, KNEE_SQUARE, Record
 
 TIE = 1e-9
 NOTHING_MPS = 1e-30
@@ -27,28 +19,33 @@ NOTHING_MPS = 1e-30
 @part
 def reset_estimator(parameters: Record, state: Record) -> None:
     """Begin anew: a position alone says nothing about velocity, so it is 0. A given velocity is already there."""
-    if parameters.estimator != ESTIMATOR_GIVEN:
+    if parameters.estimator != given.CODE:
         clear(state.estimate_mps)
         state.window_held = 0
-    if parameters.estimator == ESTIMATOR_KALMAN:
+    if parameters.estimator == kalman.CODE:
         begin_filter(parameters, state.kalman)
+    elif parameters.estimator == lead.CODE:
+        begin_lead(state.lead)
 
 
 @part
 def estimate_velocity(parameters: Record, state: Record, window: Any, interval_s: float) -> None:
     """Bring ``state.estimate_mps`` and ``state.velocity_mps`` to the newest position, Δt after the one before."""
-    if parameters.estimator == ESTIMATOR_EWMA:
+    if parameters.estimator == ewma.CODE:
         _ewma(parameters, state, state.estimate_mps, interval_s)
-    elif parameters.estimator == ESTIMATOR_KALMAN:
+    elif parameters.estimator == kalman.CODE:
         _ewma(parameters, state, state.kalman.smoothed_mps, interval_s)
         filter_velocity(parameters, state, interval_s)
-    elif parameters.estimator == ESTIMATOR_LINE:
+    elif parameters.estimator == lead.CODE:
+        _ewma(parameters, state, state.lead.smoothed_mps, interval_s)
+        add_lead(state, state.lead, interval_s)
+    elif parameters.estimator == line.CODE:
         _remember(parameters, state, window, interval_s)
         _line(parameters, state, window)
-    elif parameters.estimator == ESTIMATOR_FOAW:
+    elif parameters.estimator == foaw.CODE:
         _remember(parameters, state, window, interval_s)
         _foaw(parameters, state, window)
-    elif parameters.estimator == ESTIMATOR_RAW:
+    elif parameters.estimator == raw.CODE:
         _raw(state, interval_s)
     _knee(parameters, state)
 

@@ -8,7 +8,8 @@ import pytest
 from study_app.haptics.kernels.estimators import kalman
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.layout import ESTIMATOR_EWMA, LIMITER_ESTIMATOR, records
+from study_app.haptics.model.estimators import ewma
+from study_app.haptics.model.layout import LIMITER_ESTIMATOR, records
 from study_app.haptics.model.limits import damping_limits, table
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Kalman, Scene
@@ -159,7 +160,7 @@ def test_it_is_stable_at_any_tick(period_s):
 def test_the_limit_holds_where_the_delay_is_wrong_by_one():
     """At 1 kHz and one tick the limit itself is that of a loop that is one tick later than believed."""
     assert damping_limits(1e-3, 1, Kalman()).drag_nspm <= boundary_nspm(Kalman(), 1e-3, 2, believed=1) * 1.01
-    assert damping_limits(1e-3, 1, Kalman()).drag_nspm >= 45
+    assert damping_limits(1e-3, 1, Kalman()).drag_nspm >= 53
     for entry in table():
         if entry.estimator == "kalman":
             assert entry.limits.drag_nspm < boundary_nspm(Ewma(), entry.period_s, entry.delay_ticks)
@@ -207,7 +208,7 @@ def test_nothing_of_a_motion_is_left_in_denormal_numbers():
 
 def test_a_device_that_measures_no_delay_gets_ewma():
     found, usual = (Hand(WATER.model_copy(update={"velocity": it})) for it in (Kalman(), Ewma()))
-    assert found.model.parameters[0].estimator == ESTIMATOR_EWMA
+    assert found.model.parameters[0].estimator == ewma.CODE
     assert [s.tobytes() for s in found.sweep(0.2, 40)] == [s.tobytes() for s in usual.sweep(0.2, 40)]
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from study_app.haptics.model.estimators.response import fastest_hz, passed_share
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Line, Raw
 from study_app.haptics.runtime.offline import simulate
+from study_app.protocol.checks.estimator_response import fastest_hz, passed_share
 from tests.haptics.scenes import UNBENT, scene
 
 SWINGS = 4

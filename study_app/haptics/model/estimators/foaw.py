@@ -1,0 +1,42 @@
+"""First-order adaptive windowing: the slope of the longest line that fits."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from study_app.haptics.model.estimator import WINDOWS, EstimatorKind, line_share
+from study_app.haptics.model.estimators.line import MAX_WINDOW
+from study_app.haptics.model.ranges import Frozen, within
+
+CODE = 3
+
+
+class Foaw(Frozen):
+    """The slope of the longest line that misses no position by more than ``tolerance_m`` (``velocity``).
+
+    First-order adaptive windowing: at most ``samples`` positions, fewer where the motion bends. The tolerance is in the
+    hand frame, by default one count of the Falcon's encoders.
+    """
+
+    kind: Literal["foaw"] = "foaw"
+    samples: int = Field(default=16, ge=2, le=MAX_WINDOW)
+    tolerance_m: Annotated[float, within(0, 0.01, "10 mm is a third of a hand's stroke")] = 38e-6
+
+
+def _fill(record: Any, velocity: Foaw, scale: float) -> None:
+    record.tolerance_m = velocity.tolerance_m * scale
+
+
+ESTIMATOR = EstimatorKind(
+    name="foaw",
+    label="Adaptive window",
+    code=CODE,
+    model=Foaw,
+    passed_share=lambda velocity, period_s, omega_per_s: line_share(velocity.samples, period_s, omega_per_s),
+    fill=_fill,
+    samples=lambda velocity: int(velocity.samples),
+    parameter="samples",
+    measured=WINDOWS,
+)

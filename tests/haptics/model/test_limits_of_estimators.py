@@ -1,0 +1,50 @@
+"""Which entries of the table of slope limits count for an estimator."""
+
+import pytest
+
+from study_app.haptics.model.estimators import ESTIMATORS, NAMED
+from study_app.haptics.model.limits import damping_limits, table
+from study_app.haptics.model.scene import Ewma, Foaw, Given, Lead, Line, Raw
+
+
+@pytest.mark.parametrize("kind", [it for it in ESTIMATORS if it.of_device], ids=lambda it: it.name)
+def test_every_estimator_has_entries_at_every_measured_parameter(kind):
+    found = [it for it in table() if it.estimator == kind.name]
+    assert {it.parameter for it in found} == (set(kind.measured) or {None})
+    assert len(found) == 16 * max(len(kind.measured), 1)
+
+
+def entry(name, parameter):
+    """Return the limit of drag of an entry, at 1 kHz and one tick of delay."""
+    (found,) = [
+        it.limits.drag_nspm
+        for it in table()
+        if (it.estimator, it.parameter, it.period_s, it.delay_ticks) == (name, parameter, 1e-3, 1)
+    ]
+    return found
+
+
+def limit(velocity):
+    """Return the same of an estimator."""
+    return damping_limits(1e-3, 1, velocity).drag_nspm
+
+
+def test_between_two_windows_the_worse_counts():
+    assert limit(Line(samples=12)) == min(entry("line", 11), entry("line", 15))
+    assert limit(Line(samples=4)) == min(entry("line", 3), entry("line", 5)) > entry("line", 15)
+    assert limit(Line(samples=2)) == pytest.approx(limit(Raw()), rel=0.02)
+
+
+def test_a_smaller_tolerance_also_has_the_limit_of_the_raw_difference():
+    assert limit(Foaw(tolerance_m=1e-6)) == min(entry("foaw", 16), entry("raw", None)) < limit(Foaw())
+
+
+def test_a_given_velocity_has_the_limit_of_ewma_and_lead_has_its_own():
+    assert limit(Given()) == limit(Ewma()) == 53
+    assert limit(Lead()) == entry("lead", None) < limit(Ewma())
+
+
+def test_a_parameter_that_is_measured_is_a_field_of_the_model():
+    for kind in NAMED.values():
+        assert kind.parameter is None or kind.parameter in kind.model.model_fields
+        assert bool(kind.parameter) == bool(kind.measured)
