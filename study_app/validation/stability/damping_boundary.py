@@ -40,7 +40,7 @@ FAST_SHARE: Final = 0.4
 """The same beyond 1 kHz, where a count of the encoder is a greater speed and the slew limit a steeper force."""
 FAST_NSPM: Final = 40.0
 """The most there."""
-FAST_KALMAN_NSPM: Final = 24.0
+FAST_KALMAN_NSPM: Final = 22.0
 """The same with "kalman", which passes on more of a hand that lets go while a wake breaks."""
 KALMAN_SHARE: Final = 0.64
 """Of the limits above, with "kalman", up to 1 kHz, but where liquids are felt as they are: at 1, a held one in tar was

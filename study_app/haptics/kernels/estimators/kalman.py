@@ -1,10 +1,11 @@
 """A Kalman filter of velocity that knows the force just sent and learns the mass that the force moves.
 
 Per axis the state is position, velocity and acceleration, driven by white jerk of density q that grows with speed and
-acceleration; all axes share one covariance. The force, delayed as the loop is believed to be, passes two high-pass
-filters, since only its fast part is certain to meet the device's own mass and not the hand. Its effect is the state's
-response to it at 1 kg, V, times the inverse mass θ, estimated separately: a two-stage filter (Friedland 1969, IEEE TAC
-14:359). So the estimate lags neither behind the hand nor behind what the loop itself does to the handle.
+acceleration, and where innovations exceed their variance; all axes share one covariance. The force, delayed as the loop
+is believed to be, passes two high-pass filters, since only its fast part is certain to meet the device's own mass and
+not the hand. Its effect is the state's response to it at 1 kg, V, times the inverse mass θ, estimated separately: a
+two-stage filter (Friedland 1969, IEEE TAC 14:359). So the estimate lags neither behind the hand nor behind what the
+loop itself does to the handle.
 
 A position that stays the same while the handle must have moved is a sample that the device repeated: it is passed over,
 but a second one in a row is believed. Innovations far outside their variance for 20 ms, or a delay that changes, are
@@ -23,7 +24,10 @@ from study_app.haptics.model.layout import Record
 
 JERK_M2PS5: Final = 0.5
 JERK_OF_SPEED_PS3: Final = 4000.0
-JERK_OF_ACCELERATION_PS: Final = 12.0
+JERK_OF_ACCELERATION_PS: Final = 10.0
+JERK_OF_SURPRISE_M2PS5: Final = 300.0
+SURPRISE: Final = 4.0
+"""Mean of Σ innovation² / its variance from which on the jerk is raised: a reach that begins within 50 ms at rest."""
 TIMING_S: Final = 20e-6
 """Standard deviation of a sample's time."""
 CORNER_RADPS: Final = 2.0 * math.pi * 6.0
@@ -122,9 +126,9 @@ def _correct(parameters: Record, state: Record, filtered: Record, interval_s: fl
     """Predict and correct state, response and inverse mass; return Σ innovation² / its variance over the axes."""
     t, half = interval_s, 0.5 * interval_s * interval_s
     speed_m2ps2 = square(filtered.estimate_mps)
-    jerk_m2ps5 = (
-        JERK_M2PS5 + JERK_OF_SPEED_PS3 * speed_m2ps2 + JERK_OF_ACCELERATION_PS * square(filtered.acceleration_mps2)
-    )
+    excess = max(filtered.surprise - SURPRISE, 0.0)
+    jerk_m2ps5 = JERK_M2PS5 + JERK_OF_SPEED_PS3 * speed_m2ps2 + JERK_OF_SURPRISE_M2PS5 * excess * excess
+    jerk_m2ps5 += JERK_OF_ACCELERATION_PS * square(filtered.acceleration_mps2)
     qt = jerk_m2ps5 * t
     qh = jerk_m2ps5 * half
     p = filtered.covariance
