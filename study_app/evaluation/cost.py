@@ -13,6 +13,7 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.model.bounds import bounds
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.layout import SAMPLE, Record, records
@@ -70,8 +71,9 @@ def hand(ticks: int = WARM_UP) -> Floats:
 class Bench:
     """One scene on the bench: its memory, and the cost of every batch so far."""
 
-    def __init__(self, scene: Scene) -> None:
-        self._model, self._safety, self._sample = pack(scene), new_safety(), records(SAMPLE, 1)
+    def __init__(self, scene: Scene, dynamics: Dynamics = UNKNOWN) -> None:
+        self._model, self._sample = pack(scene, dynamics=dynamics), records(SAMPLE, 1)
+        self._safety = new_safety(delay_ticks=dynamics.delay_ticks(scene.rate_hz))
         self._positions_m = hand()
         self._ticks = 0
         self.costs_ns: list[float] = []

@@ -36,7 +36,7 @@ class EstimatorKind:
         Name in the lab.
     code : int
         Its number in compiled code.
-    model : type of Frozen
+    model : Frozen subclass
         Its table in files; its values are the ``velocity`` of the callables below.
     passed_share : callable
         Re V/(jωX) of ``velocity`` in an even swing of ω [rad/s], sampled every ``period_s``.

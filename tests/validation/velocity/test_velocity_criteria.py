@@ -1,0 +1,108 @@
+"""The accuracy of velocity estimators: measured as its closed form says, and the command that judges it."""
+
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from study_app import cli
+from study_app.cli.options import EXIT_FOUND
+from study_app.haptics.model.estimator import ewma_response
+from study_app.haptics.model.scene import Ewma, Kalman, Raw
+from study_app.validation.stability.stability_cases import GRIPS
+from study_app.validation.velocity import criteria, held_handle, imposed_motions
+from study_app.validation.velocity.criteria import PARTS, Row, report
+from study_app.validation.velocity.imposed_motions import COUNT_M, SMOOTH, Stroke, estimated, noise_mmps
+from tests.haptics.scenes import COMPILED
+
+compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+
+
+@compiled
+@pytest.mark.slow
+@pytest.mark.parametrize("alpha", [0.05, 0.1])
+def test_error_of_ewma_is_that_of_its_frequency_response(alpha):
+    found = imposed_motions.errors(Ewma(alpha=alpha))
+    for stroke in (it for it in found if it.frequency_hz and it.amplitude_m == 0.03):
+        w, t_s = 2 * math.pi * stroke.frequency_hz, np.linspace(0, 1, 10_000)
+        passed = ewma_response(alpha, 1e-3, w)
+        true = np.cos(w * t_s)
+        seen = abs(passed) * np.cos(w * t_s + np.angle(passed))
+        expected = np.sqrt(np.mean((seen * abs(seen) - true * abs(true)) ** 2) / np.mean(true**4))
+        assert found[stroke] == pytest.approx(100 * expected, rel=0.03), stroke
+
+
+@compiled
+@pytest.mark.slow
+def test_noise_of_the_raw_difference_is_that_of_its_counts():
+    """At v each tick has one count with probability p = v T/count, else none: count/T √(p (1 - p)), nearly all fast."""
+    found = noise_mmps(Raw())
+    for speed_mps in (0.005, 0.02):
+        p = speed_mps * 1e-3 / COUNT_M
+        assert found[speed_mps] == pytest.approx(1e3 * COUNT_M / 1e-3 * math.sqrt(p * (1 - p)), rel=0.05)
+
+
+@pytest.mark.parametrize("stroke", [*SMOOTH, Stroke(0.01, 5.0)], ids=str)
+def test_speeds_of_a_stroke_are_the_derivative_of_its_positions(stroke):
+    t_s = np.linspace(0.01, 0.97, 5000)
+    places_m, speeds_mps = stroke.places_m(t_s), stroke.speeds_mps(t_s)
+    assert np.gradient(places_m, t_s) == pytest.approx(speeds_mps, abs=0.01 * np.abs(speeds_mps).max())
+    assert np.ptp(places_m) == pytest.approx(2 * stroke.amplitude_m, rel=1e-3)
+
+
+def test_estimators_get_positions_in_counts():
+    t_s = np.arange(40) / 1000
+    found = estimated(Raw(), t_s, 0.013 * t_s)
+    assert np.round(found / (COUNT_M / 1e-3)) == pytest.approx(found / (COUNT_M / 1e-3), abs=1e-9)
+    assert len(set(np.round(found, 9))) == 2
+
+
+@compiled
+@pytest.mark.slow
+def test_a_held_handle_has_the_error_of_the_imposed_motion():
+    """Quadratic drag in a firm hand, 3 Hz: the handle follows a sine closely, and EWMA lags by the same."""
+    _, quadratic = held_handle.plain_forces()
+    held = held_handle.error(quadratic, Ewma(), GRIPS["firm"], Stroke(0.02, 3.0))
+    passed = ewma_response(0.1, 1e-3, 2 * math.pi * 3)
+    assert held == pytest.approx(100 * 2 / math.sqrt(3) * abs(passed - 1), rel=0.1)
+    assert held_handle.error(quadratic, Kalman(), GRIPS["firm"], Stroke(0.02, 3.0)) < 0.25 * held
+
+
+def test_whole_forces_are_those_of_physical2_at_scale_3_without_buoyancy():
+    found = held_handle.whole_forces()
+    assert [scene.liquids[0].id for scene in found] == list(held_handle.WHOLE_LIQUIDS) == list(criteria.WHOLE_PERCENT)
+    for scene in found:
+        assert scene.scale == 3
+        assert "buoyancy" not in scene.liquids[0].effects
+        assert scene.liquids[0].effects
+
+
+@compiled
+@pytest.mark.slow
+@pytest.mark.parametrize("part", [name for name in PARTS if name != "cost"])
+def test_the_kalman_filter_meets_its_limits(part):
+    rows = tuple(PARTS[part]())
+    assert any(row.goal is not None for row in rows)
+    assert [row.name for row in rows if not row.met] == []
+
+
+def test_a_row_is_judged_by_its_first_value():
+    assert Row("error", (2.5, 9.0), 2.5).met
+    assert not Row("error", (2.51, 0.0), 2.5).met
+    assert Row("damping", (40.0, 0.0), 40.0, least=True).met
+    assert not Row("damping", (39.9, 90.0), 40.0, least=True).met
+    assert Row("shown", (1e9, 0.0)).met
+    text = report((Row("error", (2.51, 0.0, 0.0), 2.5), Row("shown", (1.0, 0.0, 0.0))))
+    assert "≤ 2.5: not met" in text
+    assert not text.endswith("met")
+
+
+def test_command_prints_the_rows_and_ends_with_3_where_one_is_missed(monkeypatch):
+    for value, code in ((1.0, None), (3.0, EXIT_FOUND)):
+        rows = (Row("error of v·|v|", (value, 7.0, 3.5), 2.5),)
+        monkeypatch.setattr(criteria, "measure", lambda _progress, rows=rows: rows)
+        ran = CliRunner().invoke(cli.commands, ["stability", "--velocity"], standalone_mode=False)
+        assert ran.exception is None
+        assert (ran.return_value or None) == code
+        assert "error of v·|v|" in ran.stdout
