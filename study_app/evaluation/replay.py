@@ -35,6 +35,7 @@ from study_app.protocol.trials.presentation import scene_of
 from study_app.store import receipt, recording_files
 from study_app.store.atomic import is_there
 from study_app.store.blinded import blinding
+from study_app.store.blinded.resolved_model import as_recorded
 from study_app.store.blinded.sealing import opened
 from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.folders import locate
@@ -357,7 +358,7 @@ def _ran(
         devices = {
             at: (float(device.get("force_limit_n", np.inf)), dynamics_from(device)) for at, device in described.items()
         }
-        return whole_protocol(kept["protocol"], key), devices
+        return as_recorded(whole_protocol(kept["protocol"], key), kept, key), devices
     except KeyError as lacking:
         raise StoreError(f"{path} lacks {lacking}: restore it from a copy") from lacking
     except (AttributeError, TypeError, ValueError):  # said without the reason, which would tell conditions

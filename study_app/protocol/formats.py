@@ -42,7 +42,8 @@ NEW_VALUES: Final = {
 }
 """Values of earlier keys that belong to format 2."""
 
-HINT: Final = 'write format = 2; nothing else in the file changes its meaning but effects = "auto"'
+HINT: Final = 'write format = 2; only effects = "auto" and an omitted scene.velocity change their meaning'
+ESTIMATOR: Final = "kalman"
 WORKSPACE_MM: Final = (100.0, 60.0, 60.0)
 DENSITY_KG_M3: Final = 1000.0
 
@@ -96,7 +97,7 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(block, Mapping)
     ):
         found["limits"] = _with(_table(found, "limits"), **LEVEL_LIMITS)
-    found = with_densities(found)
+    found = with_scene_defaults(found)
     if isinstance(liquids := _table(found, "liquids"), dict):
         found.setdefault("conditions", {name: {"liquid": name} for name in liquids})
     if isinstance(blocks := _table(found, "blocks"), dict) and blocks:
@@ -106,9 +107,10 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def with_densities(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a file of format 2 with the densities that its dampers leave out."""
+def with_scene_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a file of format 2 with the estimator and the densities of dampers that it leaves out."""
     found = dict(document)
+    found["scene"] = _with(_table(found, "scene"), velocity={"kind": ESTIMATOR})
     if isinstance(liquids := _table(found, "liquids"), dict):
         found["liquids"] = {name: _with_density(table) for name, table in liquids.items()}
     return found

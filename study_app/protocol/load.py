@@ -171,7 +171,7 @@ def _sound_scene(document: dict[str, Any], name: str, places: Places) -> dict[st
     """Return the document of a scene file, completed; raises what is wrong with it."""
     faults: list[Fault] = []
     if formats.is_second(document):
-        document = formats.with_densities(document)
+        document = formats.with_scene_defaults(document)
     elif not formats.is_later(document):
         faults = [fault for fault in formats.newer_keys(document) if fault.path[0] in SceneFile.model_fields]
     _raise(name, faults + _outside([fault.path for fault in faults], _faults(SceneFile, document)), places)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,10 +15,13 @@ from pyarrow import parquet
 
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StoreError
+from study_app.evaluation import replay as replay_module
 from study_app.evaluation.replay import replay
+from study_app.haptics.model import gate
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
+from study_app.protocol import formats
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
@@ -185,6 +189,25 @@ def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
     )
     assert found.proved
     assert 0 < found.computed_s < found.took_s
+
+
+def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Replay uses the recorded effects where this program would choose others, and the recorded estimator."""
+    file = short.write(tmp_path)
+    text = file.read_text(encoding="utf-8").replace("format = 1", "format = 2", 1)
+    file.write_text(re.sub(r"^effects = \[.*?\]", 'effects = "auto"', text, flags=re.MULTILINE), encoding="utf-8")
+    rehearse(file, participants=1, seed=1, results=tmp_path / "results")
+    place = session(tmp_path / "results")
+    assert json.loads((place / "receipt.json").read_text())["protocol"]["scene"]["velocity"] == {"kind": "kalman"}
+    monkeypatch.setattr(gate, "_budget_n", lambda _scene, total_n: 0.9 * total_n)
+    monkeypatch.setattr(formats, "ESTIMATOR", "ewma")
+    found = replay(place)
+    assert (found.differences, found.uncompared) == ((), ())
+    assert found.recordings == 4
+    monkeypatch.setattr(replay_module, "as_recorded", lambda protocol, _receipt, _key: protocol)
+    assert replay(place).differences
 
 
 def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path) -> None:

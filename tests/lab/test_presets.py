@@ -73,7 +73,7 @@ def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_brok
     assert Choice(str(tmp_path / "mine.toml"), "honey", "Honey (mine)") in at_hand
     assert {it.source for it in at_hand} == {*shipped(), str(tmp_path / "mine.toml")}
     assert len({it.title for it in at_hand}) == len(at_hand)
-    water = next(it for it in at_hand if it.liquid == "water")
+    water = next(it for it in at_hand if (it.source, it.liquid) == ("rek2024", "water"))
     assert water.scene.velocity == Ewma()  # as its file says
     assert water.setting().origin == water.scene.model_copy(update={"velocity": Kalman()})
 

@@ -7,6 +7,7 @@ import pytest
 from study_app.haptics.model.effects.drag import resistance_n
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.limits import slope_limit
+from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.protocol.describe import describe
 from study_app.protocol.liquid_summary import effects, warnings
 from study_app.protocol.load import load, load_scene, load_scenes, parse
@@ -79,9 +80,11 @@ def test_of_the_physical_liquids_only_the_tar_of_the_demonstration_is_warned_of(
     assert describe(protocol).endswith(f"Warnings\n  {warning}")
 
 
-def test_the_second_edition_of_the_physical_liquids_differs_in_what_auto_chooses_alone():
+def test_the_second_edition_of_the_physical_liquids_differs_in_estimator_and_in_what_auto_chooses():
     first, second = (load(name) for name in ("physical_liquids", "physical2"))
-    assert (first.liquids, first.conditions, first.scene) == (second.liquids, second.conditions, second.scene)
+    assert (first.liquids, first.conditions) == (second.liquids, second.conditions)
+    assert (first.scene.velocity, second.scene.velocity) == (Ewma(), Kalman())
+    assert first.scene.model_copy(update={"velocity": Kalman()}) == second.scene
     chosen = {name: resolve(second.scene_of(name)).liquids[0].effects for name in second.liquids}
     assert chosen.pop("water") == ("drag", "added_mass")
     assert all("unsteady_drag" in effects and "drag" not in effects for effects in chosen.values())

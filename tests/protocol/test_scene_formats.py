@@ -10,7 +10,7 @@ from study_app.errors import ProtocolError
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.overrides import override, value_of
-from study_app.haptics.model.scene import Liquid, Scene
+from study_app.haptics.model.scene import Ewma, Kalman, Line, Liquid, Scene
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.load import load_scene
 from study_app.protocol.scene_file import scene_text
@@ -28,6 +28,16 @@ def test_a_damper_in_format_2_needs_no_density(tmp_path: Path) -> None:
     assert scene.liquids[0].drag == Drag(law="linear", damping_nspm=12)
     assert value_of(override(scene, "damping_nspm", "20"), "damping_nspm") == 20
     assert steady(scene).force_n == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize(("number", "velocity"), [(1, Ewma()), (2, Kalman())])
+def test_the_estimator_of_a_scene_file_is_that_of_its_format(
+    tmp_path: Path, number: int, velocity: Ewma | Kalman
+) -> None:
+    text = f"format = {number}\n[scene]\nscale = 3\n[liquids.water]\ndensity_kg_m3 = 1000\n"
+    assert load_scene(written(tmp_path / "water.toml", text), "water").velocity == velocity
+    named = text.replace("scale = 3", 'scale = 3\nvelocity = { kind = "line" }')
+    assert load_scene(written(tmp_path / "water.toml", named), "water").velocity == Line()
 
 
 def test_a_damper_in_format_1_is_refused(tmp_path: Path) -> None:

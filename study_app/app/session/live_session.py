@@ -225,6 +225,7 @@ class LiveSession(QObject):
         self._store = open_store(chosen, protocol, source, rig, screens, made.masking)
         self._crash_trace = CrashTrace(self._store.folder.crash)
         self._store.append("preflight", checks=[one.entry for one in found])
+        protocol = self._store.as_recorded(protocol)
         protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
         schedule = chosen.schedule(protocol)
         start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines, self._store.key)

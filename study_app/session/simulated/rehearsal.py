@@ -108,7 +108,7 @@ def rehearse(
                 recordings=recordings,
             )
             store = begin(folder, study, source, start, clock=SessionClock(rig.servo.now_ns))
-            own = session_protocol(StudyFolder(folder), study, person, 1)
+            own = session_protocol(StudyFolder(folder), store.as_recorded(study), person, 1)
             lasted_s, answers = _run(own, build_schedule(own, person, seed), rig, store, FIRST, observer)
             proof = store.fingerprint
         if progress is not None:
@@ -153,7 +153,7 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
             now_ns=rig.servo.now_ns,
             now=max(datetime.now().astimezone(), datetime.fromisoformat(lines[-1]["at"])),
         )
-        own = session_protocol(locate(session_folder)[0], study, person, begun["session"])
+        own = session_protocol(locate(session_folder)[0], store.as_recorded(study), person, begun["session"])
         schedule = build_schedule(own, person, seed)
         _run(own, schedule, rig, store, resume_at(own, schedule, lines, store.key), OBSERVER)
 

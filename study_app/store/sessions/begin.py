@@ -20,6 +20,7 @@ from study_app.store import receipt
 from study_app.store.atomic import cannot_write, is_there, sweep_old, sync_folder, temporary_path
 from study_app.store.blinded.allocation import Allocation, allocate, check_session
 from study_app.store.blinded.blinding import Key, open_or_draw_key, reveals
+from study_app.store.blinded.resolved_model import sealed_model
 from study_app.store.clock import SessionClock
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
@@ -129,6 +130,7 @@ def begin(
         started, first_receipt = first_words(
             protocol, source, start, key_hash=key.hash, measures_sealed=sealed, clock=clock, allocation=allocation
         )
+        first_receipt["resolved"] = sealed_model(protocol, start.participant, start.session, key)
         return _open(place, opening, clock, key, first_receipt, started, protocol)
     except BaseException:
         _unclaim(place, opening)

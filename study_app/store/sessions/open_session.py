@@ -13,8 +13,10 @@ from types import TracebackType
 from typing import Any
 
 from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.blinded.blinding import Key
+from study_app.store.blinded.resolved_model import as_recorded
 from study_app.store.blinded.sealing import opened, opened_key, sealed
 from study_app.store.checksums import write_checksums
 from study_app.store.folders import SessionFolder, StudyFolder
@@ -81,6 +83,16 @@ class SessionStore:
     def lines(self) -> tuple[Line, ...]:
         """The journal so far."""
         return tuple(self._lines)
+
+    def as_recorded(self, protocol: Protocol) -> Protocol:
+        """Return the protocol with estimator, effects and laws as they were resolved when the session began.
+
+        Raises
+        ------
+        StoreError
+            The receipt does not open with the study's key.
+        """
+        return as_recorded(protocol, self._receipt, self.key)
 
     def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
         """Put an event into the journal; with ``waits`` it is on the disk when this returns, else soon after.

@@ -157,7 +157,7 @@ def study(*edits: tuple[str, str]) -> Protocol:
             [("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [40]")],
             "stimuli.damping.levels",
             "levels = [0.02, 0.6]",
-            "standard 40 at level 0.6 gives 64 N·s/m at the hand; the slope limit (1000 Hz, ewma, 1 tick) is 53",
+            "standard 40 at level 0.6 gives 64 N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53",
             "levels to 0.325, or the standard to 33.1",
         ),
         (
@@ -352,7 +352,7 @@ def test_hidden_and_shown_balls_make_different_conditions() -> None:
     ("ticks", "code", "said"),
     [
         ("1", 0, "Duration"),
-        ("2", 2, "gives 25.6 N·s/m at the hand; the slope limit (1000 Hz, ewma, 2 ticks) is 21.5"),
+        ("2", 2, "gives 25.6 N·s/m at the hand; the slope limit (1000 Hz, kalman, 2 ticks) is 20.6"),
         ("5", 2, "5 is not in the range"),
     ],
 )

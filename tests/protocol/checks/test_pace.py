@@ -43,6 +43,7 @@ REACH = (
     'kind = "reach"\ntargets_mm = [[-20, 0, 0], [20, 0, 0]]\nradius_mm = 5\ndwell_s = 0.2\ncount = 2\n'
     'instruction = "Reach."',
 )
+EWMA = ("[liquids.damper]", '[scene.velocity]\nkind = "ewma"\n[liquids.damper]')
 HIDDEN = ('liquid = "damper"\n[tasks', 'liquid = "damper"\nball = "hidden"\n[tasks')
 
 
@@ -60,7 +61,7 @@ def study(edits: Iterable[tuple[str, str]]) -> Protocol:
         (
             [("[8]", "[40]")],
             "stimuli.damping.levels",
-            "standard 40 at level 0.6 gives 64 N·s/m at the hand; the slope limit (1000 Hz, ewma, 1 tick) is 53",
+            "standard 40 at level 0.6 gives 64 N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53",
             "levels to 0.325, or the standard to 33.1",
         ),
         (
@@ -76,7 +77,7 @@ def study(edits: Iterable[tuple[str, str]]) -> Protocol:
             "amplitude_mm = 23.5 or frequency_hz = 0.94",
         ),
         (
-            [("amplitude_mm = 25", "amplitude_mm = 10\nfrequency_hz = 3")],
+            [EWMA, ("amplitude_mm = 25", "amplitude_mm = 10\nfrequency_hz = 3")],
             "tasks.stir.frequency_hz",
             "at 3 Hz the velocity estimator passes 96.9 % of a damper",
             "at most 1.6 Hz: 99 %",

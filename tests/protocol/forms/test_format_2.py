@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import ProtocolError
+from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.protocol.instruments.instrument import instrument, instruments
 from study_app.protocol.load import load, parse
 from study_app.protocol.orders.block_orders import orders_of
@@ -45,9 +46,19 @@ def test_names_of_trials_are_in_every_language_of_the_study() -> None:
     assert label == {"en": "Trial", "nl": "Proef"}
 
 
-def test_file_of_format_1_means_the_same_in_format_2() -> None:
+def test_file_of_format_1_means_the_same_in_format_2_but_for_an_estimator_that_it_leaves_out() -> None:
     one, two = (parse(SOUND.replace("format = 1", f"format = {n}").encode(), "small") for n in (1, 2))
-    assert one.model_copy(update={"format": 2}) == two
+    assert (one.scene.velocity, two.scene.velocity) == (Ewma(), Kalman())
+    scene = one.scene.model_copy(update={"velocity": Kalman()})
+    assert one.model_copy(update={"format": 2, "scene": scene}) == two
+
+
+@pytest.mark.parametrize("kind", ["ewma", "line", "kalman"])
+def test_an_estimator_that_the_file_names_counts_in_both_formats(kind: str) -> None:
+    named = f'[scene.velocity]\nkind = "{kind}"\n\n[liquids.'
+    for n in (1, 2):
+        text = SOUND.replace("format = 1", f"format = {n}").replace("[liquids.", named, 1)
+        assert parse(text.encode(), "small").scene.velocity.kind == kind
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ SEQUENCE = (
     'sequence = ["viscosity", "detect", "rate", "number", "pairs", "chosen", "expected"]',
 )
 SESSIONS = 12
-HIDDEN = {"sealed", "key_hash", "at", "previous", "fingerprint"}
+HIDDEN = {"sealed", "resolved", "key_hash", "at", "previous", "fingerprint"}
 """What may differ: sealed fields, hashes, and the time of day."""
 
 Said: TypeAlias = dict[str, Any]

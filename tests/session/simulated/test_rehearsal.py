@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from itertools import count
 from pathlib import Path
@@ -14,8 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import SessionError, StoreError
+from study_app.haptics.model import gate
+from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.haptics.runtime.servo import Servo
-from study_app.protocol.model import Reach
+from study_app.protocol import formats
+from study_app.protocol.load import load, source_bytes
+from study_app.protocol.model import Protocol, Reach
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.questions.rating import RatingView
 from study_app.session.pages import TextPage
@@ -247,3 +252,39 @@ def test_a_rehearsal_that_was_interrupted_and_resumed_answers_like_one_that_was_
     rehearsal.resume(parted.session("P001", 1).path)
     answers, others = (confirmed(journal.read(folder.session("P001", 1).journal)) for folder in (whole, parted))
     assert answers == others
+
+
+@pytest.mark.slow
+@needs_servo
+def test_a_resumed_session_goes_on_with_the_model_that_it_began_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program that chooses other effects and another estimator resumes with those of the receipt."""
+    file = tmp_path / "study.toml"
+    text = source_bytes("demo").decode().replace("format = 1", "format = 2", 1)
+    file.write_text(re.sub(r"^effects = \[.*?\]", 'effects = "auto"', text, flags=re.MULTILINE), encoding="utf-8")
+    results, kept, used = StudyFolder(tmp_path / "results"), SessionStore.append, []
+
+    def interrupted(self: SessionStore, event: str, **fields: Any) -> None:
+        if event == "responses":
+            raise KeyboardInterrupt
+        kept(self, event, **fields)
+
+    def noting(protocol: Protocol, *rest: Any) -> Any:
+        used.append(protocol)
+        return run(protocol, *rest)
+
+    run = rehearsal._run
+    monkeypatch.setattr(rehearsal, "_run", noting)
+    with monkeypatch.context() as patched:
+        patched.setattr(SessionStore, "append", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            rehearsal.rehearse(str(file), participants=1, seed=1, results=results.path, recordings=False)
+    monkeypatch.setattr(gate, "_budget_n", lambda _scene, total_n: 0.9 * total_n)
+    monkeypatch.setattr(formats, "ESTIMATOR", "ewma")
+    assert load(str(file)).scene.velocity == Ewma()
+    rehearsal.resume(results.session("P001", 1).path, protocol=str(file))
+    first, second = used
+    assert first.scene.velocity == second.scene.velocity == Kalman()
+    assert first.liquids == second.liquids
+    assert not {liquid.effects for liquid in first.liquids.values()} & {"auto", ("drag",)}

@@ -1,0 +1,121 @@
+"""The force model as a session resolved it: sealed in its receipt, used where a program would choose otherwise."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from study_app.errors import StoreError
+from study_app.haptics.model import gate
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.scene import Ewma, Kalman
+from study_app.protocol.model import Protocol
+from study_app.store.blinded.resolved_model import as_recorded, sealed_model
+from study_app.store.sessions.begin import SessionStore
+from tests.protocol.trials import studies
+from tests.store.sessions.conftest import Again
+
+MUD = {"density_kg_m3": 1313.7, "viscosity_pa_s": 2.0, "effects": "auto"}
+
+
+@pytest.fixture
+def protocol(tables_of_study: Callable[..., dict[str, Any]]) -> Protocol:
+    tables = tables_of_study(format=2, scene={"velocity": {"kind": "kalman"}})
+    tables["liquids"]["quagmire"] = MUD
+    return Protocol.model_validate(tables)
+
+
+@pytest.fixture
+def begun(start: Callable[..., SessionStore]) -> Iterator[SessionStore]:
+    """A session that has begun; a test may close it before its end."""
+    with start() as store:
+        yield store
+
+
+def receipt_of(store: SessionStore) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(store.folder.receipt.read_text())
+    return found
+
+
+def leave_all_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the gate choose as another version might: everything may be left out."""
+    monkeypatch.setattr(gate, "_budget_n", lambda _scene, total_n: 2 * total_n)
+
+
+def mud(protocol: Protocol) -> Any:
+    return protocol.liquids["quagmire"]
+
+
+def test_resume_uses_effects_laws_and_estimator_of_the_receipt(
+    begun: SessionStore,
+    protocol: Protocol,
+    again: Again,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (chosen,) = resolve(protocol.scene_of("quagmire")).liquids
+    assert mud(protocol).effects == "auto"
+    assert len(chosen.effects) > 1
+    begun.close()
+    leave_all_out(monkeypatch)
+    now = protocol.model_copy(update={"scene": protocol.scene.model_copy(update={"velocity": Ewma()})})
+    assert resolve(now.scene_of("quagmire")).liquids[0].effects != chosen.effects
+    with again(protocol=protocol) as store:
+        used = store.as_recorded(now)
+    assert used.scene.velocity == Kalman()
+    assert mud(used).effects == chosen.effects
+    assert mud(used).drag == chosen.drag
+    assert resolve(used.scene_of("quagmire")).liquids[0] == chosen
+    assert used.liquids["mildew"] == protocol.liquids["mildew"]
+
+
+def test_effects_cannot_be_read_in_the_receipt(begun: SessionStore) -> None:
+    begun.close()
+    held = receipt_of(begun)
+    assert held["protocol"]["scene"]["velocity"] == {"kind": "kalman"}
+    text = begun.folder.receipt.read_text()
+    assert "quagmire" not in text
+    assert "unsteady_drag" not in text
+    assert len(held["resolved"]) % 64 == 32  # a tag, and blocks
+
+
+def test_receipts_of_earlier_versions_give_the_estimator_alone(begun: SessionStore, protocol: Protocol) -> None:
+    held = receipt_of(begun)
+    del held["resolved"]
+    held["protocol"]["scene"]["velocity"] = {"kind": "ewma", "alpha": 0.2}
+    used = as_recorded(protocol, held, begun.key)
+    assert used.scene.velocity == Ewma(alpha=0.2)
+    assert used.liquids == protocol.liquids
+
+
+@pytest.mark.parametrize("change", ["digit", "participant", "other_key"])
+def test_a_changed_text_or_one_of_another_session_is_refused(
+    begun: SessionStore, protocol: Protocol, change: str
+) -> None:
+    held, key = receipt_of(begun), begun.key
+    if change == "digit":
+        held["resolved"] = ("0" if held["resolved"][0] != "0" else "1") + held["resolved"][1:]
+    elif change == "participant":
+        held["resolved"] = sealed_model(protocol, "P008", 1, key)
+    else:
+        key = dataclasses.replace(key, nonce=bytes(32))
+    with pytest.raises(StoreError, match=r"receipt of P007 does not open with the study's key \(resolved\)"):
+        as_recorded(protocol, held, key)
+
+
+def test_a_liquid_whose_delay_is_varied_keeps_its_effects(
+    start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late = [
+        ('effects = ["drag"]\ndrag = { law = "haider-levenspiel" }\n', 'effects = "auto"\n'),
+        ('vary = "viscosity_pa_s"\nstandards = [1, 2]\nlevels = [0.1, 0.8]', 'vary = "delay_ms"\nlevels = [50, 200]'),
+        ("\nlevels = [0.2, 0.4, 0.8]", "\nlevels = [60, 100]"),
+    ]
+    protocol = studies.study(*late)
+    (chosen,) = resolve(protocol.scene_of("thin")).liquids
+    with start(protocol=protocol) as store:
+        leave_all_out(monkeypatch)
+        assert store.as_recorded(protocol).liquids["thin"].effects == chosen.effects
