@@ -38,8 +38,8 @@ FALCONS_HZ: Final = (500.0, 1000.0)
 PHASES: Final = 12
 FIRST_RELEASE_S: Final = 0.6
 CASES: Final = 1500
-"""Of each group of misjudged delays and of disturbed samples."""
-KALMAN_CASES: Final = 250
+"""Of each group of misjudged delays and masses and of disturbed samples."""
+KALMAN_CASES: Final = 500
 """Of each group that is judged with the Kalman filter, too."""
 
 DRAWN: Final[Mapping[str, tuple[Any, ...]]] = {
@@ -97,9 +97,13 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     ]
     for name, change in CHANGES.items():
         found.append(changed(name, change, both))
+    found += [
+        Group(name, tuple(map(change, _drawn(f"{seed} {name}", some(both, min(CASES, count or CASES)), light))))
+        for name, change in MASSES.items()
+    ]
     found.append(Group("let go in mid-stroke", some(releases, count)))
-    for name in MISJUDGED:
-        cases = tuple(case for case in map(CHANGES[name], releases) if case is not None)
+    for name in (*MISJUDGED, *MASSES):
+        cases = tuple(case for case in map({**CHANGES, **MASSES}[name], releases) if case is not None)
         found.append(Group(f"let go in mid-stroke, {name}", some(cases, min(CASES, count or CASES))))
     driven = "through the Falcon's driver"
     driven_held = some(tuple(_grid(("light", "middle", "firm"), (FALCON,), FALCONS_HZ, (1,))), count)
@@ -151,6 +155,12 @@ CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
     "no sample for 20 ms, again and again": lambda case: dataclasses.replace(case, burst_ms=20.0),
 }
 MISJUDGED: Final = tuple(CHANGES)[:3]
+MASSES: Final[Mapping[str, Callable[[Case], Case]]] = {
+    "least mass stated at half": lambda case: dataclasses.replace(case, believed_kg=0.5 * case.mass_kg),
+    "least mass stated at 1.5 times": lambda case: dataclasses.replace(case, believed_kg=round(1.5 * case.mass_kg, 6)),
+    "mass doubled and halved every 150 ms": lambda case: dataclasses.replace(case, other_kg=2.0 * case.mass_kg),
+}
+"""Changes of what the device states of its handle, or of the handle itself; made once its mass has been drawn."""
 
 
 def _grid(

@@ -29,6 +29,9 @@ SLOWER_S: Final = 0.5
 MEASURED_S: Final = 0.03
 """How long a device that has become slower takes to measure it."""
 
+MASS_S: Final = 0.15
+"""After so long the mass of the handle changes, in cases where it does: within each stroke of a hand."""
+
 # Hand, servo and encoder, in addition to the handle and the model.
 LOOP = np.dtype(
     [
@@ -46,6 +49,8 @@ LOOP = np.dtype(
         ("duplicated", np.float64),  # share of samples that repeat the position of the sample before
         ("burst_s", np.float64),  # how long there is no new sample at all, at the end of each `BURST_PERIOD_S`
         ("slows_to", np.int64),  # delay of the device from `SLOWER_S` on [ticks], which it measures by and by
+        ("mass_kg", np.float64),  # of the handle
+        ("other_kg", np.float64),  # the same in every second stretch of `MASS_S`; 0: always the same
         ("now_s", np.float64),
         ("broken", np.int64),  # 1 once a force or the handle's place was no number
         ("was_m", np.float64, (3,)),  # where the hand is
@@ -134,6 +139,9 @@ def run(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any,
                 handle.held = loop.arm.held = 0
             if loop.now_s >= SLOWER_S:
                 handle.delay = loop.arm.delay = max(handle.delay, loop.slows_to)
+            if loop.other_kg > 0.0:
+                other = math.floor(loop.now_s / MASS_S) % 2.0 == 1.0
+                handle.mass_kg = loop.arm.handle_kg = loop.other_kg if other else loop.mass_kg
             _move(handle, loop, elapsed_s)
             copy(loop.goes_m, loop.was_m)
         _see(sample, handle, pace, loop)

@@ -82,6 +82,7 @@ def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None) ->
     loop.noise_m = case.noise_um * 1e-6
     loop.lost, loop.duplicated, loop.burst_s = case.lost, case.duplicated, case.burst_ms * 1e-3
     loop.slows_to = case.slows_to
+    loop.mass_kg, loop.other_kg = case.mass_kg, case.other_kg
     if case.plant == SECOND:
         loop.arm = new_arm(ARMS[case.hand], handle_kg=case.mass_kg, **_device(case))
     grip = GRIPS[case.hand]
@@ -99,8 +100,9 @@ def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None) ->
 
 
 def _dynamics(case: Case) -> Dynamics:
-    """Return what the device says of itself: its least mass is what it has, the delay what is believed."""
-    return Dynamics(case.believed_delay / case.rate_hz, case.quantum_um * 1e-6, case.mass_kg)
+    """Return what the device states: its least mass and its delay, as they are believed."""
+    least_kg = case.believed_kg or (min(case.mass_kg, case.other_kg) if case.other_kg else case.mass_kg)
+    return Dynamics(case.believed_delay / case.rate_hz, case.quantum_um * 1e-6, least_kg)
 
 
 def _device(case: Case) -> dict[str, Any]:

@@ -68,6 +68,8 @@ RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "lost": (0.0, 0.5),
     "duplicated": (0.0, 0.5),
     "burst_ms": (0.0, 40.0),
+    "believed_kg": (0.0, 5.0),
+    "other_kg": (0.0, 5.0),
 }
 """What a case may be made of; the sweep's own choices lie within."""
 
@@ -86,7 +88,8 @@ class Case:
     its emulator (`driven`), whose delay, encoders and samples are their own. ``believed`` is the delay that
     the loop believes (-1: the true one), ``slows_to`` that of the device from 0.5 s on (-1: the same). ``lost`` is a
     share of ticks without a new sample, ``duplicated`` one of samples that repeat the position before; for the last
-    ``burst_ms`` of every 300 ms there is no new sample.
+    ``burst_ms`` of every 300 ms there is no new sample. ``believed_kg`` is the least mass that the device states
+    (0: the true one), ``other_kg`` the mass of the handle in every second stretch of 150 ms (0: the same).
     """
 
     liquid: str = "water"
@@ -112,6 +115,8 @@ class Case:
     lost: float = 0.0
     duplicated: float = 0.0
     burst_ms: float = 0.0
+    believed_kg: float = 0.0
+    other_kg: float = 0.0
 
     @property
     def believed_delay(self) -> int:

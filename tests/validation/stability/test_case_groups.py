@@ -12,6 +12,7 @@ from study_app.validation.stability.case_groups import (
     FIRST_RELEASE_S,
     HANDLES_KG,
     KALMAN_CASES,
+    MASSES,
     PHASES,
     groups,
     sweep,
@@ -68,6 +69,37 @@ def test_groups_have_disturbed_samples_and_misjudged_delays(all_groups):
     for name, cases in all_groups.items():
         misjudged = "tick" in name
         assert {case.misjudged for case in cases} == {misjudged}, name
+
+
+def test_groups_have_misjudged_and_changing_masses(all_groups):
+    for prefix in ("", "let go in mid-stroke, ", "kalman: "):
+        half, more, doubled = (all_groups[f"{prefix}{name}"] for name in MASSES)
+        assert {case.believed_kg / case.mass_kg for case in half} == {0.5}
+        assert {round(case.believed_kg / case.mass_kg, 6) for case in more} == {1.5}
+        assert {case.other_kg / case.mass_kg for case in doubled} == {2.0}
+        assert {case.other_kg for case in (*half, *more)} == {case.believed_kg for case in doubled} == {0.0}
+
+
+@pytest.mark.parametrize(
+    ("masses", "stated_kg"),
+    [({}, 0.1), ({"believed_kg": 0.15}, 0.15), ({"other_kg": 0.04}, 0.04), ({"other_kg": 0.2}, 0.1)],
+)
+def test_the_loop_gets_the_mass_that_the_device_states(masses, stated_kg):
+    model = new_bench(Case(mass_kg=0.1, estimator="kalman", **masses), safe=True).model
+    assert model.parameters[0].mass_kg == pytest.approx(stated_kg)
+
+
+@compiled
+@pytest.mark.parametrize("plant", PLANTS)
+def test_mass_of_the_handle_changes_every_150_ms(plant):
+    case = Case(liquid="water", scale=1.0, plant=plant, hand="thrown", speed_mps=0.4, mass_kg=0.1, other_kg=0.25)
+    trace = trace_of(case)
+    free_n = (trace.acting_n - case.viscous_nspm * trace.velocity_mps)[:-1]
+    moved = np.einsum("ij,ij->i", free_n, free_n), np.einsum("ij,ij->i", free_n, np.diff(trace.velocity_mps, axis=0))
+    for k in range(6):
+        rows = slice(round(k * 150) + 2, round(k * 150) + 148)
+        found_kg = moved[0][rows].sum() / moved[1][rows].sum() / case.rate_hz
+        assert found_kg == pytest.approx((0.1, 0.25)[k % 2], rel=0.02), k
 
 
 def test_groups_through_the_driver_have_all_liquids_within_its_workspace(all_groups):
@@ -203,7 +235,7 @@ TAR, THROWN_TAR = "speed_mps=0.1885 release_s=1.01667", "hand=thrown speed_mps=0
         SHORT.format(3, 2, "physical_tar", 3, 0.05)
         + "rate_hz=500 estimator=kalman motion=reaches "
         + THROWN_TAR,  # KALMAN_SHARE
-        SHORT.format(2, 1, "physical_tar", 1, 0.25) + "motion=stroke speed_mps=1 estimator=kalman",  # KALMAN_SLEW
+        SHORT.format(2, 1, "physical_tar", 1, 0.2) + "motion=stroke speed_mps=1 estimator=kalman",  # KALMAN_SLEW
     ],
 )
 def test_a_delay_one_tick_longer_than_believed_leaves_the_loop_stable(line):
