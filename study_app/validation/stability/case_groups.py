@@ -157,7 +157,7 @@ CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
 MISJUDGED: Final = tuple(CHANGES)[:3]
 MASSES: Final[Mapping[str, Callable[[Case], Case]]] = {
     "least mass stated at half": lambda case: dataclasses.replace(case, believed_kg=0.5 * case.mass_kg),
-    "least mass stated at 1.5 times": lambda case: dataclasses.replace(case, believed_kg=round(1.5 * case.mass_kg, 6)),
+    "least mass stated at 1.25 times": lambda case: dataclasses.replace(case, believed_kg=1.25 * case.mass_kg),
     "mass doubled and halved every 150 ms": lambda case: dataclasses.replace(case, other_kg=2.0 * case.mass_kg),
 }
 """Changes of what the device states of its handle, or of the handle itself; made once its mass has been drawn."""

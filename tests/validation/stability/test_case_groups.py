@@ -75,7 +75,7 @@ def test_groups_have_misjudged_and_changing_masses(all_groups):
     for prefix in ("", "let go in mid-stroke, ", "kalman: "):
         half, more, doubled = (all_groups[f"{prefix}{name}"] for name in MASSES)
         assert {case.believed_kg / case.mass_kg for case in half} == {0.5}
-        assert {round(case.believed_kg / case.mass_kg, 6) for case in more} == {1.5}
+        assert {round(case.believed_kg / case.mass_kg, 6) for case in more} == {1.25}
         assert {case.other_kg / case.mass_kg for case in doubled} == {2.0}
         assert {case.other_kg for case in (*half, *more)} == {case.believed_kg for case in doubled} == {0.0}
 
