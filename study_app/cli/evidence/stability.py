@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 )
 @click.option("--withheld", is_flag=True, help="Only the share of each liquid's force that safety withholds.")
 @click.option("--velocity", is_flag=True, help="Only errors, noise, stable damping and cost of velocity estimators.")
+@click.option(
+    "--delayed", type=click.Path(path_type=Path), metavar="FILE", help="Only measure what is left of a delayed force."
+)
 @click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
 @click.option("--cases", type=click.IntRange(1), metavar="N", help="Only N cases of each group.")
 def stability(
@@ -32,6 +35,7 @@ def stability(
     table: Path | None,
     withheld: bool,
     velocity: bool,
+    delayed: Path | None,
     seed: str,
     cases: int | None,
 ) -> None:
@@ -63,6 +67,9 @@ def stability(
         return
     if velocity:
         _print_velocity()
+        return
+    if delayed is not None:
+        _write_delayed(delayed)
         return
     with progress() as show, open_executor("threads") as executor:
         swept = found.run_sweep(
@@ -103,6 +110,16 @@ def _print_velocity() -> None:
     click.echo(report(rows))
     if not all(row.met for row in rows):
         click.get_current_context().exit(EXIT_FOUND)
+
+
+def _write_delayed(file: Path) -> None:
+    """Write the table of delayed forces, and print how long each may be delayed."""
+    from study_app.validation.stability import force_delay
+
+    with progress() as show:
+        found = force_delay.write(file, lambda done, of: show(f"{done} of {of} delays", done / of))
+    click.echo(force_delay.report(found))
+    click.echo(file)
 
 
 def _end(verdicts: Sequence[Verdict]) -> None:

@@ -80,8 +80,8 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
     copy(lift_n, passivity.lift_before_n)
     copy(state.force_n, force_n)
     copy(state.lift_n, lift_n)
-    _limit_slope(model, safety, sample)
-    _limit_inertia(model, safety, sample)
+    limit_slope(model, safety, sample)
+    limit_inertia(model, safety, sample)
     if not (is_finite(force_n) and is_finite(lift_n)):
         sample.limiters |= LIMITER_NON_FINITE
         sample.status = STATUS_NON_FINITE
@@ -110,7 +110,7 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
 
 
 @part
-def _limit_slope(model: Any, safety: Record, sample: Record) -> None:
+def limit_slope(model: Any, safety: Record, sample: Record) -> None:
     """Shorten each liquid's damping to F·min(1, B|w|/|F|): the secant of the maximum stable damping.
 
     Drag that builds up late gets what is left of B, at the greater speed that it belongs to: in fast strokes it follows
@@ -140,7 +140,7 @@ def _limit_slope(model: Any, safety: Record, sample: Record) -> None:
 
 
 @part
-def _limit_inertia(model: Any, safety: Record, sample: Record) -> None:
+def limit_inertia(model: Any, safety: Record, sample: Record) -> None:
     """Reduce inertial forces to their stable share (`pack`): fast motion meets them as dampers, too."""
     for i in range(model.parameters[0].liquids):
         local = model.liquid_states[i]

@@ -82,6 +82,7 @@ def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None) ->
     loop.noise_m = case.noise_um * 1e-6
     loop.lost, loop.duplicated, loop.burst_s = case.lost, case.duplicated, case.burst_ms * 1e-3
     loop.slows_to = case.slows_to
+    loop.late_ticks = round(case.force_delay_ms * 1e-3 * case.rate_hz)
     loop.mass_kg, loop.other_kg = case.mass_kg, case.other_kg
     if case.plant == SECOND:
         loop.arm = new_arm(ARMS[case.hand], handle_kg=case.mass_kg, **_device(case))

@@ -70,6 +70,7 @@ RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "burst_ms": (0.0, 40.0),
     "believed_kg": (0.0, 5.0),
     "other_kg": (0.0, 5.0),
+    "force_delay_ms": (0.0, 200.0),
 }
 """What a case may be made of; the sweep's own choices lie within."""
 
@@ -90,6 +91,7 @@ class Case:
     share of ticks without a new sample, ``duplicated`` one of samples that repeat the position before; for the last
     ``burst_ms`` of every 300 ms there is no new sample. ``believed_kg`` is the least mass that the device states
     (0: the true one), ``other_kg`` the mass of the handle in every second stretch of 150 ms (0: the same).
+    ``force_delay_ms`` is how late the force of the effects comes to the passivity controller, by the study's own wish.
     """
 
     liquid: str = "water"
@@ -117,6 +119,7 @@ class Case:
     burst_ms: float = 0.0
     believed_kg: float = 0.0
     other_kg: float = 0.0
+    force_delay_ms: float = 0.0
 
     @property
     def believed_delay(self) -> int:
