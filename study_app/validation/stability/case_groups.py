@@ -39,7 +39,7 @@ PHASES: Final = 12
 FIRST_RELEASE_S: Final = 0.6
 CASES: Final = 1500
 """Of each group of misjudged delays and masses and of disturbed samples."""
-KALMAN_CASES: Final = 500
+KALMAN_CASES: Final = 250
 """Of each group that is judged with the Kalman filter, too."""
 
 DRAWN: Final[Mapping[str, tuple[Any, ...]]] = {
