@@ -24,6 +24,11 @@ def shipped() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _shipped_folder().glob("*.toml")))
 
 
+def shipped_file(name: str) -> Path:
+    """Return the file of a protocol that ships with the program, even where the workspace has one of the same name."""
+    return _shipped_folder() / f"{name}.toml"
+
+
 def at_hand() -> tuple[str, ...]:
     """Return the names of the protocols in the workspace, then of those that ship with the program."""
     return tuple(dict.fromkeys((*(path.stem for path in workspace().own_protocols()), *shipped())))

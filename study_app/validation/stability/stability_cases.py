@@ -13,6 +13,7 @@ from study_app.haptics.model.effects.drag import DAMPING_NSPM, Drag
 from study_app.haptics.model.estimators import ESTIMATORS as KINDS
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.protocol.load import load
+from study_app.protocol.source.files import shipped_file
 
 REACHES: Final = "reaches"
 CIRCLES: Final = "circles"
@@ -185,7 +186,7 @@ def liquids() -> Mapping[str, Scene]:
     """
     found: dict[str, Scene] = {}
     for protocol, prefix in (("rek2024", ""), ("physical_liquids", "physical_")):
-        study = load(protocol)
+        study = load(shipped_file(protocol))
         found |= {f"{prefix}{name}": study.scene_of(name) for name in study.liquids}
     damper = Liquid(id=DAMPER, density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=DAMPING_NSPM[1]))
     for liquid in (Liquid(id="dense", density_kg_m3=10_000), damper):
@@ -196,7 +197,7 @@ def liquids() -> Mapping[str, Scene]:
 @cache
 def scenes() -> Mapping[str, Scene]:
     """Return what a case may present: what the sweep does, and the liquids of physical2."""
-    study = load("physical2")
+    study = load(shipped_file("physical2"))
     return {**liquids(), **{f"physical2_{name}": study.scene_of(name) for name in study.liquids}}
 
 
