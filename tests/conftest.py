@@ -20,6 +20,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 # No test uses the settings or the workspace of this machine's user: its workspace is its working folder.
 # Set here because fixtures of modules and sessions begin before those of a test.
 os.environ["LIQUID_STUDY_CONFIG"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "settings"))
+os.environ["LIQUID_STUDY_CACHE"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "cache"))
 os.environ["LIQUID_STUDY_WORKSPACE"] = "."
 
 try:
@@ -57,8 +58,24 @@ _settings = itertools.count()
 
 @pytest.fixture(autouse=True)
 def settings_of_nobody(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let no test meet, or change, the settings of this machine's user; the folder is not there until one is kept."""
-    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path_factory.getbasetemp() / f"settings-{next(_settings)}"))
+    """Let no test meet, or change, the settings of this machine's user; the folder is not there until one is kept.
+
+    The same holds for finished cases of interrupted computations.
+    """
+    settings = tmp_path_factory.getbasetemp() / f"settings-{next(_settings)}"
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(settings))
+    monkeypatch.setenv("LIQUID_STUDY_CACHE", str(settings.with_name(f"{settings.name}-cache")))
+
+
+@pytest.fixture(scope="session")
+def dask_cluster() -> Iterator[str]:
+    """Return the address of a Dask cluster of two worker processes."""
+    from tests.workers.local_cluster import INSTALLED, MISSING, local_cluster
+
+    if not INSTALLED:
+        pytest.skip(MISSING)
+    with local_cluster() as (address, _):
+        yield address
 
 
 @pytest.fixture(autouse=True)

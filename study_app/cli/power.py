@@ -7,11 +7,11 @@ from pathlib import Path
 import click
 
 from study_app.cli.options import FILE, Target
+from study_app.cli.parallel import EXIT_CANCELLED, executor_for, takes_workers
 from study_app.cli.progress import progress
-from study_app.workers.executors import ENGINES, Engine, open_executor
+from study_app.workers.executors import Workers
 
 SIZES = (5, 8, 12, 16, 20, 24)
-EXIT_CANCELLED = 130
 
 
 def _sizes(_context: click.Context, _option: click.Parameter, value: str) -> tuple[int, ...]:
@@ -43,28 +43,28 @@ def _sizes(_context: click.Context, _option: click.Parameter, value: str) -> tup
     show_default=True,
     help="Simulated studies for each size.",
 )
-@click.option(
-    "--jobs", type=click.IntRange(-1), default=-1, metavar="N", help="Parallel processes; default: one per core."
-)
-@click.option(
-    "--engine",
-    type=click.Choice(ENGINES),
-    default="processes",
-    show_default=True,
-    help="What computes on this computer; the numbers are the same.",
-)
+@takes_workers
+@click.option("--engine", type=click.Choice(["processes", "dask"]), hidden=True)
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figures.")
 def power(
-    protocol: str, sizes: tuple[int, ...], studies: int, jobs: int, engine: Engine, seed: int, to: Path | None
+    protocol: str,
+    sizes: tuple[int, ...],
+    studies: int,
+    workers: Workers,
+    engine: str | None,
+    seed: int,
+    to: Path | None,
 ) -> None:
     """Estimate the power of the protocol's own tests on simulated studies, and the smallest detectable difference.
 
     Four sessions are rehearsed to obtain the features of each condition; then thousands of participants answer with
     the rehearsals' answer model, which is plausible but not measured. Ctrl-C ends with the results so far.
     """
-    if jobs == 0:
-        raise click.BadParameter("0 jobs cannot run: give 1 or more, or -1 for one per core", param_hint="--jobs")
+    if engine == "processes":
+        workers = Workers(workers.count)
+    elif engine == "dask" and workers.cluster is None:
+        raise click.UsageError("--engine dask needs a cluster: give --cluster tcp://HOST:8786")
     from study_app.analysis.power.plan import plan
     from study_app.analysis.power.power_curves import Powers, powers
     from study_app.analysis.power.power_files import write
@@ -77,13 +77,12 @@ def power(
     found: Powers | None = None
     cancelled = False
     try:
-        with progress() as show:
+        with progress() as show, executor_for(workers) as executor:
             show("simulating every condition")
             planned = plan(study, feelings(study, seed=seed, progress=show))
-            with open_executor(engine, jobs) as executor:
-                for done, counts in sweep(planned, sizes, studies, seed, executor):
-                    show(f"{done} of {studies} studies of each size", done / studies)
-                    found = powers(planned, sizes, done, studies, seed, counts)
+            for done, counts in sweep(planned, sizes, studies, seed, executor):
+                show(f"{done} of {studies} studies of each size", done / studies)
+                found = powers(planned, sizes, done, studies, seed, counts)
     except KeyboardInterrupt:
         cancelled = True
     if found is not None:

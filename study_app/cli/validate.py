@@ -8,8 +8,9 @@ from pathlib import Path
 import click
 
 from study_app.cli.options import EXIT_FOUND, Target
+from study_app.cli.parallel import executor_for, takes_workers
 from study_app.cli.progress import progress
-from study_app.workers.executors import open_executor
+from study_app.workers.executors import Workers
 
 EXIT_UNDECIDED = 4
 
@@ -22,12 +23,10 @@ EXIT_UNDECIDED = 4
     show_default=True,
     help="Initial number of studies per cell.",
 )
-@click.option(
-    "--jobs", type=click.IntRange(-1), default=-1, metavar="N", help="Parallel processes; default: one per core."
-)
+@takes_workers
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
-def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None:
+def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
     """Measure how often the report's verdicts are wrong, on studies simulated with no, some or all effects.
 
     Studies of rek2024 with 5, 12 and 24 participants, by the rehearsals' answer model and by an ordinal probit model
@@ -37,8 +36,6 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
     far. Ends with exit code 3 if a rate exceeds its limit by its 99.9 % interval, else with 4 where the
     studies are too few to decide about one.
     """
-    if jobs == 0:
-        raise click.BadParameter("0 jobs cannot run: give 1 or more, or -1 for one per core", param_hint="--jobs")
     from study_app.analysis.power.plan import plan
     from study_app.protocol.load import load
     from study_app.session.simulated.trial_features import feelings
@@ -54,18 +51,17 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
     def say(text: str) -> None:
         click.echo(f"{time.monotonic() - begun:.0f} s: {text}", err=True)
 
-    with progress() as show:
-        show("rehearsing every condition")
-        protocol = load("rek2024")
-        studied = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))
-        begun = time.monotonic()
-        try:
-            with open_executor("processes", jobs) as executor:
-                for done, so_far in validate(studied, studies, executor, seed=seed, progress=say):
-                    rates = so_far
-                    show(f"{done} studies")
-        except KeyboardInterrupt:
-            click.echo("ended early", err=True)
+    try:
+        with progress() as show, executor_for(workers) as executor:
+            show("rehearsing every condition")
+            protocol = load("rek2024")
+            studied = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))
+            begun = time.monotonic()
+            for done, so_far in validate(studied, studies, executor, seed=seed, progress=say):
+                rates = so_far
+                show(f"{done} studies")
+    except KeyboardInterrupt:
+        click.echo("ended early", err=True)
     words = f"{done} studies in {time.monotonic() - begun:.0f} s\n\n{markdown(rates)}"
     click.echo(words, nl=False)
     if to is not None:

@@ -1,21 +1,22 @@
-"""Executors: independent cases, whichever engine; interrupts, killed workers and a killed program leave nothing."""
+"""Local processes: independent cases; interrupts, killed workers and a killed program change and leave nothing."""
 
 from __future__ import annotations
 
 import os
-import random
 import signal
 import subprocess
 import sys
 import textwrap
 from concurrent.futures import Executor, Future
+from functools import partial
 from pathlib import Path
 
 import psutil
 import pytest
 
-from study_app.errors import WorkerError
-from study_app.workers.executors import ENGINES, Engine, open_executor
+from study_app.errors import StudyError, WorkerError
+from study_app.workers.executors import Workers, open_executor
+from tests.workers.cases import die, draw, killed_once, loaded, refuse
 
 pytestmark = pytest.mark.slow
 
@@ -23,79 +24,79 @@ SOON_S = 60.0
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 
-def draw(seed: int) -> float:
-    """Return the result of a seeded case."""
-    return random.Random(seed).random()  # noqa: S311 - not for cryptography
-
-
-def die(_case: int) -> None:
-    """End the process as a kill does."""
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def loaded(_case: int) -> tuple[bool, str]:
-    """Return whether Qt is loaded, and how many threads linear algebra may use."""
-    return "PySide6" in sys.modules, os.environ["OMP_NUM_THREADS"]
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("workers", [1, 2, -1])
-def test_results_are_those_of_the_seeds_in_their_order(engine: Engine, workers: int) -> None:
-    with open_executor(engine, workers) as executor:
+@pytest.mark.parametrize("workers", [1, 2, None])
+def test_results_are_those_of_the_seeds_in_their_order(workers: int | None) -> None:
+    with open_executor(Workers(workers)) as executor:
         assert isinstance(executor, Executor)
         assert list(executor.map(draw, range(20))) == [draw(seed) for seed in range(20)]
 
 
 def test_a_process_loads_no_window_library_and_computes_in_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    with open_executor("processes", 1) as executor:
+    with open_executor(Workers(1)) as executor:
         assert executor.submit(loaded, 0).result() == (False, "1")
 
 
 @posix
-def test_a_killed_process_is_one_clear_line() -> None:
+@pytest.mark.parametrize("workers", [1, 2])
+def test_killed_processes_change_no_result(workers: int, tmp_path: Path) -> None:
+    """Four of forty cases kill their process the first time."""
+    with open_executor(Workers(workers)) as executor:
+        assert list(executor.map(partial(killed_once, tmp_path), range(40))) == [draw(seed) for seed in range(40)]
+
+
+@posix
+def test_a_case_that_always_kills_its_process_is_one_clear_line() -> None:
     with (
-        pytest.raises(WorkerError, match="a worker process ended unexpectedly") as told,
-        open_executor("processes", 2) as executor,
+        pytest.raises(WorkerError, match="a worker process ended unexpectedly 3 times") as raised,
+        open_executor(Workers(2)) as executor,
     ):
         list(executor.map(die, range(4)))
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_an_exception_cancels_the_cases_that_have_not_begun(engine: Engine) -> None:
+def test_an_error_of_a_case_is_raised_where_its_result_is_asked_for() -> None:
+    with open_executor(Workers(2)) as executor:
+        futures = [executor.submit(refuse, case) for case in range(6)]
+        with pytest.raises(StudyError, match="case 3"):
+            futures[3].result()
+        assert [future.result() for future in futures[:3]] == [0, 1, 2]
+
+
+def test_an_exception_cancels_the_cases_that_have_not_finished() -> None:
     waiting: list[Future[float]] = []
 
     def interrupted() -> None:
-        with open_executor(engine, 1) as executor:
+        with open_executor(Workers(1)) as executor:
             waiting.extend(executor.submit(draw, seed) for seed in range(20_000))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
-    assert any(future.cancelled() or future.exception() is not None for future in waiting)
+    assert any(future.cancelled() for future in waiting)
     assert all(future.done() for future in waiting)
+
+
+def test_nothing_can_be_submitted_after_the_end() -> None:
+    executor = open_executor(Workers(1))
+    executor.shutdown()
+    with pytest.raises(RuntimeError, match="shut down"):
+        executor.submit(draw, 1)
 
 
 ENDLESS = """
     import os, signal, sys, time
-    from study_app.workers.executors import open_executor
-    from tests.workers.test_executors import report_and_wait
+    from study_app.workers.executors import Workers, open_executor
+    from tests.workers.cases import report_and_wait
     if __name__ == "__main__":
         signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
         try:
-            with open_executor("processes", 2) as executor:
+            with open_executor(Workers(2)) as executor:
                 list(executor.map(report_and_wait, range(8)))
         except KeyboardInterrupt:
             print("interrupted", flush=True)
             sys.exit(130)
 """
-
-
-def report_and_wait(_case: int) -> None:
-    """Print the process's number, and wait for a signal."""
-    os.write(sys.stdout.fileno(), f"{os.getpid()}\n".encode())  # whole lines, whichever process is first
-    signal.pause()
 
 
 @posix

@@ -7,7 +7,9 @@ from pathlib import Path
 import click
 
 from study_app.cli.options import Target
+from study_app.cli.parallel import executor_for, takes_workers
 from study_app.cli.progress import progress
+from study_app.workers.executors import Workers
 
 
 @click.command()
@@ -24,7 +26,8 @@ from study_app.cli.progress import progress
     "when it is left out of the fit: about two minutes.",
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; default: print.")
-def cfd(to: Path | None, *, solve: bool, refit: bool) -> None:
+@takes_workers
+def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool) -> None:
     """Fit models of honey and glycerin to the force of a fluid solver; report the remaining error.
 
     A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
@@ -43,7 +46,10 @@ def cfd(to: Path | None, *, solve: bool, refit: bool) -> None:
     if to is not None:
         make_folder(to)
     with progress(lambda text: click.echo(text, err=True)) as show:
-        solved = solve_all(to, show) if solve and to is not None else ()
+        solved: tuple[Path, ...] = ()
+        if solve and to is not None:
+            with executor_for(workers) as executor:
+                solved = solve_all(to, executor, show)
         source = to if solve else None
         tables, drag = stored(source), steady(source)
         found = refit_all((*tables, *training(source)), held_out(source), show) if refit else None

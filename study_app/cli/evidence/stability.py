@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from study_app.cli.options import EXIT_FOUND, Target
+from study_app.cli.parallel import executor_for, takes_workers
 from study_app.cli.progress import progress
-from study_app.workers.executors import open_executor
+from study_app.workers.executors import Workers
 
 if TYPE_CHECKING:
     from study_app.validation.stability.verdict import Verdict
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 )
 @click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
 @click.option("--cases", type=click.IntRange(1), metavar="N", help="Only N cases of each group.")
+@takes_workers
 def stability(
     to: Path | None,
     line: str | None,
@@ -38,6 +40,7 @@ def stability(
     delayed: Path | None,
     seed: str,
     cases: int | None,
+    workers: Workers,
 ) -> None:
     """Simulate thousands of closed loops with the safety layer off and on, and print the unstable ones.
 
@@ -58,12 +61,12 @@ def stability(
         _end(verdicts[-1:])
         return
     if table is not None:
-        with progress() as show:
-            found.write_limits(table, lambda done, of: show(f"{done} of {of} limits", done / of))
+        with progress() as show, executor_for(workers) as executor:
+            found.write_limits(table, executor, lambda done, of: show(f"{done} of {of} limits", done / of))
         click.echo(table)
         return
     if withheld:
-        _print_withheld()
+        _print_withheld(workers)
         return
     if velocity:
         _print_velocity()
@@ -71,7 +74,7 @@ def stability(
     if delayed is not None:
         _write_delayed(delayed)
         return
-    with progress() as show, open_executor("threads") as executor:
+    with progress() as show, executor_for(workers) as executor:
         swept = found.run_sweep(
             some(sweep(seed), cases),
             groups(seed, cases),
@@ -79,7 +82,7 @@ def stability(
             lambda done, of: show(f"{done} of {of} verdicts", done / of),
         )
         show("comparing forces")
-        compared = fidelities()
+        compared = fidelities(executor=executor)
     click.echo(found.summary(swept, compared))
     if to is not None:
         click.echo("\n" + "\n".join(str(file) for file in found.write(to, swept, compared)))
@@ -89,13 +92,13 @@ def stability(
     _end(swept.unstable)
 
 
-def _print_withheld() -> None:
+def _print_withheld(workers: Workers) -> None:
     """Print the shares of force withheld; end with 3 if a goal is not met."""
     from study_app.validation.stability.withheld_force import measure, report
 
-    with progress() as show:
+    with progress() as show, executor_for(workers) as executor:
         show("measuring the force withheld")
-        shares = measure()
+        shares = measure(executor=executor)
     click.echo(report(shares))
     if not all(share.met for share in shares):
         click.get_current_context().exit(EXIT_FOUND)

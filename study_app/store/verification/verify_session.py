@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,6 @@ from study_app.store.verification.fingerprints import fingerprint
 from study_app.store.verification.response_checks import wrong_responses
 from study_app.store.verification.table_comparison import check_tables
 from study_app.store.verification.violations import Gathered
-from study_app.workers.executors import open_executor
 
 LOOKS = 20
 """So often is looked again at what was found in files that another program wrote meanwhile."""
@@ -237,7 +237,7 @@ def _hashes(folder: SessionFolder) -> dict[str, str]:
             return ""
 
     names = files(folder)
-    with open_executor("threads", READERS) as readers:
+    with ThreadPoolExecutor(READERS) as readers:
         return dict(zip(names, readers.map(hashed, names), strict=True))
 
 

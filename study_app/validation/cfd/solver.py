@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import Executor
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final
@@ -47,8 +49,10 @@ PERMITTED: Final = 0.02
 """Greatest difference, as a share of the greatest force: from the coarse solution, and from the exact linear one."""
 
 
-def solve(to: Path, tell: Callable[[str], None]) -> tuple[Path, ...]:
-    """Write the tables of all cases and of steady drag into the folder ``to``; return the files.
+def solve(to: Path, executor: Executor, tell: Callable[[str], None]) -> tuple[Path, ...]:
+    """Write the tables of all cases and of steady drag, solved by an executor, into the folder ``to``.
+
+    Return the files.
 
     Raises
     ------
@@ -56,22 +60,32 @@ def solve(to: Path, tell: Callable[[str], None]) -> tuple[Path, ...]:
         NGSolve is not installed, a solution is not good enough, or a file cannot be written.
     """
     library()
-    written = []
-    for solved, folder, grid, coarse_grid in (
-        (cases(), to, GRID, COARSE),
-        (training_cases(), to / TRAINING_FOLDER, BOTH_WAYS, BOTH_WAYS_COARSE),
-        (held_out_cases(), to / HELD_OUT_FOLDER, BOTH_WAYS, BOTH_WAYS_COARSE),
-    ):
-        make_folder(folder)
-        flow, coarse = Flow(grid), Flow(coarse_grid)
-        for case in solved:
-            tell(f"{case.liquid_id}, {case.title}, Re {case.reynolds:.3g} ...")
-            path = folder / f"{case.name}.csv"
-            write_file(path, motion_table(case, flow, coarse, STEP if case.reynolds <= FAST_REYNOLDS else STEP / 2))
-            written.append(path)
-    tell(f"steady drag at Re {REYNOLDS[0]:g} to {REYNOLDS[-1]:g} ...")
-    write_file(to / STEADY_FILE, steady_table())
-    return (*written, to / STEADY_FILE)
+    solved = {
+        folder / f"{case.name}.csv": executor.submit(_solved, case, *grids)
+        for some, folder, grids in (
+            (cases(), to, (GRID, COARSE)),
+            (training_cases(), to / TRAINING_FOLDER, (BOTH_WAYS, BOTH_WAYS_COARSE)),
+            (held_out_cases(), to / HELD_OUT_FOLDER, (BOTH_WAYS, BOTH_WAYS_COARSE)),
+        )
+        for case in some
+    }
+    solved[to / STEADY_FILE] = executor.submit(steady_table)
+    for number, (path, table) in enumerate(solved.items(), start=1):
+        tell(f"{path.name}, {number} of {len(solved)} ...")
+        make_folder(path.parent)
+        write_file(path, table.result())
+    return tuple(solved)
+
+
+def _solved(case: Case, grid: Grid, coarse: Grid) -> bytes:
+    step = STEP if case.reynolds <= FAST_REYNOLDS else STEP / 2
+    return motion_table(case, _flow(grid), _flow(coarse), step)
+
+
+@cache
+def _flow(grid: Grid) -> Flow:
+    """Return the flow on a grid; a worker makes its mesh once."""
+    return Flow(grid)
 
 
 def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = STEP) -> bytes:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator
+from concurrent.futures import Executor
 from typing import Any, Final
 
 import numpy as np
@@ -110,18 +112,23 @@ def measured_estimators() -> tuple[Velocity, ...]:
     return found
 
 
-def measure_limits(velocities: Iterable[Velocity] | None = None) -> Iterator[Entry]:
-    """Yield the table of limits, line by line; of all estimators, or of some."""
-    for velocity in measured_estimators() if velocities is None else velocities:
-        for period_s in PERIODS_S:
-            for delay in DELAYS[1:]:
-                felt = velocity.kind in {"ewma", "kalman"} and period_s == NOMINAL_S and delay <= 1
-                drag = _limit_nspm(velocity, period_s, delay, felt=felt)
-                inertia = (FELT_INERTIA_SHARE if felt else INERTIA_SHARE) * drag
-                limits = DampingLimits(_rounded_down(drag), _rounded_down(inertia))
-                parameter = ESTIMATORS[velocity.kind].parameter
-                value = None if parameter is None else float(getattr(velocity, parameter))
-                yield Entry(velocity.kind, value, period_s, delay, limits)
+def measure_limits(
+    velocities: Iterable[Velocity] | None = None, *, executor: Executor | None = None
+) -> Iterator[Entry]:
+    """Yield the table of limits, line by line; of all estimators, or of some; by an executor or here."""
+    loops = itertools.product(velocities or measured_estimators(), PERIODS_S, DELAYS[1:])
+    in_turn = map if executor is None else executor.map
+    yield from in_turn(_entry, *zip(*loops, strict=True))
+
+
+def _entry(velocity: Velocity, period_s: float, delay: int) -> Entry:
+    felt = velocity.kind in {"ewma", "kalman"} and period_s == NOMINAL_S and delay <= 1
+    drag = _limit_nspm(velocity, period_s, delay, felt=felt)
+    inertia = (FELT_INERTIA_SHARE if felt else INERTIA_SHARE) * drag
+    limits = DampingLimits(_rounded_down(drag), _rounded_down(inertia))
+    parameter = ESTIMATORS[velocity.kind].parameter
+    value = None if parameter is None else float(getattr(velocity, parameter))
+    return Entry(velocity.kind, value, period_s, delay, limits)
 
 
 def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -60,9 +61,15 @@ class Fidelity(NamedTuple):
         return self.difference_n <= self.target_n
 
 
-def fidelities(names: Sequence[str] | None = None, loops: Sequence[tuple[float, int]] = LOOPS) -> tuple[Fidelity, ...]:
-    """Measure liquids (by default all) in each of the loops."""
-    return tuple(itertools.starmap(_worst, itertools.product(names or liquids(), loops)))
+def fidelities(
+    names: Sequence[str] | None = None,
+    loops: Sequence[tuple[float, int]] = LOOPS,
+    *,
+    executor: Executor | None = None,
+) -> tuple[Fidelity, ...]:
+    """Measure liquids (by default all) in each of the loops, by an executor or here."""
+    in_turn = map if executor is None else executor.map
+    return tuple(in_turn(_worst, *zip(*itertools.product(names or liquids(), loops), strict=True)))
 
 
 def by_liquid(found: Sequence[Fidelity]) -> Mapping[str, tuple[Fidelity, ...]]:

@@ -185,8 +185,8 @@ def write(to: Path, swept: Swept, fidelities: Sequence[Fidelity]) -> tuple[Path,
     return tuple(to / name for name in files)
 
 
-def write_limits(file: Path, tell: Tell | None = None) -> None:
-    """Measure the table of limits that `haptics.model.limits` reads, and write it.
+def write_limits(file: Path, executor: Executor, tell: Tell | None = None) -> None:
+    """Measure the table of limits that `haptics.model.limits` reads by an executor, and write it.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def write_limits(file: Path, tell: Tell | None = None) -> None:
     """
     rows: list[Sequence[Any]] = [("estimator", "parameter", "period_ms", "delay_ticks", "drag_nspm", "inertia_nspm")]
     lines = len(measured_estimators()) * len(PERIODS_S) * len(DELAYS[1:])
-    for name, value, period_s, delay, (drag, inertia) in measure_limits():
+    for name, value, period_s, delay, (drag, inertia) in measure_limits(executor=executor):
         parameter = "" if value is None else f"{value:g}"
         rows.append((name, parameter, f"{period_s * 1e3:g}", delay, f"{drag:g}", f"{inertia:g}"))
         if tell is not None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -83,14 +84,20 @@ class Withheld(NamedTuple):
 
 
 def measure(
-    names: Sequence[str] | None = None, estimators: Sequence[str] = ESTIMATORS, *, delay: int = 1
+    names: Sequence[str] | None = None,
+    estimators: Sequence[str] = ESTIMATORS,
+    *,
+    delay: int = 1,
+    executor: Executor | None = None,
 ) -> tuple[Withheld, ...]:
     """Return the shares of liquids (by default all that ship), each at its own scale, at 1 kHz."""
     shipped = [name for name in liquids() if name not in {"dense", "damper"}]
-    return tuple(
-        _measured(Case(liquid=liquid, scale=liquids()[liquid].scale, delay=delay, estimator=estimator), mode)
+    planned = [
+        (Case(liquid=liquid, scale=liquids()[liquid].scale, delay=delay, estimator=estimator), mode)
         for estimator, mode, liquid in itertools.product(estimators, MODES, names or shipped)
-    )
+    ]
+    in_turn = map if executor is None else executor.map
+    return tuple(in_turn(_measured, *zip(*planned, strict=True)))
 
 
 def report(found: Sequence[Withheld]) -> str:

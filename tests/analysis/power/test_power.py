@@ -32,7 +32,7 @@ from study_app.errors import AnalysisError
 from study_app.protocol.forms.simulated_observer import NOTHING_FELT, Felt
 from study_app.protocol.load import load, parse
 from study_app.store.verification.table_checks import problems
-from study_app.workers.executors import Engine, open_executor
+from study_app.workers.executors import Workers, open_executor
 from tests.analysis.conftest import SMALL
 from tests.protocol.groups.grouped import grouped
 
@@ -90,12 +90,62 @@ def curves(found: Powers, question: str, item: str | None = None) -> dict[str | 
     return {one.setting: one for one in found.curves if (one.question, one.item) == (question, item)}
 
 
-@pytest.mark.parametrize(("engine", "workers"), [("processes", 1), ("processes", 2), ("threads", 2)])
-def test_the_counts_do_not_depend_on_the_executor(counted: tuple[int, Counts], engine: Engine, workers: int) -> None:
-    with open_executor(engine, workers) as executor:
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_counts_do_not_depend_on_the_executor(counted: tuple[int, Counts], workers: int) -> None:
+    with open_executor(Workers(workers)) as executor:
         studies, counts = swept(planned(), executor=executor)
     assert studies == 30
     assert same(counts, counted[1])
+
+
+def test_the_command_writes_the_same_bytes_with_one_worker_two_and_a_cluster(
+    dask_cluster: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda protocol, **_: felt_in(protocol))
+    written = []
+    for words in (("--workers", "1"), ("--jobs", "2"), ("--cluster", dask_cluster)):
+        to = tmp_path / words[0]
+        asked = ("power", "rek2024", "--sizes", "5", "--studies", "50", "--to", str(to))
+        result = CliRunner().invoke(commands, [*asked, *words])
+        assert result.exit_code == 0, result.output
+        written.append({path.name: path.read_bytes() for path in to.iterdir()})
+    assert written[0].keys() >= {"power.csv", "power.md", "power-delays.png"}
+    assert written[0] == written[1] == written[2]
+
+
+def test_engine_dask_and_its_variable_are_other_words_for_a_cluster(
+    dask_cluster: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Workers] = []
+
+    def opening(workers: Workers) -> Any:
+        opened.append(workers)
+        raise AnalysisError("opened")
+
+    monkeypatch.setattr("study_app.cli.power.executor_for", opening)
+    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", dask_cluster)
+    for words in (("--engine", "dask"), (), ("--workers", "2"), ("--engine", "processes")):
+        assert isinstance(CliRunner().invoke(commands, ["power", "rek2024", *words]).exception, AnalysisError)
+    assert opened == [Workers(cluster=dask_cluster), Workers(cluster=dask_cluster), Workers(2), Workers()]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--engine", "dask"), "--engine dask needs a cluster: give --cluster tcp://HOST:8786"),
+        (("--workers", "2", "--cluster", "tcp://lab1:8786"), "--workers and --cluster exclude each other"),
+        (("--workers", "0"), "0 workers cannot compute: give 1 or more"),
+        (("--jobs", "-2"), "-2 is not in the range x>=-1"),
+        (("--engine", "ray"), "'ray' is not one of 'processes', 'dask'"),
+    ],
+)
+def test_workers_that_make_no_sense_are_a_usage_error(
+    words: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
+    result = CliRunner().invoke(commands, ["power", "rek2024", *words])
+    assert result.exit_code == 2
+    assert said in result.output
 
 
 def test_another_seed_gives_other_numbers(counted: tuple[int, Counts]) -> None:
@@ -248,13 +298,6 @@ def test_a_protocol_that_compares_nothing_is_refused() -> None:
         plan(protocol.model_copy(update={"blocks": alone}), felt_in(protocol))
 
 
-@pytest.mark.parametrize("engine", ["dask", "ray", "loky"])
-def test_an_engine_that_does_not_exist_is_a_usage_error(engine: str) -> None:
-    result = CliRunner().invoke(commands, ["power", "rek2024", "--engine", engine])
-    assert result.exit_code == 2
-    assert f"'{engine}' is not one of 'processes', 'threads'" in result.output
-
-
 @pytest.mark.parametrize("sizes", ["5,many", "1", "5,2000", ""])
 def test_sizes_that_make_no_sense_are_refused(sizes: str) -> None:
     result = CliRunner().invoke(commands, ["power", "rek2024", "--sizes", sizes])
@@ -283,12 +326,12 @@ def test_an_interrupt_ends_the_workers_too() -> None:
         """
         import signal
         from study_app.analysis.power.power_sweep import sweep
-        from study_app.workers.executors import open_executor
+        from study_app.workers.executors import Workers, open_executor
         from tests.analysis.power.test_power import planned
         if __name__ == "__main__":
             signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job starts deaf to it
             try:
-                with open_executor("processes", 2) as executor:
+                with open_executor(Workers(2)) as executor:
                     for done, counts in sweep(planned(), (5,), 1_000_000, 1, executor):
                         print(done, flush=True)
             except KeyboardInterrupt:

@@ -41,7 +41,7 @@ from study_app.validation.report_rates.rate_tables import markdown, table
 from study_app.validation.report_rates.rates import Limit, Rate
 from study_app.validation.report_rates.simulation import validate
 from study_app.validation.report_rates.study_rates import CLAIMED, LOST, Cell, count, truth
-from study_app.workers.executors import open_executor
+from study_app.workers.executors import Workers, open_executor
 
 
 @pytest.fixture(scope="module")
@@ -155,16 +155,18 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
 
 
 @pytest.mark.slow
-def test_rates_do_not_depend_on_the_executor(rek: Simulated, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rates_do_not_depend_on_the_executor(
+    rek: Simulated, dask_cluster: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(studies, "TRUTH", 200)
     monkeypatch.setattr(simulation, "EXTENTS", EXTENTS[:1])
     monkeypatch.setattr(simulation, "ROUNDS", 1)
     found = []
-    for engine, workers in (("threads", 1), ("threads", 2), ("processes", 2)):
-        with open_executor(engine, workers) as executor:  # type: ignore[arg-type]
-            *_, last = validate(rek, 2, executor, sizes=(5,))
-        found.append(last)
-    assert found[0][0] > 0
+    for workers in (Workers(1), Workers(2), Workers(cluster=dask_cluster)):
+        with open_executor(workers) as executor:
+            *_, (done, rates) = validate(rek, 2, executor, sizes=(5,))
+        assert done > 0
+        found.append(table(rates))
     assert found[0] == found[1] == found[2]
 
 

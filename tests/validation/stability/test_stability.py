@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -12,15 +13,18 @@ from study_app import cli
 from study_app.cli.options import EXIT_FOUND
 from study_app.errors import StoreError, StudyError
 from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.haptics.model.scene import Raw
 from study_app.protocol.load import load, shipped
 from study_app.validation.stability import stability_report as stability
 from study_app.validation.stability.case_groups import Group, groups, some, sweep
+from study_app.validation.stability.damping_boundary import measure_limits
 from study_app.validation.stability.device_bench import trace_of
 from study_app.validation.stability.fidelity import LIMITED, STUDY_LOOPS, fidelities
 from study_app.validation.stability.stability_cases import GRIPS, Case, liquids, parse, scene_of
 from study_app.validation.stability.trace_measures import fast_part, smooth
 from study_app.validation.stability.verdict import judge
-from study_app.workers.executors import open_executor
+from study_app.validation.stability.withheld_force import measure
+from study_app.workers.executors import Workers, open_executor
 from tests.haptics.scenes import COMPILED
 
 pytestmark = pytest.mark.slow
@@ -33,7 +37,7 @@ PRESETS = [name for name in liquids() if name not in LIMITED]
 
 @pytest.fixture(scope="module")
 def swept():
-    with open_executor("threads") as executor:
+    with ThreadPoolExecutor(2) as executor:
         return stability.run_sweep(some(sweep(), 120), [Group("gentle", (Case(), Case(plant="arm")))], executor)
 
 
@@ -69,6 +73,27 @@ def test_the_strongest_linear_damper_is_unstable_without_safety_and_stable_with_
     assert sum(not judge(case, safe=False).stable for case in damped) > 25
     assert [str(case) for case in damped if not judge(case, safe=True).stable] == []
     assert parse(str(damped[0])) == damped[0]
+
+
+@compiled
+def test_verdicts_do_not_depend_on_the_executor(dask_cluster):
+    found = []
+    for workers in (Workers(1), Workers(2), Workers(cluster=dask_cluster)):
+        with open_executor(workers) as executor:
+            judged = stability.run_sweep(some(sweep(), 6), [Group("gentle", (Case(plant="arm"),))], executor)
+        found.append(dataclasses.replace(judged, took_s=0.0))
+    assert repr(found[0]) == repr(found[1]) == repr(found[2])
+    assert len(found[0].on) == 6
+
+
+@compiled
+def test_limits_and_shares_do_not_depend_on_the_executor():
+    with open_executor(Workers(2)) as executor:
+        loops = (["honey"], [(1000.0, 1)])
+        assert fidelities(*loops, executor=executor) == fidelities(*loops)
+        shares = (["honey"], ["ewma"])
+        assert measure(*shares, executor=executor) == measure(*shares)
+        assert list(measure_limits([Raw()], executor=executor)) == list(measure_limits([Raw()]))
 
 
 @compiled
@@ -262,7 +287,8 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     monkeypatch.setattr(stability, "judge", lambda case, safe: dataclasses.replace(judged, case=case, safe=safe))
     monkeypatch.setattr(stability, "judge_driven", lambda case: dataclasses.replace(judged, case=case, safe=True))
     few = fidelities(["honey"], STUDY_LOOPS)
-    monkeypatch.setattr("study_app.validation.stability.fidelity.fidelities", lambda: few)
+    monkeypatch.setattr("study_app.validation.stability.fidelity.fidelities", lambda **_: few)
+    monkeypatch.setattr("study_app.cli.evidence.stability.executor_for", lambda _: ThreadPoolExecutor(1))
     ran = command("--cases", "2")
     assert ran.return_value == EXIT_FOUND
     lines = [line for line in ran.stderr.splitlines() if line.startswith("liquid=")]
@@ -278,7 +304,7 @@ def test_a_line_that_is_none_is_refused():
 def test_the_table_of_limits_is_written_as_it_ships(monkeypatch, tmp_path):
     from study_app.haptics.model.limits import table
 
-    monkeypatch.setattr(stability, "measure_limits", lambda: iter(table()))
+    monkeypatch.setattr(stability, "measure_limits", lambda **_: iter(table()))
     ran = command("--table", str(tmp_path / "limits.csv"))
     assert ran.exception is None
     from importlib import resources

@@ -74,7 +74,7 @@ def test_goals_are_judged_over_all_liquids_but_tar():
 
 def test_command_prints_the_table_and_ends_with_3_where_a_goal_is_missed(monkeypatch):
     for found, code in ((row("honey"), None), (row("honey", 0.5), EXIT_FOUND)):
-        monkeypatch.setattr(withheld_force, "measure", lambda found=found: (found,))
+        monkeypatch.setattr(withheld_force, "measure", lambda found=found, **_: (found,))
         ran = CliRunner().invoke(cli.commands, ["stability", "--withheld"], standalone_mode=False)
         assert ran.exception is None
         assert (ran.return_value or None) == code

@@ -1,0 +1,157 @@
+"""A Dask cluster of two worker processes: the same results, killed workers, and one line where there is none."""
+
+from __future__ import annotations
+
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import psutil
+import pytest
+
+from study_app.cli import main
+from study_app.errors import StudyError, WorkerError
+from study_app.workers import cluster as clusters
+from study_app.workers.cluster import ADDRESS
+from study_app.workers.environment import environment
+from study_app.workers.executors import Workers, open_executor
+from tests.workers.cases import draw, killed_once, refuse
+from tests.workers.local_cluster import INSTALLED, MISSING, local_cluster
+
+pytestmark = pytest.mark.slow
+needs_distributed = pytest.mark.skipif(not INSTALLED, reason=MISSING)
+posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+
+
+@needs_distributed
+def test_results_are_those_of_the_seeds_in_their_order(dask_cluster: str) -> None:
+    with open_executor(Workers(cluster=dask_cluster)) as executor:
+        assert executor.workers == 2
+        assert list(executor.map(draw, range(50))) == [draw(seed) for seed in range(50)]
+
+
+@needs_distributed
+def test_an_error_of_a_case_is_raised_where_its_result_is_asked_for(dask_cluster: str) -> None:
+    with open_executor(Workers(cluster=dask_cluster)) as executor:
+        futures = [executor.submit(refuse, case) for case in range(6)]
+        with pytest.raises(StudyError, match="case 3"):
+            futures[3].result()
+        assert [future.result() for future in futures[:3]] == [0, 1, 2]
+
+
+@needs_distributed
+def test_an_exception_cancels_the_cases_that_have_not_finished(dask_cluster: str) -> None:
+    def interrupted() -> None:
+        with open_executor(Workers(cluster=dask_cluster)) as executor:
+            waiting.extend(executor.submit(draw, seed) for seed in range(300))
+            raise KeyboardInterrupt
+
+    waiting: list[object] = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert all(future.done() for future in waiting)  # type: ignore[attr-defined]
+    assert any(future.cancelled() for future in waiting)  # type: ignore[attr-defined]
+
+
+@needs_distributed
+@posix
+def test_killed_workers_change_no_result_and_a_lost_scheduler_is_one_line(tmp_path: Path) -> None:
+    """Four of forty cases kill their worker the first time; then the scheduler and its workers are killed."""
+    with local_cluster() as (address, scheduler):
+        with open_executor(Workers(cluster=address)) as executor:
+            assert list(executor.map(partial(killed_once, tmp_path), range(40))) == [draw(seed) for seed in range(40)]
+
+        def lost() -> None:
+            with open_executor(Workers(cluster=address)) as executor:
+                futures = [executor.submit(draw, seed) for seed in range(2000)]
+                assert futures[0].result() == draw(0)
+                for process in (*scheduler.children(recursive=True), scheduler):
+                    process.kill()
+                for future in futures:
+                    future.result()
+
+        with pytest.raises(WorkerError, match=f"the cluster at {address} was lost") as raised:
+            lost()
+        assert "\n" not in str(raised.value)
+        assert not psutil.pid_exists(scheduler.pid) or scheduler.status() == psutil.STATUS_ZOMBIE
+
+
+def test_a_worker_with_another_library_or_program_refuses_its_cases() -> None:
+    compute = clusters._compute
+    assert compute(environment(), draw, (3,), {}) == draw(3)
+    with pytest.raises(WorkerError, match=r"numpy \S+ instead of 1\.0; scipy") as raised:
+        compute({**environment(), "numpy": "1.0", "scipy": "0.1"}, draw, (3,), {})
+    assert "\n" not in str(raised.value)
+    with pytest.raises(WorkerError, match=r"liquid-study \S+ \(\w{16}\) instead of 0\.1\.0 \(another\)"):
+        compute({**environment(), "liquid-study": "0.1.0 (another)"}, draw, (3,), {})
+
+
+@pytest.mark.parametrize("address", ["tcp://lab1:8786", "tls://10.0.0.2:8786", "tcp://[::1]:8786"])
+def test_an_address_has_a_scheme_a_host_and_a_port(address: str) -> None:
+    assert ADDRESS.fullmatch(address)
+
+
+@pytest.fixture
+def other_program() -> Iterator[str]:
+    """Serve a program that closes every connection without a word."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            try:
+                while True:
+                    server.accept()[0].close()
+            except OSError:
+                return
+
+        serving = threading.Thread(target=serve)
+        serving.start()
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        server.shutdown(socket.SHUT_RDWR)
+        serving.join()
+
+
+@pytest.fixture
+def silent_program(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """Serve a program that waits for its client to speak, as a web server does."""
+    monkeypatch.setattr(clusters, "CONNECT_S", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("localhost", "'localhost' is no address of a Dask scheduler: give tcp://HOST:PORT"),
+        ("http://127.0.0.1:8786", "give tcp://HOST:PORT"),
+        ("tcp://127.0.0.1:port", "give tcp://HOST:PORT"),
+        ("tcp://127.0.0.1:99999", "no Dask scheduler answers at tcp://127.0.0.1:99999"),
+        ("tcp://127.0.0.1:1", "(Connection refused)"),
+        ("tcp://no-such-host.invalid:8786", "no Dask scheduler answers at tcp://no-such-host.invalid:8786"),
+        ("other_program", "(another program answers there)"),
+        ("silent_program", "(timed out)"),
+    ],
+)
+def test_a_cluster_that_is_not_there_is_one_line_and_exit_code_2(
+    address: str,
+    said: str,
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    address = request.getfixturevalue(address) if address.endswith("_program") else address
+    monkeypatch.setattr("sys.argv", ["liquid-study", "power", "rek2024", "--cluster", address])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+
+
+@needs_distributed
+def test_without_the_extra_one_line_says_what_to_install(dask_cluster: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(WorkerError, match=r"pip install 'liquid-study\[cluster\]'"):
+        open_executor(Workers(cluster=dask_cluster))
