@@ -4,6 +4,7 @@ import csv
 import re
 import shutil
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
 
 import numpy as np
@@ -269,6 +270,21 @@ def test_without_the_library_one_line_says_what_to_install(monkeypatch, tmp_path
     assert isinstance(finished.exception, StudyError)
     assert "pip install ngsolve" in str(finished.exception)
     assert CliRunner().invoke(cfd, ["--solve"]).exit_code == 2
+
+
+def test_cases_are_solved_by_an_executor_and_stored_under_their_names(monkeypatch, tmp_path):
+    monkeypatch.setattr(solver, "library", lambda: None)
+    monkeypatch.setattr(solver, "motion_table", lambda case, flow, coarse: f"{case.name} {flow} {coarse}".encode())
+    monkeypatch.setattr(solver, "steady_table", lambda: b"steady")
+    monkeypatch.setattr(solver, "Flow", lambda grid: f"ball {grid.ball}")
+    said = []
+    solver._flow.cache_clear()
+    with ThreadPoolExecutor(2) as executor:
+        written = solver.solve(tmp_path / "new", executor, said.append)
+    solver._flow.cache_clear()
+    assert [path.name for path in written] == [*(f"{name}.csv" for name in NAMES), "steady.csv"]
+    assert [path.read_text("utf-8") for path in written] == [*(f"{it} ball 0.1 ball 0.14" for it in NAMES), "steady"]
+    assert said[0] == f"{NAMES[0]}.csv, 1 of 5 ..."
 
 
 @pytest.fixture(scope="module")
