@@ -109,10 +109,18 @@ class KeptCases(CancellingExecutor):
             self.stored += 1
 
 
+class _KeyPickler(pickle.Pickler):
+    """Pickles sets in one order, whatever the hashes of this start."""
+
+    def persistent_id(self, value: object) -> object:
+        """Return what stands for a set."""
+        return sorted(map(_key_of, value)) if isinstance(value, set | frozenset) else None
+
+
 def _key_of(call: object) -> bytes:
     """Return a digest of a call, which does not depend on which of its values are one object."""
     content = io.BytesIO()
-    pickler = pickle.Pickler(content, pickle.HIGHEST_PROTOCOL)
+    pickler = _KeyPickler(content, pickle.HIGHEST_PROTOCOL)
     pickler.fast = True
     pickler.dump(call)
     return hashlib.sha256(content.getbuffer()).digest()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -126,6 +128,30 @@ def test_another_program_or_library_has_other_cases(
 def test_other_arguments_are_another_case(store: Path, computed: Path, tmp_path: Path) -> None:
     compute(store, computed, range(4), stop_after=4)
     assert compute(store, tmp_path, range(4)).reused == 0
+
+
+def test_a_case_is_the_same_with_other_hashes() -> None:
+    """A protocol holds sets of names, whose order differs from one start to the next."""
+    program = (
+        "from study_app.protocol.load import load; from study_app.workers.kept_cases import _key_of;"
+        "print(_key_of((load('viscosityjnd'), frozenset('abc'))).hex(), list(set('abcdefgh')))"
+    )
+    keys, orders = zip(
+        *(
+            subprocess.run(
+                [sys.executable, "-c", program],
+                capture_output=True,
+                text=True,
+                check=True,
+                cwd=Path(__file__).parents[2],
+                env={**os.environ, "PYTHONHASHSEED": seed},
+            ).stdout.split(maxsplit=1)
+            for seed in ("1", "2")
+        ),
+        strict=True,
+    )
+    assert orders[0] != orders[1]
+    assert keys[0] == keys[1]
 
 
 def test_cases_that_nothing_asked_for_in_a_month_are_removed(store: Path, computed: Path) -> None:

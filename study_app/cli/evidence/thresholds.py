@@ -11,8 +11,9 @@ from pathlib import Path
 import click
 
 from study_app.cli.options import EXIT_FOUND, Target
+from study_app.cli.parallel import executor_for, takes_workers
 from study_app.cli.progress import progress
-from study_app.workers.executors import open_executor
+from study_app.workers.executors import Workers
 
 
 @click.command()
@@ -25,19 +26,15 @@ from study_app.workers.executors import open_executor
     help="Studies of ten participants, of each protocol.",
 )
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
-@click.option(
-    "--workers", type=click.IntRange(-1), default=-1, metavar="N", help="Parallel processes; default: one per core."
-)
+@takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
-def validate(files: tuple[str, ...], studies: int, seed: int, workers: int, to: Path | None) -> None:
+def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, to: Path | None) -> None:
     """Recover planted thresholds: by the methods and the analysis alone, and through the whole program.
 
     For each protocol (default: viscosityjnd, delaydetect, delayjnd) many studies of ten equal observers choose levels
     and are analysed; then three participants are rehearsed with servo, store, unblinding and analysis. Every value is
     printed with its limit. Ends with exit code 3 if one exceeds it.
     """
-    if workers == 0:
-        raise click.BadParameter("0 workers cannot run: give 1 or more, or -1 for one per core", param_hint="--workers")
     from study_app.protocol.load import load
     from study_app.store.output_files import write_files
     from study_app.validation.thresholds.methods_alone import simulate
@@ -51,13 +48,12 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: int, to: 
         raise click.UsageError(str(error)) from error
     begun = time.monotonic()
     judged: list[Verdict] = []
-    with progress() as show:
+    with progress() as show, executor_for(workers) as executor:
         for source, one in chosen:
-            with open_executor("processes", workers) as executor:
-                found = []
-                for study in executor.map(partial(simulate, one, seed=seed), range(studies), chunksize=5):
-                    found.append(study)
-                    show(f"{one.name}: {len(found)} of {studies} studies", len(found) / studies)
+            found = []
+            for study in executor.map(partial(simulate, one, seed=seed), range(studies)):
+                found.append(study)
+                show(f"{one.name}: {len(found)} of {studies} studies", len(found) / studies)
             judged += verdicts(one, found)
             show(f"{one.name}: rehearsing {PEOPLE} participants")
             with tempfile.TemporaryDirectory() as folder:
