@@ -12,6 +12,8 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+from study_app.workers.executors import Workers
+
 # An example may compile on a fresh machine: how long one takes is no failure.
 hypothesis.settings.register_profile("unhurried", deadline=None)
 hypothesis.settings.load_profile("unhurried")
@@ -76,6 +78,21 @@ def dask_cluster() -> Iterator[str]:
         pytest.skip(MISSING)
     with local_cluster() as (address, _):
         yield address
+
+
+@pytest.fixture
+def worker_options(request: pytest.FixtureRequest) -> tuple[tuple[str, str], ...]:
+    """Return options that must not change a result: one worker, two, and a cluster where there can be one."""
+    from tests.workers.local_cluster import INSTALLED
+
+    here = (("--workers", "1"), ("--workers", "2"))
+    return (*here, ("--cluster", request.getfixturevalue("dask_cluster"))) if INSTALLED else here
+
+
+@pytest.fixture
+def all_workers(worker_options: tuple[tuple[str, str], ...]) -> tuple[Workers, ...]:
+    """Return the workers of these options."""
+    return tuple(Workers(cluster=it) if name == "--cluster" else Workers(int(it)) for name, it in worker_options)
 
 
 @pytest.fixture(autouse=True)

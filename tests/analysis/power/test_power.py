@@ -99,23 +99,24 @@ def test_the_counts_do_not_depend_on_the_executor(counted: tuple[int, Counts], w
 
 
 def test_the_command_writes_the_same_bytes_with_one_worker_two_and_a_cluster(
-    dask_cluster: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    worker_options: tuple[tuple[str, str], ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda protocol, **_: felt_in(protocol))
     written = []
-    for words in (("--workers", "1"), ("--jobs", "2"), ("--cluster", dask_cluster)):
-        to = tmp_path / words[0]
+    for number, words in enumerate(worker_options):
+        to = tmp_path / str(number)
         asked = ("power", "rek2024", "--sizes", "5", "--studies", "50", "--to", str(to))
         result = CliRunner().invoke(commands, [*asked, *words])
         assert result.exit_code == 0, result.output
         written.append({path.name: path.read_bytes() for path in to.iterdir()})
     assert written[0].keys() >= {"power.csv", "power.md", "power-delays.png"}
-    assert written[0] == written[1] == written[2]
+    assert all(files == written[0] for files in written)
 
 
 def test_engine_dask_and_its_variable_are_other_words_for_a_cluster(
-    dask_cluster: str, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    cluster = "tcp://lab1:8786"
     opened: list[Workers] = []
 
     def opening(workers: Workers) -> Any:
@@ -123,10 +124,10 @@ def test_engine_dask_and_its_variable_are_other_words_for_a_cluster(
         raise AnalysisError("opened")
 
     monkeypatch.setattr("study_app.cli.power.executor_for", opening)
-    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", dask_cluster)
-    for words in (("--engine", "dask"), (), ("--workers", "2"), ("--engine", "processes")):
+    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", cluster)
+    for words in (("--engine", "dask"), (), ("--jobs", "3"), ("--engine", "processes")):
         assert isinstance(CliRunner().invoke(commands, ["power", "rek2024", *words]).exception, AnalysisError)
-    assert opened == [Workers(cluster=dask_cluster), Workers(cluster=dask_cluster), Workers(2), Workers()]
+    assert opened == [Workers(cluster=cluster), Workers(cluster=cluster), Workers(3), Workers()]
 
 
 @pytest.mark.parametrize(

@@ -156,18 +156,18 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
 
 @pytest.mark.slow
 def test_rates_do_not_depend_on_the_executor(
-    rek: Simulated, dask_cluster: str, monkeypatch: pytest.MonkeyPatch
+    rek: Simulated, all_workers: tuple[Workers, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(studies, "TRUTH", 200)
     monkeypatch.setattr(simulation, "EXTENTS", EXTENTS[:1])
     monkeypatch.setattr(simulation, "ROUNDS", 1)
     found = []
-    for workers in (Workers(1), Workers(2), Workers(cluster=dask_cluster)):
+    for workers in all_workers:
         with open_executor(workers) as executor:
             *_, (done, rates) = validate(rek, 2, executor, sizes=(5,))
         assert done > 0
         found.append(table(rates))
-    assert found[0] == found[1] == found[2]
+    assert all(rates == found[0] for rates in found)
 
 
 def test_two_studies_in_one_process_have_truths_of_their_own(rek: Simulated, monkeypatch: pytest.MonkeyPatch) -> None:
