@@ -1,6 +1,6 @@
 """What it takes to compute cases by other processes: two workers against two programs, time per case, 1,000 workers.
 
-Run it by itself: ``python tests/benchmarks/workers/executors.py [ROUNDS]``; about five minutes on two free cores. With
+Run it by itself: ``python tests/benchmarks/workers/executors.py [ROUNDS]``; about two minutes on two free cores. With
 the extra ``cluster`` it starts a Dask cluster of two worker processes here.
 """
 
@@ -28,10 +28,12 @@ from study_app.workers.executors import Workers, open_executor
 from study_app.workers.kept_cases import KeptCases
 from tests.workers.local_cluster import INSTALLED, local_cluster
 
-ROUNDS = 5
-CASES = 24
+ROUNDS = 20
+CASES = 6
 """Of each of two workers in a round."""
-EMPTY = 2000
+EMPTY = 1000
+VERDICT_S = 0.011
+"""Processor time of a verdict on stability, measured over twenty cases."""
 PROJECTED = (10_000, 100_000, 1_000_000)
 WORKERS = (1, 2, 10, 100, 1000)
 ROOT = Path(__file__).parents[3]
@@ -71,50 +73,64 @@ def empty_case(_study: Plan, number: int) -> int:
     return number
 
 
-def program(workers: int, first: int, cases: int) -> None:
-    """Compute cases when a line comes on standard input; print the seconds that it took."""
+def program(workers: int) -> None:
+    """For each line (first case, number of cases) on standard input, compute them and print a line."""
     case = real_case(planned())
     with open_executor(Workers(workers)) as executor:
         list(executor.map(case, range(1000, 1000 + 4 * workers)))  # every process has begun
         print("ready", flush=True)
-        sys.stdin.readline()
-        began = time.perf_counter()
-        list(executor.map(case, range(first, first + cases)))
-        print(time.perf_counter() - began, flush=True)
+        for line in sys.stdin:
+            first, cases = map(int, line.split())
+            list(executor.map(case, range(first, first + cases)))
+            print("done", flush=True)
 
 
-def longest_s(*programs: tuple[int, int, int]) -> float:
-    """Start programs (workers, first case, cases) together; return the seconds of the slowest."""
-    running = [
-        subprocess.Popen(
-            [sys.executable, "-m", "tests.benchmarks.workers.executors", "--program", *map(str, words)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=ROOT,
-        )
-        for words in programs
-    ]
-    for one in running:
-        assert one.stdout is not None
-        assert one.stdout.readline() == "ready\n"
-    for one in running:
+def began(workers: int) -> subprocess.Popen[str]:
+    """Start a program that computes cases, and wait until its workers have begun."""
+    words = [sys.executable, "-m", "tests.benchmarks.workers.executors", "--program", str(workers)]
+    running = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+    assert running.stdout is not None
+    assert running.stdout.readline() == "ready\n"
+    return running
+
+
+def seconds(cases: int, *programs: subprocess.Popen[str]) -> float:
+    """Have programs share cases, started together; return the seconds until the last one is done."""
+    each = cases // len(programs)
+    started = time.perf_counter()
+    for number, one in enumerate(programs):
         assert one.stdin is not None
-        one.stdin.write("\n")
+        one.stdin.write(f"{number * each} {each}\n")
         one.stdin.flush()
-    return max(float(one.communicate()[0]) for one in running)
+    for one in programs:
+        assert one.stdout is not None
+        assert one.stdout.readline() == "done\n"
+    return time.perf_counter() - started
+
+
+def used_s(*programs: subprocess.Popen[str]) -> float:
+    """Return the processor time of programs and their workers."""
+    parents = [psutil.Process(one.pid) for one in programs]
+    return sum(sum(it.cpu_times()[:2]) for parent in parents for it in (parent, *parent.children(recursive=True)))
 
 
 def two_workers(rounds: int) -> None:
-    """Compare one program with two workers and two unrelated programs with one worker each."""
-    ratios = []
-    for number in range(rounds):
-        one_s = longest_s((2, 0, 2 * CASES))
-        two_s = longest_s((1, 0, CASES), (1, CASES, CASES))
-        ratios.append(two_s / one_s)
-        print(f"  round {number + 1}: two workers {one_s:6.2f} s, two programs {two_s:6.2f} s, ratio {ratios[-1]:.3f}")
+    """Compare one program with two workers and two unrelated programs with one worker each, in turns."""
+    one, two = (began(2),), (began(1), began(1))
+    before = used_s(*one), used_s(*two)
+    took = [(seconds(2 * CASES, *one), seconds(2 * CASES, *two)) for _ in range(rounds)]
+    used = used_s(*one) - before[0], used_s(*two) - before[1]
+    for running in (*one, *two):
+        running.communicate()
+    ratios = [apart_s / together_s for together_s, apart_s in took]
     print(
-        f"  two workers / two programs, throughput, median of {rounds}: {statistics.median(ratios):.3f} (goal ≥ 0.9)\n"
+        f"  {rounds} rounds of {2 * CASES} cases; ratio of throughput in each: {min(ratios):.2f} to {max(ratios):.2f}"
+    )
+    sums = [sum(one) for one in zip(*took, strict=True)]
+    print(f"  seconds: {sums[0]:.1f} and {sums[1]:.1f}; of processor time {used[0]:.1f} and {used[1]:.1f}")
+    print(
+        f"  two workers / two programs, throughput: {sums[1] / sums[0]:.3f} over all rounds, "
+        f"{statistics.median(ratios):.3f} median (goal ≥ 0.9); by processor time {used[1] / used[0]:.3f}\n"
     )
 
 
@@ -141,18 +157,18 @@ def print_parts(name: str, parts: Parts) -> None:
 
 def begin_s(executor: Executor, study: Plan) -> float:
     """Return the seconds from the first case to its result, where no process has begun."""
-    began = time.perf_counter()
+    started = time.perf_counter()
     executor.submit(_count, study, 0).result()
-    return time.perf_counter() - began
+    return time.perf_counter() - started
 
 
 def case_s(study: Plan) -> float:
     """Return the processor time of one case here [s]."""
     _count(study, 0)
-    began = time.process_time()
+    started = time.process_time()
     for batch in range(1, 5):
         _count(study, batch)
-    return (time.process_time() - began) / 4
+    return (time.process_time() - started) / 4
 
 
 def project(name: str, parts: Parts, case_s: float, begin_s: float) -> None:
@@ -162,7 +178,8 @@ def project(name: str, parts: Parts, case_s: float, begin_s: float) -> None:
     """
     serial_s = max(parts.client_s, parts.scheduler_s)
     busy = f"client and scheduler busy with {(case_s + parts.workers_s) / serial_s:.0f} workers"
-    print(f"  {name}: {1e3 * case_s:.0f} ms per case, {1e3 * serial_s:.2f} ms of one processor for each, {busy}")
+    print(f"  {name}: {1e3 * case_s:.0f} ms per case, {1e3 * serial_s:.2f} ms of one processor for each, {busy};")
+    print(f"  1,000 workers stay busy with cases of {1000 * serial_s:.1f} s and more")
     print(f"    {'cases':>10}" + "".join(f"{f'{workers} workers':>22}" for workers in WORKERS))
     for cases in PROJECTED:
         cells = []
@@ -207,11 +224,11 @@ def main() -> None:
     print(f"  first case of a new worker after {began_s:.1f} s")
     print("\nProjection from these parts: seconds, and the share of them in which every worker computes")
     project("power", there, taken_s, began_s)
-    project("a case as long as a verdict on stability", there, 0.05, began_s)
+    project("a case as short as a verdict on stability", there, VERDICT_S, began_s)
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--program"]:
-        program(*map(int, sys.argv[2:5]))
+        program(int(sys.argv[2]))
     else:
         main()
