@@ -79,7 +79,7 @@ def executor_for(workers: Workers) -> Iterator[Executor]:
             yield kept
     except BaseException:
         if kept.stored:
-            click.echo(f"{kept.stored} finished cases are kept: the same command continues with them", err=True)
+            click.echo(f"finished cases kept: {kept.stored}; the same command continues with them", err=True)
         raise
     if kept.reused:
-        click.echo(f"{kept.reused} cases were finished by an earlier start", err=True)
+        click.echo(f"cases finished by an earlier start: {kept.reused}", err=True)

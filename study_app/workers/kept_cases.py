@@ -110,7 +110,7 @@ class KeptCases(CancellingExecutor):
 
 
 class _KeyPickler(pickle.Pickler):
-    """Pickles sets in one order, whatever the hashes of this start."""
+    """Pickles sets in the same order in every start; their hashes differ."""
 
     def persistent_id(self, value: object) -> object:
         """Return what stands for a set."""

@@ -51,12 +51,12 @@ class Parts(NamedTuple):
 def planned() -> Plan:
     """Return what power estimation computes with, without rehearsals."""
     protocol = load("rek2024")
-    felt = {
+    features = {
         (block.id, name): (Felt(0.3 + 0.6 * number, 4.0, 0.1, 0.01, 0.03, 0.006 + protocol.delay_s(name)),)
         for block in protocol.main_blocks
         for number, name in enumerate(block.conditions)
     }
-    return plan(protocol, felt)
+    return plan(protocol, features)
 
 
 def real_case(study: Plan) -> Callable[[int], object]:
