@@ -27,6 +27,7 @@ NEW_KEYS: Final = (
     "questionnaires.*.items.*.kind",
     "questionnaires.*.items.*.show_if",
     "liquids.*.drag.damping_nspm",
+    "liquids.*.non_newtonian",
     "scene.fade_s",
     "conditions.*.ball",
     *TABLES,
@@ -36,9 +37,9 @@ NEW_KEYS: Final = (
 )
 """Keys that belong to format 2, as patterns of places in the file."""
 NEW_VALUES: Final = {
-    "liquids.*.drag.law": "linear",
-    "liquids.*.effects.*": "unsteady_drag",
-    "tasks.*.kind": "follow",
+    "liquids.*.drag.law": ("linear",),
+    "liquids.*.effects.*": ("unsteady_drag", "non_newtonian"),
+    "tasks.*.kind": ("follow",),
 }
 """Values of earlier keys that belong to format 2."""
 
@@ -64,10 +65,10 @@ def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
     for pattern in NEW_KEYS:
         for path, _ in entries(document, pattern):
             yield Fault(path, "belongs to format 2", HINT)
-    for pattern, value in NEW_VALUES.items():
+    for pattern, values in NEW_VALUES.items():
         for path, stated in entries(document, pattern):
-            if stated == value:
-                yield Fault(path, f'"{value}" belongs to format 2', HINT)
+            if stated in values:
+                yield Fault(path, f'"{stated}" belongs to format 2', HINT)
     for path, labels in entries(document, "scales.*.labels.*"):
         if isinstance(labels, tuple) and len(labels) != POINTS:
             bound = "needs at least" if len(labels) < POINTS else "more than"
@@ -118,7 +119,10 @@ def with_scene_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def needed_by(scene: Scene) -> int:
     """Return the format that a scene file needs."""
-    newer = any(liquid.drag.law == "linear" or "unsteady_drag" in liquid.effects for liquid in scene.liquids)
+    newer = any(
+        liquid.drag.law == "linear" or "unsteady_drag" in liquid.effects or liquid.non_newtonian is not None
+        for liquid in scene.liquids
+    )
     return 2 if newer or scene.fade_s != FADE_S else scene.format
 
 

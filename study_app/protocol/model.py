@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
+from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import (
     BeforeValidator,
@@ -222,12 +222,9 @@ class StudyLiquid(Liquid):
 
     model_config = ConfigDict(title="Liquid")
 
-    body: OwnBody | None = Field(default=None, description="The ball in this liquid, where it is not the scene's.")
+    LATER: ClassVar[frozenset[str]] = Liquid.LATER | {"body"}
 
-    @model_serializer(mode="wrap")
-    def _without_no_body(self, serialized: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what earlier versions did not know: sealed keys keep their bytes."""
-        return {name: value for name, value in serialized(self).items() if name != "body" or value is not None}
+    body: OwnBody | None = Field(default=None, description="The ball in this liquid, where it is not the scene's.")
 
     @property
     def alone(self) -> Liquid:

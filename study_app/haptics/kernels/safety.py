@@ -115,6 +115,7 @@ def limit_slope(model: Any, safety: Record, sample: Record) -> None:
 
     Drag that builds up late gets what is left of B, at the greater speed that it belongs to: in fast strokes it follows
     so soon that freed handles of 50 g and less swung at scales of 10 and more.
+    A force that grows more steeply than B brings its excess along.
     Where the body passes between liquids they share the limit B, so that their sum keeps it.
     """
     parameters = model.parameters[0]
@@ -124,6 +125,10 @@ def limit_slope(model: Any, safety: Record, sample: Record) -> None:
     for i in range(parameters.liquids):
         local = model.liquid_states[i]
         if local.share > 0.0:
+            if square(local.excess_n) > 0.0:
+                sample.limiters |= LIMITER_SLOPE
+                for axis in range(3):
+                    sample.device_force_n[axis] -= local.excess_n[axis]
             most_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * local.share / shares
             if square(local.damping_n) > most_nspm * most_nspm * square(local.relative_mps):
                 sample.limiters |= LIMITER_SLOPE

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import part
-from study_app.haptics.model.layout import Record
+from study_app.haptics.model.layout import GROWS_AS_SPEED, GROWS_LESS, Record
 
 
 @part
@@ -15,8 +15,8 @@ def filter_storage(model: Any, passivity: Record) -> float:
 
     With v̂' = (v − v̂)/τ a damper F(v̂) takes ∫F v dt = ∫F v̂ dt + τ∫F dv̂ from the hand: the second term is a storage,
     K τ F v̂ with K = 1/3 for a force that grows as v̂², 1/2 for one that grows as v̂. Where only the share s of F is left
-    at the force limit, K = 1 - 2/3 √s and 1 - s/2. A loop that has shown a debt is believed less of it, by the
-    controller's gain: a swinging loop would live on its storage.
+    at the force limit, K = 1 - 2/3 √s and 1 - s/2; of a force that grows less than v̂, K is at most 1. A loop that has
+    shown a debt is believed less of it, by the controller's gain: a swinging loop would live on its storage.
     """
     parameters, state = model.parameters[0], model.state[0]
     lag_s = parameters.fallback_lag_s if state.kalman.distrusted else parameters.filter_lag_s
@@ -29,6 +29,8 @@ def filter_storage(model: Any, passivity: Record) -> float:
     if power_w <= 0.0:
         return 0.0
     share = 1.0 - 2.0 / 3.0 * math.sqrt(passivity.norm_share)
-    if state.linear:
+    if state.growth == GROWS_AS_SPEED:
         share = max(share, 1.0 - 0.5 * passivity.norm_share)
+    elif state.growth == GROWS_LESS:
+        share = 1.0
     return float(passivity.gain * share * lag_s * power_w / parameters.scale)

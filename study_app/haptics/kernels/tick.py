@@ -15,6 +15,7 @@ from study_app.haptics.kernels.effects.current import current_velocity
 from study_app.haptics.kernels.effects.drag import drag_force
 from study_app.haptics.kernels.effects.history import basset_force
 from study_app.haptics.kernels.effects.local_wake import deposit_local_wake, local_wake_velocity
+from study_app.haptics.kernels.effects.non_newtonian import non_newtonian_force
 from study_app.haptics.kernels.effects.surface import wetted_fraction
 from study_app.haptics.kernels.effects.unsteady_drag import unsteady_drag_force
 from study_app.haptics.kernels.effects.wake import update_wake, wake_velocity
@@ -31,11 +32,12 @@ from study_app.haptics.model.effects import (
     drag,
     history,
     local_wake,
+    non_newtonian,
     surface,
     unsteady_drag,
     wake,
 )
-from study_app.haptics.model.layout import LIMITER_ESTIMATOR, STATUS_OK, Record
+from study_app.haptics.model.layout import GROWS_AS_SQUARE, LIMITER_ESTIMATOR, STATUS_OK, Record
 
 
 @kernel
@@ -74,7 +76,7 @@ def step_model(model: Any, interval_s: float, delay_ticks: int) -> None:
     clear(state.wake_mps)
     clear(state.drift_mps)
     state.returnable_j = 0.0
-    state.linear = 0
+    state.growth = GROWS_AS_SQUARE
     for i in range(parameters.liquids):
         if model.liquid_states[i].share > 0.0:
             apply_effects(model, i, interval_s, delay_ticks)
@@ -95,6 +97,7 @@ def apply_effects(model: Any, i: int, interval_s: float, delay_ticks: int) -> No
     copy(state.estimate_mps if liquid.drag.law == drag.LAW_LINEAR else state.velocity_mps, local.motion_mps)
     clear(local.wake_mps)
     clear(local.damping_n)
+    clear(local.excess_n)
     local.late_mps = 0.0
     local.inertial = 0
     if liquid.effects & current.BIT:
@@ -115,6 +118,8 @@ def apply_effects(model: Any, i: int, interval_s: float, delay_ticks: int) -> No
         basset_force(parameters, liquid, local, state, rows, delay_ticks, interval_s)
     if liquid.effects & unsteady_drag.BIT:
         unsteady_drag_force(parameters, liquid, local, state, delay_ticks, interval_s)
+    if liquid.effects & non_newtonian.BIT:
+        non_newtonian_force(parameters, liquid, local, state, delay_ticks, interval_s)
     if liquid.effects & wake.BIT:
         update_wake(liquid, local, state, rows.elements, rows.segments, interval_s)
     if liquid.effects & local_wake.BIT:

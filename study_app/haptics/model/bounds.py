@@ -15,6 +15,7 @@ from functools import cached_property
 from study_app.haptics.model.effect import GRAVITY_MPS2, Flow
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.effects.drag import resistance_n
+from study_app.haptics.model.effects.non_newtonian import steady_n
 from study_app.haptics.model.scene import Effect, Knee, Liquid, Scene
 
 
@@ -109,8 +110,12 @@ class Extremes:
 
     def drag_by_flow_n(self, flow_mps: float) -> float:
         """Return F(v + u) − F(v), the drag that a flow u adds at most."""
-        faster_n = resistance_n(self.scene, self.liquid, self.speed_mps + flow_mps)
-        return faster_n - resistance_n(self.scene, self.liquid, self.speed_mps)
+        return self._resisting_n(self.speed_mps + flow_mps) - self._resisting_n(self.speed_mps)
+
+    def _resisting_n(self, speed_mps: float) -> float:
+        if self.liquid.non_newtonian is not None:
+            return sum(steady_n(self.scene, self.liquid, speed_mps))
+        return resistance_n(self.scene, self.liquid, speed_mps)
 
     def inertial_n(self, accelerated_n: Callable[[Extremes, float, float], float]) -> float:
         """Return the force at the body's greatest acceleration and in the shear of the flow together."""

@@ -119,7 +119,7 @@ class Effect:
     choose : callable, optional
         The table that the gate gives it, and why, in words.
     note : callable, optional
-        What follows "named" where a file names it.
+        What follows why it is chosen or named, where it has no ``choose``.
     model : Any
         Type of its table in a liquid; None without a table.
     default : Any

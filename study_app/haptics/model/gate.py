@@ -119,6 +119,10 @@ def _chosen(
     for name, (_, table_why) in _tables(scene, liquid).items():
         if judged[name][0]:
             judged[name] = True, f"{judged[name][1]}; {table_why}"
+    for name, (taken, why) in judged.items():
+        note = NAMED[name].note
+        if taken and note is not None and NAMED[name].choose is None:
+            judged[name] = True, f"{why}{note(liquid)}"
     return judged
 
 

@@ -106,6 +106,11 @@ REGION_EVERYWHERE = 0
 REGION_BOX = 1
 REGION_CYLINDER = 2
 
+# How forces grow with the speed.
+GROWS_AS_SQUARE = 0
+GROWS_AS_SPEED = 1
+GROWS_LESS = 2
+
 KNEE_NONE = 0
 KNEE_SQRT = 1
 KNEE_SQUARE = 2
@@ -180,7 +185,7 @@ STATE = np.dtype(
         ("force_n", np.float64, (3,)),  # sum of the effects
         ("lift_n", np.float64, (3,)),  # what of it is buoyancy and weight
         ("returnable_j", np.float64),  # the most that effects can give back, times the scale
-        ("linear", np.int64),  # 1 where a force grows as the speed, 0 where all grow as its square
+        ("growth", np.int64),  # GROWS_*: of the force that grows least with the speed
     ],
     align=True,
 )
@@ -207,6 +212,7 @@ LIQUID_STATE = np.dtype(
         ("relative_mps", np.float64, (3,)),  # w = v - v_current - v_wake
         ("ticks", np.int64),  # ticks since the body entered; 0 where effects begin anew
         ("damping_n", np.float64, (3,)),  # sum of the forces that are held to the slope limit
+        ("excess_n", np.float64, (3,)),  # what of the forces grows more steeply than the slope limit
         ("late_n", np.float64, (3,)),  # drag that builds up late, held to what the slope limit leaves
         ("late_mps", np.float64),  # the speed that it belongs to, |w| or that of the wake; 0 where there is none
         ("prompt_nspm", np.float64),  # the slope of the drag that acts at once

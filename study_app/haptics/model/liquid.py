@@ -7,10 +7,20 @@ file in ``haptics.kernels.effects``.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
-from pydantic import Discriminator, Field, Tag, create_model, model_validator
+from pydantic import (
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    create_model,
+    model_serializer,
+    model_validator,
+)
 
+from study_app.haptics.model.effect import Effect as EffectDescriptor
 from study_app.haptics.model.effects import EFFECTS, NAMED
 from study_app.haptics.model.ranges import DensityKgM3, Extent, Frozen, Metres, ViscosityPaS
 
@@ -58,6 +68,8 @@ Region: TypeAlias = Annotated[Everywhere | Box | Cylinder, Field(discriminator="
 class _Liquid(Frozen):
     """The fields that are no effect's table."""
 
+    LATER: ClassVar[frozenset[str]] = frozenset(it.name for it in EFFECTS if it.format > 1)
+
     id: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=MAX_ID)
     density_kg_m3: DensityKgM3
     viscosity_pa_s: ViscosityPaS | None = None
@@ -67,6 +79,9 @@ class _Liquid(Frozen):
     @model_validator(mode="after")
     def _effects_have_what_they_need(self) -> _Liquid:
         if self.effects == "auto":
+            self._has_no_problem(
+                it for it in EFFECTS if it.default is None and getattr(self, it.name, None) is not None
+            )
             return self
         if len(set(self.effects)) < len(self.effects):
             raise ValueError(f"an effect is named twice in {list(self.effects)}")
@@ -83,11 +98,19 @@ class _Liquid(Frozen):
                     raise ValueError(
                         f'"{other}" and "{effect.name}" are two models of the same thing: select one of them'
                     )
-        for effect in called_for:
+        self._has_no_problem(called_for)
+        return self
+
+    def _has_no_problem(self, effects: Iterable[EffectDescriptor]) -> None:
+        for effect in effects:
             problem = effect.problem(self) if effect.problem is not None else None
             if problem is not None:
                 raise ValueError(problem)
-        return self
+
+    @model_serializer(mode="wrap")
+    def _without_later_tables(self, serialized: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what earlier versions did not know, where it says nothing: sealed keys keep their bytes."""
+        return {name: it for name, it in serialized(self).items() if it is not None or name not in self.LATER}
 
 
 _DOC = """A region with a fluid, and the effects it calls for; ``"auto"`` lets ``haptics.model.gate`` choose them.

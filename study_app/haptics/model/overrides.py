@@ -43,7 +43,7 @@ def override_all(scene: Scene, values: Mapping[str, object]) -> Scene:
     StudyError
         An unknown name, or a value out of range.
     """
-    tree = scene.model_dump()
+    tree = _tree(scene)
     for name, value in values.items():
         for table, field in _places(_tables(tree), name):
             _set(table, field, value)
@@ -63,7 +63,7 @@ def value_of(scene: Scene, name: str) -> float:
     StudyError
         The name is unknown, or its value is not a number.
     """
-    table, field = _places(_tables(scene.model_dump()), name)[0]
+    table, field = _places(_tables(_tree(scene)), name)[0]
     value = table[field]
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise StudyError(f"{_shown(name)} is not a number: it is {_shown(value)}")
@@ -72,7 +72,7 @@ def value_of(scene: Scene, name: str) -> float:
 
 def number_names(scene: Scene) -> tuple[str, ...]:
     """Return the plain names of a scene's numbers, sorted."""
-    leaves = {key: value for rows in _tables(scene.model_dump()).values() for row in rows for key, value in row.items()}
+    leaves = {key: value for rows in _tables(_tree(scene)).values() for row in rows for key, value in row.items()}
     numbers = (name for name, value in leaves.items() if isinstance(value, int | float) and not isinstance(value, bool))
     return tuple(sorted(numbers))
 
@@ -90,6 +90,15 @@ def _reason(place: tuple[int | str, ...], message: str) -> str:
     if "valid dictionary" in said:
         said = "is a table of parameters: set one of them by its name, such as --set drag_coefficient=0.42"
     return f"{name}: {said}" if name else said
+
+
+def _tree(scene: Scene) -> dict[str, Any]:
+    """Return a scene as tables, with every table that a liquid may have."""
+    tree = scene.model_dump()
+    for liquid in tree["liquids"]:
+        for name in _OF_A_LIQUID:
+            liquid.setdefault(name, None)
+    return tree
 
 
 def _tables(tree: dict[str, Any]) -> Tables:

@@ -7,6 +7,7 @@ from typing import Final, Literal, NamedTuple
 
 from study_app.haptics.model.bounds import met_mps
 from study_app.haptics.model.effects.drag import resistance_n
+from study_app.haptics.model.effects.non_newtonian import VISCOUS_SHARE, steady_n
 from study_app.haptics.model.effects.unsteady_drag import even_n
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.limits import slope_limit
@@ -31,13 +32,17 @@ def steady(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
     one tick of delay.
     """
     (liquid,) = resolve(scene).liquids
-    if not {"drag", "unsteady_drag"} & set(liquid.effects):
+    if not {"drag", "unsteady_drag", "non_newtonian"} & set(liquid.effects):
         return Steady(0.0, 0.0, None)
     speed_mps = met_mps(scene, liquid, scene.scale * hand_mps)
     slope_n = slope_limit(1 / scene.rate_hz, 1, scene.velocity) * speed_mps / scene.scale
     if "drag" in liquid.effects:
         drag_n = resistance_n(scene, liquid, speed_mps, liquid.drag.law)
         stable_n = min(drag_n, slope_n)
+    elif "non_newtonian" in liquid.effects:
+        drag_n = sum(steady_n(scene, liquid, speed_mps))
+        held_n, viscous_n = steady_n(scene, liquid, speed_mps, slope_n / speed_mps if speed_mps > 0 else math.inf)
+        stable_n = held_n + min(viscous_n, slope_n * (VISCOUS_SHARE if held_n > 0 else 1.0))
     else:
         drag_n, stokes_n = even_n(scene, liquid, speed_mps)
         most_late_n = math.sqrt(2) * max(slope_n - stokes_n, 0.0)  # the ball moves as fast as its wake

@@ -76,7 +76,7 @@ def test_every_parameter_is_reached_by_its_table_and_most_by_their_name_alone(fe
     assert shared <= {
         *("density_kg_m3", "law", "centre_m", "viscosity_pa_s", "speed_mps", "acceleration_mps2", "depth_m", "reach_m"),
         *("length", "scaling", "exponent", "decay", "axes", "samples", "tolerance_m", "filter_s", "smoothing_s"),
-        "damping_nspm",
+        *("damping_nspm", "non_newtonian"),
     }
 
 

@@ -11,7 +11,7 @@ from study_app.haptics.model.effects.drag import (
     LAW_HAIDER_LEVENSPIEL,
     LAW_LINEAR,
 )
-from study_app.haptics.model.layout import Record
+from study_app.haptics.model.layout import GROWS_AS_SPEED, Record
 
 _schiller_naumann = part(laws.schiller_naumann)
 _haider_levenspiel = part(laws.haider_levenspiel)
@@ -34,7 +34,7 @@ def drag_force(liquid: Record, local: Record, state: Record) -> None:
         state.force_n[axis] += force_n
         local.damping_n[axis] += force_n
     if liquid.drag.law != LAW_CONSTANT:
-        state.linear = 1
+        state.growth = max(state.growth, GROWS_AS_SPEED)
 
 
 @part

@@ -26,7 +26,7 @@ from study_app.haptics.kernels.effects.added_mass import accelerate, storing_squ
 from study_app.haptics.kernels.vector import clear, copy, dot, norm, square
 from study_app.haptics.model import laws
 from study_app.haptics.model.effects.unsteady_drag import EXPONENTIALS
-from study_app.haptics.model.layout import Record
+from study_app.haptics.model.layout import GROWS_AS_SPEED, Record
 
 MEMORY_LOSS = 0.281  # c_m
 EXCESS_GAIN = 0.873  # c_y
@@ -74,7 +74,7 @@ def unsteady_drag_force(
         state.force_n[axis] += stokes_n + local.late_n[axis] + force_n[axis]
     local.late_mps = u_mps
     local.prompt_nspm = law.stokes_nspm * local.frontal
-    state.linear = 1
+    state.growth = max(state.growth, GROWS_AS_SPEED)
     inertia_kg = (law.mass_kg + 0.5 * law.factor_kg_rs * math.sqrt(PERIOD_S)) * local.share
     state.returnable_j += (
         0.5 * liquid.inertia_share[delay_ticks] * inertia_kg * storing_square(parameters, law, local, tracks)

@@ -129,7 +129,7 @@ EFFECT = Effect(
     flow=flow,
     model=Current,
     missing='kind = "uniform", "channel" or "vortex", ...',
-    through=("drag", "unsteady_drag"),
+    through=("drag", "unsteady_drag", "non_newtonian"),
     parameters=PARAMETERS,
     state=STATE,
     fill=_fill,

@@ -1,0 +1,185 @@
+"""Non-Newtonian drag: yield stress, shear thinning and thickening, elasticity, of a ball in creeping flow.
+
+With w the velocity relative to the liquid, τ_v = K (|w|/D)^n and η the effective viscosity F/(3πD|w|)::
+
+    Herschel–Bulkley  F = 3πD² [X(n) τ_v + 1.7 n^1.5 √(τ_v τ_y)] w/|w| + F_y s/s_y,    F_y = 3πD² · 1.157 τ_y
+    Carreau           F = 3πη₀D w [1 + (0.275 · 2λ|w|/D)²]^((n−1)/2)
+    Maxwell           F = 3πη₀D v,    v' = (w − v)/λ
+    shear thickening  F = 3πηD w, η from η₀ to the thickened viscosity between the onset γ̇ = 2|w|/D and twice that
+
+All are multiplied by φ(Re), Re = ρ|w|D/η (``laws.finite_reynolds``), and oppose the motion; what φ adds to F_y acts
+along w, so that the elastic stiffness stays. X: Gu & Tanner 1985. The
+elastic displacement s is that of an elastic-plastic solid, ds = dp − |dp| s/s_y: at rest the liquid holds the ball, and
+it flows once the force exceeds F_y; |dp| leaves out what is within two encoder counts. s and v follow positions, which
+lag less than a velocity estimate: the loop is stable with F_y/s_y up to 400 N/m at the hand where the viscous part
+keeps 0.75 of the slope limit, and with any λ. A power law has F_y = 0, a Bingham liquid n = 1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from study_app.haptics.kernels.compiled import part
+from study_app.haptics.kernels.vector import clear, copy, norm, square
+from study_app.haptics.model import rheology
+from study_app.haptics.model.effects.non_newtonian import (
+    KIND_CARREAU,
+    KIND_HERSCHEL_BULKLEY,
+    KIND_MAXWELL,
+    VISCOUS_SHARE,
+)
+from study_app.haptics.model.laws import finite_reynolds
+from study_app.haptics.model.layout import GROWS_AS_SPEED, GROWS_LESS, Record
+
+SLACK_COUNTS = 2.0
+"""Of the encoder: motion within them relaxes no stress, or a hand at rest would creep by noise. [choice]"""
+
+MOST_STRAIN = 3.0
+"""In a tick that strains the liquid more, it flows: the shear stress is that of yielding then."""
+
+_herschel_bulkley = part(rheology.herschel_bulkley)
+_carreau = part(rheology.carreau)
+_shear_thickening = part(rheology.shear_thickening)
+_over_stokes = part(finite_reynolds)
+
+
+@part
+def non_newtonian_force(
+    parameters: Record, liquid: Record, local: Record, state: Record, delay_ticks: int, interval_s: float
+) -> None:
+    """Add F to the force, (3,) [N], by the share φ of the frontal area.
+
+    The slope limit B holds the viscous part. What exceeds it in an elastic liquid, and what grows more steeply in one
+    that thickens, is passed on as ``local.excess_n``, for the safety layer to take away.
+    """
+    law, tracks = liquid.non_newtonian, local.non_newtonian
+    if local.ticks == 0:
+        clear(tracks.strain)
+        clear(tracks.ahead_m)
+        clear(tracks.velocity_mps)
+        clear(tracks.step_m)
+    else:
+        for axis in range(3):
+            drift_mps = state.velocity_mps[axis] - local.motion_mps[axis]
+            tracks.step_m[axis] = state.position_m[axis] - state.previous_m[axis] - drift_mps * interval_s
+    limit_nspm = parameters.slope_limit_nspm[delay_ticks]
+    state.growth = max(state.growth, GROWS_AS_SPEED)
+    if law.kind == KIND_HERSCHEL_BULKLEY:
+        _yielding(parameters, law, tracks, local, state, limit_nspm)
+    elif law.kind == KIND_MAXWELL:
+        _viscoelastic(law, tracks, local, state, interval_s)
+    else:
+        _viscous(law, local, state, limit_nspm)
+
+
+@part
+def _yielding(parameters: Record, law: Any, tracks: Record, local: Record, state: Record, limit_nspm: float) -> None:
+    """Herschel–Bulkley; what the elastic displacement stores, ½ F_y s²/s_y, it may give back."""
+    w, strain = local.relative_mps, tracks.strain
+    speed_mps = norm(w)
+    viscous_n = _herschel_bulkley(speed_mps, law.viscous, law.plastic, law.exponent)
+    whole_n = viscous_n + law.yield_n
+    beyond_n = (_inertial_factor(law, whole_n, speed_mps) - 1.0) * whole_n
+    if speed_mps > 0.0:
+        resistance_nspm = local.frontal * (viscous_n + beyond_n) / speed_mps
+        stable_nspm = min(resistance_nspm, VISCOUS_SHARE * limit_nspm) if law.yield_n > 0.0 else resistance_nspm
+        _resist(local, state, w, stable_nspm)
+        _exceed(local, state, w, resistance_nspm - stable_nspm)
+    state.growth = GROWS_LESS
+    if law.yield_n == 0.0:
+        return
+    stable = min(limit_nspm / law.full_nspm, 1.0)
+    per_m = law.stiffness_npm * stable * stable / law.yield_n
+    x = min(_slipped_m(tracks, SLACK_COUNTS * parameters.count_m * parameters.scale) * per_m, MOST_STRAIN)
+    share = _mean(x)
+    for axis in range(3):
+        strain[axis] += share * (tracks.step_m[axis] * per_m - x * strain[axis])
+    shortening = 1.0 / max(norm(strain), 1.0)
+    for axis in range(3):
+        strain[axis] *= shortening
+        state.force_n[axis] -= local.frontal * law.yield_n * strain[axis]
+    state.returnable_j += 0.5 * local.frontal * law.yield_n * square(strain) / per_m
+
+
+@part
+def _mean(x: float) -> float:
+    """Return (1 − e^(−x))/x, the mean of a decay over a tick, to 1 % up to x = 2; x times it is less than 1."""
+    return 1.0 / (1.0 + x * (0.5 + x / 12.0))
+
+
+@part
+def _slipped_m(tracks: Record, slack_m: float) -> float:
+    """Return how far the ball moved in this tick, encoder noise and dither left out: a play operator's step."""
+    ahead_m = tracks.ahead_m
+    for axis in range(3):
+        ahead_m[axis] += tracks.step_m[axis]
+    distance_m = norm(ahead_m)
+    if distance_m <= slack_m:
+        return 0.0
+    for axis in range(3):
+        ahead_m[axis] *= slack_m / distance_m
+    return distance_m - slack_m
+
+
+@part
+def _viscoelastic(law: Any, tracks: Record, local: Record, state: Record, interval_s: float) -> None:
+    """Maxwell; the slope limit holds F at |v|: at |w| it would remove the push after a stop."""
+    w, v = local.relative_mps, tracks.velocity_mps
+    if law.relaxation_s == 0.0:
+        copy(w, v)
+    else:
+        x = interval_s / law.relaxation_s
+        share = _mean(x)
+        for axis in range(3):
+            v[axis] += share * (tracks.step_m[axis] / law.relaxation_s - x * v[axis])
+    speed_mps = norm(v)
+    ratio = local.frontal * _inertial_factor(law, law.stokes_nspm * speed_mps, speed_mps)
+    for axis in range(3):
+        local.late_n[axis] = -ratio * law.stokes_nspm * v[axis]
+        state.force_n[axis] += local.late_n[axis]
+    local.late_mps = speed_mps
+    local.prompt_nspm = 0.0
+    state.returnable_j += 0.5 * ratio * law.stokes_nspm * law.relaxation_s * square(v)
+
+
+@part
+def _viscous(law: Any, local: Record, state: Record, limit_nspm: float) -> None:
+    """Carreau and shear thickening."""
+    w = local.relative_mps
+    speed_mps = norm(w)
+    if speed_mps == 0.0:
+        return
+    if law.kind == KIND_CARREAU:
+        force_n = _carreau(speed_mps, law.stokes_nspm, law.time_spm, law.exponent)
+        state.growth = GROWS_LESS
+        _resist(local, state, w, local.frontal * _inertial_factor(law, force_n, speed_mps) * force_n / speed_mps)
+        return
+    force_n = _shear_thickening(speed_mps, law.stokes_nspm, law.thickened_nspm, law.onset_mps, math.inf)
+    stable_n = _shear_thickening(speed_mps, law.stokes_nspm, law.thickened_nspm, law.onset_mps, limit_nspm)
+    ratio = local.frontal * _inertial_factor(law, force_n, speed_mps) / speed_mps
+    _resist(local, state, w, ratio * stable_n)
+    _exceed(local, state, w, ratio * (force_n - stable_n))
+
+
+@part
+def _resist(local: Record, state: Record, w: Any, resistance_nspm: float) -> None:
+    """Add −R w to the force, as one that the slope limit holds."""
+    for axis in range(3):
+        force_n = -resistance_nspm * w[axis]
+        local.damping_n[axis] += force_n
+        state.force_n[axis] += force_n
+
+
+@part
+def _exceed(local: Record, state: Record, w: Any, resistance_nspm: float) -> None:
+    """Add −R w to the force, as one that exceeds the slope limit."""
+    for axis in range(3):
+        local.excess_n[axis] = -resistance_nspm * w[axis]
+        state.force_n[axis] += local.excess_n[axis]
+
+
+@part
+def _inertial_factor(law: Any, force_n: float, speed_mps: float) -> float:
+    """Return φ(Re) of `rheology.inertial_factor`."""
+    return float(_over_stokes(law.inertia_kg_m * speed_mps * speed_mps / force_n)) if force_n > 0.0 else 1.0

@@ -1,0 +1,181 @@
+"""Non-Newtonian drag: a liquid with a yield stress, shear thinning or thickening, or elasticity resists motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from study_app.haptics.model.effect import FLOAT, INT, Effect, Fields, Parameter
+from study_app.haptics.model.rheology import (
+    CARREAU_RATE,
+    RESOLVED_S,
+    Carreau,
+    HerschelBulkley,
+    Maxwell,
+    Rheology,
+    even_n,
+    viscous_factors,
+    yield_n,
+)
+
+if TYPE_CHECKING:
+    from study_app.haptics.model.bounds import Extremes
+    from study_app.haptics.model.liquid import Liquid
+    from study_app.haptics.model.scene import Scene
+
+BIT = 1 << 9
+
+KIND_HERSCHEL_BULKLEY = 0
+KIND_CARREAU = 1
+KIND_MAXWELL = 2
+KIND_SHEAR_THICKENING = 3
+
+STIFFNESS_NPM: Final = 400.0
+"""Greatest elastic stiffness at the hand below the yield stress, of a loop that is stable with `FULL_NSPM`."""
+FULL_NSPM: Final = 53.0
+VISCOUS_SHARE: Final = 0.75
+"""Of the slope limit, for the viscous force of a liquid that is also elastic. [choice]"""
+
+_REPLACES: Final = ("drag", "unsteady_drag", "history")
+_START: Final[dict[str, dict[str, float]]] = {
+    "herschel-bulkley": {"yield_stress_pa": 15.0, "consistency_pa_sn": 10.0, "flow_index": 0.25},
+    "carreau": {"zero_shear_viscosity_pa_s": 6.0, "time_constant_s": 0.15, "flow_index": 0.3},
+    "maxwell": {"zero_shear_viscosity_pa_s": 30.0, "relaxation_time_s": 0.3},
+    "shear-thickening": {
+        "zero_shear_viscosity_pa_s": 1.0,
+        "thickened_viscosity_pa_s": 20.0,
+        "onset_shear_rate_per_s": 5.0,
+    },
+}
+"""What the lab begins with: ketchup, shampoo, slime and cornstarch in water."""
+_NOT_IN_IT: Final = "no thixotropy, no impact, no fracture, no yielding by unsteady flow"
+
+
+def steady_n(scene: Scene, liquid: Liquid, speed_mps: float, steepest_nspm: float = math.inf) -> tuple[float, float]:
+    """Return the force [N] against an even motion: that of the yield stress, and the viscous part."""
+    diameter_m = scene.body.diameter_m
+    return even_n(liquid.non_newtonian, liquid.density_kg_m3, diameter_m, speed_mps, steepest_nspm)
+
+
+def _bound_n(extremes: Extremes) -> float | None:
+    """Return F(v) of an even motion."""
+    if extremes.liquid.non_newtonian is None:
+        return None
+    return sum(steady_n(extremes.scene, extremes.liquid, extremes.speed_mps)) if extremes.speed_mps > 0 else 0.0
+
+
+def _exerted_n(extremes: Extremes) -> float | None:
+    """Return the force of a body against the current that is called for; strokes faster than λ build up less stress."""
+    rheology = extremes.liquid.non_newtonian
+    if rheology is None:
+        return None
+    even_motion_n = sum(steady_n(extremes.scene, extremes.liquid, extremes.relative_mps))
+    if not isinstance(rheology, Maxwell) or extremes.speed_mps == 0.0:
+        return even_motion_n
+    return even_motion_n / math.hypot(1.0, rheology.relaxation_time_s * extremes.acceleration_mps2 / extremes.speed_mps)
+
+
+def _problem(liquid: Liquid) -> str | None:
+    if liquid.viscosity_pa_s is None:
+        return None
+    return (
+        "viscosity_pa_s is that of a Newtonian liquid, and the table non_newtonian says another law: remove one of them"
+    )
+
+
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
+    rheology, diameter_m = liquid.non_newtonian, scene.body.diameter_m
+    record.inertia_kg_m = 3 * math.pi * liquid.density_kg_m3 * diameter_m**2
+    if isinstance(rheology, HerschelBulkley):
+        record.kind = KIND_HERSCHEL_BULKLEY
+        record.viscous, record.plastic = viscous_factors(rheology, diameter_m)
+        record.exponent = rheology.flow_index / 2
+        record.yield_n = yield_n(rheology, diameter_m)
+        record.stiffness_npm = STIFFNESS_NPM / scene.scale
+        record.full_nspm = FULL_NSPM / scene.scale
+        return
+    record.stokes_nspm = 3 * math.pi * diameter_m * rheology.zero_shear_viscosity_pa_s
+    if isinstance(rheology, Carreau):
+        record.kind = KIND_CARREAU
+        record.time_spm = CARREAU_RATE * 2 * rheology.time_constant_s / diameter_m
+        record.exponent = (rheology.flow_index - 1) / 2
+    elif isinstance(rheology, Maxwell):
+        record.kind = KIND_MAXWELL
+        record.relaxation_s = rheology.relaxation_time_s if rheology.relaxation_time_s >= RESOLVED_S else 0.0
+    else:
+        record.kind = KIND_SHEAR_THICKENING
+        record.thickened_nspm = 3 * math.pi * diameter_m * rheology.thickened_viscosity_pa_s
+        record.onset_mps = rheology.onset_shear_rate_per_s * diameter_m / 2
+
+
+PARAMETERS: Fields = (
+    ("kind", INT),  # KIND_*
+    ("inertia_kg_m", FLOAT),  # 3π ρ D²
+    ("viscous", FLOAT),  # Herschel–Bulkley: a of a w^n [N (s/m)^n]
+    ("plastic", FLOAT),  # b of b w^(n/2)
+    ("exponent", FLOAT),  # Herschel–Bulkley: n/2; Carreau: (n − 1)/2
+    ("yield_n", FLOAT),  # 3π D² · 1.157 τ_y
+    ("stiffness_npm", FLOAT),  # greatest F_y / s_y [N/m, scene], at the slope limit below
+    ("full_nspm", FLOAT),  # [N·s/m, scene]
+    ("stokes_nspm", FLOAT),  # 3π η₀ D, of the other kinds
+    ("time_spm", FLOAT),  # Carreau: 0.275 · 2λ/D
+    ("relaxation_s", FLOAT),  # Maxwell: λ; 0 where it is too short to be resolved
+    ("thickened_nspm", FLOAT),  # 3π η D after shear thickening
+    ("onset_mps", FLOAT),  # speed of its onset
+)
+
+STATE: Fields = (
+    ("strain", FLOAT, (3,)),  # Herschel–Bulkley: s/s_y, elastic displacement over that of yielding, 0 … 1
+    ("ahead_m", FLOAT, (3,)),  # how far the ball is ahead of the place that |dp| counts from
+    ("velocity_mps", FLOAT, (3,)),  # Maxwell: the velocity that a Newtonian liquid of the same force would meet
+    ("step_m", FLOAT, (3,)),  # motion relative to the current within the tick
+)
+
+
+def _control(field: str, label: str, unit: str, least: float, most: float, **more: Any) -> Parameter:
+    return Parameter(f"non_newtonian.{field}", label, unit, least, most, **({"logarithmic": True} | more))
+
+
+EFFECT = Effect(
+    name="non_newtonian",
+    label="Non-Newtonian drag",
+    bit=BIT,
+    bound_n=_bound_n,
+    exerted_n=_exerted_n,
+    extent="area",
+    format=2,
+    bars=lambda extremes: (_REPLACES, "non-Newtonian drag instead: the liquid has the parameters of a flow curve"),
+    note=lambda liquid: f", {liquid.non_newtonian.kind}: {_NOT_IN_IT}",
+    model=Rheology,
+    missing='kind = "herschel-bulkley", "carreau", "maxwell" or "shear-thickening", ...',
+    excludes=_REPLACES,
+    problem=_problem,
+    parameters=PARAMETERS,
+    state=STATE,
+    fill=_fill,
+    start=lambda kind, _centre_m, _reach_m: {
+        "kind": kind or "herschel-bulkley",
+        **_START[kind or "herschel-bulkley"],
+    },
+    controls=(
+        Parameter(
+            "non_newtonian.kind",
+            "Flow curve",
+            choices=(
+                ("herschel-bulkley", "Herschel–Bulkley"),
+                ("carreau", "Carreau"),
+                ("maxwell", "Maxwell"),
+                ("shear-thickening", "Shear thickening"),
+            ),
+        ),
+        _control("yield_stress_pa", "Yield stress", "Pa", 0.0, 500.0, logarithmic=False, decimals=1),
+        _control("consistency_pa_sn", "Consistency K", "Pa·sⁿ", 1e-3, 1000.0),
+        _control("flow_index", "Flow index n", "", 0.1, 1.0, logarithmic=False),
+        _control("zero_shear_viscosity_pa_s", "Zero-shear viscosity", "Pa·s", 1e-3, 1000.0),
+        _control("time_constant_s", "Time constant λ", "s", 1e-3, 10.0, decimals=3),
+        _control("relaxation_time_s", "Relaxation time λ", "s", 1e-3, 10.0, decimals=3),
+        _control("thickened_viscosity_pa_s", "Thickened viscosity", "Pa·s", 1e-3, 1000.0),
+        _control("onset_shear_rate_per_s", "Onset shear rate", "1/s", 0.1, 1000.0),
+    ),
+)

@@ -1,0 +1,186 @@
+"""Non-Newtonian liquids: flow curves by a rheometer's parameters, and the steady force on a sphere in creeping flow.
+
+The functions of plain numbers are compiled as they stand (``kernels.effects.non_newtonian``). What they are not:
+thixotropy, impact, and yielding in unsteady flow other than by the elastic-plastic state of that kernel.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Final, Literal, Self, TypeAlias
+
+from pydantic import Field, model_validator
+
+from study_app.haptics.model.laws import finite_reynolds
+from study_app.haptics.model.ranges import Frozen, ViscosityPaS, within
+
+YIELD: Final = 1.157
+"""Yield drag over 3π D² τ_y, fitted to this project's fluid solver; 1.166 from Beris et al. 1985."""
+PLASTIC: Final = 1.7
+"""Factor of the plastic boundary layer, likewise: 3π D² · 1.7 n^1.5 √(τ_v τ_y)."""
+CARREAU_RATE: Final = 0.275
+"""Mean shear rate of a Carreau liquid around a sphere, over 2|w|/D."""
+THICKENED_WITHIN: Final = 2.0
+"""Shear thickening is complete at this multiple of the shear rate of its onset."""
+RESOLVED_S: Final = 0.01
+"""A shorter relaxation is below what the velocity estimator resolves: the liquid counts as Newtonian."""
+
+_INDICES: Final = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+_SHAPES: Final = (1.354, 1.413, 1.458, 1.442, 1.420, 1.382, 1.320, 1.240, 1.140, 1.0)
+
+StressPa: TypeAlias = Annotated[float, within(0, 5000, "no liquid is a solid: toothpaste has 50 to 200 Pa")]
+ConsistencyPaSn: TypeAlias = Annotated[float, within(1e-4, 1e5, "water has 0.001 Pa·s, ketchup 10 Pa·sⁿ")]
+FlowIndex: TypeAlias = Annotated[
+    float, within(0.1, 1, 'below, no drag on a sphere is known; above 1 it is "shear-thickening"')
+]
+TimeS: TypeAlias = Annotated[float, within(1e-4, 1000, "shorter, a liquid is Newtonian; longer, it is a solid")]
+ShearRate: TypeAlias = Annotated[float, within(0.01, 1e5, "a hand shears a liquid at 0.1 to 100 per second")]
+
+
+class HerschelBulkley(Frozen):
+    """Flow curve τ = τ_y + K γ̇^n: yield stress, consistency, flow index. Bingham: n = 1; power law: τ_y = 0."""
+
+    kind: Literal["herschel-bulkley"] = "herschel-bulkley"
+    yield_stress_pa: StressPa = 0.0
+    consistency_pa_sn: ConsistencyPaSn
+    flow_index: FlowIndex = 1.0
+
+
+class Carreau(Frozen):
+    """Flow curve τ = η₀ γ̇ [1 + (λγ̇)²]^((n−1)/2): thin at high shear rates, no yield stress."""
+
+    kind: Literal["carreau"] = "carreau"
+    zero_shear_viscosity_pa_s: ViscosityPaS
+    time_constant_s: TimeS
+    flow_index: FlowIndex
+
+
+class Maxwell(Frozen):
+    """Stress by τ + λ dτ/dt = η γ̇: viscoelastic, with the relaxation time λ and the shear modulus η/λ."""
+
+    kind: Literal["maxwell"] = "maxwell"
+    zero_shear_viscosity_pa_s: ViscosityPaS
+    relaxation_time_s: TimeS
+
+
+class ShearThickening(Frozen):
+    """Viscosity η₀ up to a shear rate, the thickened one from twice that rate on; between them τ is linear in γ̇."""
+
+    kind: Literal["shear-thickening"] = "shear-thickening"
+    zero_shear_viscosity_pa_s: ViscosityPaS
+    thickened_viscosity_pa_s: ViscosityPaS
+    onset_shear_rate_per_s: ShearRate
+
+    @model_validator(mode="after")
+    def _thickens(self) -> Self:
+        if self.thickened_viscosity_pa_s < self.zero_shear_viscosity_pa_s:
+            raise ValueError(
+                f"thickened_viscosity_pa_s = {self.thickened_viscosity_pa_s:g} is less than zero_shear_viscosity_pa_s "
+                f'= {self.zero_shear_viscosity_pa_s:g}: for a liquid that thins, write kind = "carreau"'
+            )
+        return self
+
+
+Rheology: TypeAlias = Annotated[HerschelBulkley | Carreau | Maxwell | ShearThickening, Field(discriminator="kind")]
+
+
+def shape_factor(flow_index: float) -> float:
+    """Return X(n), the drag of a power-law liquid over 3π D² K (w/D)^n (Gu & Tanner 1985), interpolated."""
+    for below in range(len(_INDICES) - 1):
+        if flow_index <= _INDICES[below + 1]:
+            share = (flow_index - _INDICES[below]) / (_INDICES[below + 1] - _INDICES[below])
+            return _SHAPES[below] + share * (_SHAPES[below + 1] - _SHAPES[below])
+    return 1.0
+
+
+def herschel_bulkley(speed_mps: float, viscous: float, plastic: float, half_index: float) -> float:
+    """Return the viscous part of the force [N]: a w^n + b w^(n/2), of what flows and of the plastic layer around it."""
+    root = math.pow(speed_mps, half_index)
+    return (viscous * root + plastic) * root
+
+
+def carreau(speed_mps: float, stokes_nspm: float, time_spm: float, exponent: float) -> float:
+    """Return the force [N]: 3πη₀D w [1 + (t w)²]^((n−1)/2)."""
+    rate = time_spm * speed_mps
+    return stokes_nspm * speed_mps * math.pow(1.0 + rate * rate, exponent)
+
+
+def shear_thickening(value: float, slope: float, thickened: float, onset: float, steepest: float) -> float:
+    """Return the stress at a shear rate, or the force at a speed: slope · v up to the onset, a ramp, thickened · v.
+
+    The ramp ends at twice the onset, or rises by ``steepest`` where that is less.
+    """
+    rising = max(min((THICKENED_WITHIN * thickened - slope) / (THICKENED_WITHIN - 1.0), steepest), slope)
+    return min(max(slope * value, slope * onset + rising * (value - onset)), thickened * value)
+
+
+def stress_pa(rheology: Any, shear_rate_per_s: float) -> float:
+    """Return the shear stress [Pa] of steady shear: the flow curve."""
+    rate = shear_rate_per_s
+    if isinstance(rheology, HerschelBulkley):
+        return float(rheology.yield_stress_pa + rheology.consistency_pa_sn * rate**rheology.flow_index)
+    if isinstance(rheology, Carreau):
+        exponent = (rheology.flow_index - 1) / 2
+        return carreau(rate, rheology.zero_shear_viscosity_pa_s, rheology.time_constant_s, exponent)
+    if isinstance(rheology, Maxwell):
+        return float(rheology.zero_shear_viscosity_pa_s * rate)
+    return shear_thickening(
+        rate,
+        rheology.zero_shear_viscosity_pa_s,
+        rheology.thickened_viscosity_pa_s,
+        rheology.onset_shear_rate_per_s,
+        math.inf,
+    )
+
+
+def yield_n(rheology: Any, diameter_m: float) -> float:
+    """Return the force [N] that a sphere at rest bears before the liquid flows: 3π D² · 1.157 τ_y."""
+    return 3 * math.pi * diameter_m**2 * YIELD * getattr(rheology, "yield_stress_pa", 0.0)
+
+
+def viscous_factors(rheology: HerschelBulkley, diameter_m: float) -> tuple[float, float]:
+    """Return a and b of `herschel_bulkley`: 3πD² X K D^−n and 3πD² · 1.7 n^1.5 √(K D^−n τ_y)."""
+    index, area_m2 = rheology.flow_index, 3 * math.pi * diameter_m**2
+    stress = rheology.consistency_pa_sn * diameter_m**-index
+    plastic = PLASTIC * index**1.5 * math.sqrt(stress * rheology.yield_stress_pa)
+    return area_m2 * shape_factor(index) * stress, area_m2 * plastic
+
+
+def creeping_n(
+    rheology: Any, diameter_m: float, speed_mps: float, steepest_nspm: float = math.inf
+) -> tuple[float, float]:
+    """Return the force [N] on a sphere in steady creeping flow: that of the yield stress, and the viscous part.
+
+    ``steepest_nspm`` limits how steeply the force of a liquid that thickens grows.
+    """
+    if isinstance(rheology, HerschelBulkley):
+        viscous, plastic = viscous_factors(rheology, diameter_m)
+        parts = herschel_bulkley(speed_mps, viscous, plastic, rheology.flow_index / 2)
+        return yield_n(rheology, diameter_m), parts
+    stokes_nspm = 3 * math.pi * diameter_m * rheology.zero_shear_viscosity_pa_s
+    if isinstance(rheology, Carreau):
+        time_spm = CARREAU_RATE * 2 * rheology.time_constant_s / diameter_m
+        return 0.0, carreau(speed_mps, stokes_nspm, time_spm, (rheology.flow_index - 1) / 2)
+    if isinstance(rheology, Maxwell):
+        return 0.0, stokes_nspm * speed_mps
+    thickened_nspm = 3 * math.pi * diameter_m * rheology.thickened_viscosity_pa_s
+    onset_mps = rheology.onset_shear_rate_per_s * diameter_m / 2
+    return 0.0, shear_thickening(speed_mps, stokes_nspm, thickened_nspm, onset_mps, steepest_nspm)
+
+
+def inertial_factor(force_n: float, speed_mps: float, inertia_kg_m: float) -> float:
+    """Return φ(Re), by which a creeping flow's force grows: Re = ρ|w|D/η with the effective viscosity η = F/(3πD|w|).
+
+    ``inertia_kg_m`` is 3πρD².
+    """
+    return finite_reynolds(inertia_kg_m * speed_mps * speed_mps / force_n) if force_n > 0.0 else 1.0
+
+
+def even_n(
+    rheology: Any, density_kg_m3: float, diameter_m: float, speed_mps: float, steepest_nspm: float = math.inf
+) -> tuple[float, float]:
+    """Return the force [N] on a sphere that moves evenly: that of the yield stress, and the viscous part."""
+    held_n, viscous_n = creeping_n(rheology, diameter_m, speed_mps)
+    ratio = inertial_factor(held_n + viscous_n, speed_mps, 3 * math.pi * density_kg_m3 * diameter_m**2)
+    limited_n = creeping_n(rheology, diameter_m, speed_mps, steepest_nspm)[1]
+    return held_n, ratio * limited_n + (ratio - 1.0) * held_n

@@ -1,0 +1,276 @@
+"""Non-Newtonian drag: limits of the parameters, elasticity at rest, energy, and closed loops."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from study_app.haptics.kernels.plant import measure, move, new_handle, push
+from study_app.haptics.model import rheology
+from study_app.haptics.model.effects.current import Uniform
+from study_app.haptics.model.effects.non_newtonian import STIFFNESS_NPM, steady_n
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLOPE
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.rheology import Carreau, HerschelBulkley, Maxwell, ShearThickening
+from study_app.haptics.model.scene import Box, Liquid
+from study_app.haptics.model.steady_state import steady
+from study_app.haptics.runtime.offline import simulate
+from tests.haptics.materials import PRESETS, tank
+from tests.haptics.scenes import COMPILED, UNBENT, Hand, liquid, moving, scene, vectors
+
+D = 0.068
+DIRECTION = np.array([2.0, -1.0, 2.0]) / 3
+compiled = pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")
+
+
+def force(tank_scene, velocity_mps, interval_s=1e-3):
+    """Return the force (n, 3) along velocities (n, 3)."""
+    tank_scene = tank_scene.model_copy(update={"knee": UNBENT, "rate_hz": 1 / float(np.median(interval_s))})
+    return vectors(simulate(tank_scene, moving(velocity_mps, interval_s)), "force")
+
+
+def random_motion(seed, ticks=2000):
+    """Return velocities (n, 3) that begin at rest, up to about 0.5 m/s, with stops."""
+    random = np.random.default_rng(seed)
+    t_s = np.arange(ticks) / 1000
+    waves = sum(
+        random.normal(size=3) * np.sin(2 * np.pi * hertz * t_s + random.uniform(0, 6.3))[:, None]
+        for hertz in random.uniform(0.3, 6, 5)
+    )
+    swell = np.clip(np.sin(2 * np.pi * t_s / 0.8), 0, None)[:, None]
+    return 0.15 * random.uniform(0.05, 1) * waves * swell
+
+
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("speed_mps", [0.02, 0.5])
+def test_an_even_motion_meets_the_steady_force(name, speed_mps):
+    tank_scene = tank(name, scale=3.0)
+    ticks = {"slime": 2000, "ketchup": 50 / speed_mps, "toothpaste": 350 / speed_mps}.get(name, 20)
+    found = force(tank_scene, np.tile(speed_mps * DIRECTION, (round(ticks if COMPILED else min(ticks, 2500)), 1)))[-1]
+    assert found == pytest.approx(-sum(steady_n(tank_scene, tank_scene.liquids[0], speed_mps)) * DIRECTION, rel=6e-3)
+
+
+def by_letter(tank_scene, velocity_mps):
+    """Return the creeping force (n, 3), its elastic state in a hundred steps per tick; without the inertial factor."""
+    table, strain, ahead, v = tank_scene.liquids[0].non_newtonian, np.zeros(3), np.zeros(3), np.zeros(3)
+    yield_n, found = rheology.yield_n(table, D), np.zeros_like(velocity_mps)
+    for k, w in enumerate(velocity_mps):
+        speed = np.linalg.norm(w)
+        direction = w / speed if speed > 0 else np.zeros(3)
+        if isinstance(table, Maxwell):
+            v = w + (v - w) * np.exp(-1e-3 / table.relaxation_time_s)
+            found[k] = -3 * np.pi * D * table.zero_shear_viscosity_pa_s * v
+            continue
+        if yield_n > 0:
+            for _ in range(100):
+                step = w * 1e-5
+                ahead = ahead + step
+                slipped = max(np.linalg.norm(ahead) - 2 * 38e-6 * tank_scene.scale, 0.0)
+                ahead = ahead * (1 - slipped / max(np.linalg.norm(ahead), 1e-12))
+                strain = strain + (step - slipped * strain) * STIFFNESS_NPM / tank_scene.scale / yield_n
+                strain = strain / max(np.linalg.norm(strain), 1.0)
+        found[k] = -yield_n * strain - rheology.creeping_n(table, D, speed)[1] * direction
+    return found
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_it_equals_its_law_by_the_letter(name, monkeypatch):
+    tank_scene = tank(name, scale=3.0)
+    dense = tank_scene.liquids[0].model_copy(update={"density_kg_m3": 0.01})
+    tank_scene = tank_scene.model_copy(update={"liquids": (dense,)})
+    velocity = random_motion(3, ticks=1500 if COMPILED else 300)
+    expected = by_letter(tank_scene, velocity)
+    assert abs(force(tank_scene, velocity) - expected).max() <= 0.01 * abs(expected).max()
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_turning_the_motion_turns_the_force(name):
+    velocity = random_motion(1, ticks=400 if COMPILED else 60) + np.array([0.1, 0.2, 0.05])
+    by = Rotation.random(rng=np.random.default_rng(1))
+    straight = force(tank(name), velocity)
+    assert abs(force(tank(name), by.apply(velocity)) - by.apply(straight)).max() <= 1e-12 * abs(straight).max()
+
+
+def test_a_power_law_with_a_vanishing_yield_stress_is_one_without():
+    velocity = random_motion(2, ticks=300)
+    without, nearly = (
+        tank("ketchup", table=HerschelBulkley(yield_stress_pa=it, consistency_pa_sn=10, flow_index=0.5))
+        for it in (0.0, 1e-12)
+    )
+    assert abs(force(without, velocity) - force(nearly, velocity)).max() <= 1e-5
+
+
+def newtonian(viscosity_pa_s, velocity_mps):
+    table = HerschelBulkley(consistency_pa_sn=viscosity_pa_s)
+    return force(tank("slime", table=table), velocity_mps)
+
+
+def test_liquids_without_their_peculiarity_are_newtonian():
+    velocity = random_motion(4, ticks=300)
+    expected = newtonian(2.0, velocity)
+    for table in (
+        Carreau(zero_shear_viscosity_pa_s=2, time_constant_s=0.1, flow_index=1.0),
+        Carreau(zero_shear_viscosity_pa_s=2, time_constant_s=1e-4, flow_index=0.3),
+        Maxwell(zero_shear_viscosity_pa_s=2, relaxation_time_s=1e-3),
+        ShearThickening(zero_shear_viscosity_pa_s=2, thickened_viscosity_pa_s=2, onset_shear_rate_per_s=5),
+        HerschelBulkley(consistency_pa_sn=2, flow_index=0.99999),
+    ):
+        assert abs(force(tank("slime", table=table), velocity) - expected).max() <= 1e-3 * abs(expected).max()
+
+
+def test_a_short_relaxation_lags_by_itself_and_a_long_one_is_a_spring():
+    velocity = np.outer(np.sin(3 * np.arange(600) / 1000), [0.2, 0.1, 0.0])
+    short = force(tank("slime", table=Maxwell(zero_shear_viscosity_pa_s=2, relaxation_time_s=0.011)), velocity)
+    later = np.concatenate([np.zeros((11, 3)), newtonian(2.0, velocity)[:-11]])
+    assert abs(short - later).max() <= 0.01 * abs(later).max()
+    modulus_pa = 5.0
+    spring = Maxwell(zero_shear_viscosity_pa_s=modulus_pa * 1000, relaxation_time_s=1000)
+    place_m = np.cumsum(velocity, axis=0) * 1e-3
+    stiff = 3 * np.pi * D * modulus_pa
+    assert force(tank("slime", table=spring), velocity) == pytest.approx(-stiff * place_m, abs=2e-3 * stiff)
+
+
+def test_after_a_stop_slime_relaxes_and_ketchup_holds():
+    velocity = np.zeros((1600, 3))
+    velocity[:1000, 0] = 0.1
+    slime, ketchup = (force(tank(name, scale=3.0), velocity)[:, 0] for name in ("slime", "ketchup"))
+    relaxation_s = PRESETS["slime"][1].relaxation_time_s
+    later = round(1e3 * relaxation_s)
+    assert slime[999 + later] / slime[999] == pytest.approx(np.exp(-1), rel=0.03)
+    assert ketchup[1001:] == pytest.approx(-rheology.yield_n(PRESETS["ketchup"][1], D), rel=1e-3)
+
+
+@compiled
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("tick_ms", [0.25, 0.5, 2, 4])
+def test_ticks_from_a_quarter_to_4_ms_feel_the_same(tick_ms, name):
+    def stroke(interval_s):
+        t_s = np.arange(0, 2, interval_s)
+        return np.outer(np.sin(6 * t_s), [0.3, 0.0, 0.4])
+
+    tank_scene = tank(name).model_copy(update={"knee": UNBENT})  # late or early ticks of a servo of 1 kHz
+    usual, other = stroke(1e-3), stroke(tick_ms * 1e-3)
+    expected, found = (
+        vectors(simulate(tank_scene, moving(motion, np.full(len(motion), it))), "force")
+        for motion, it in ((usual, 1e-3), (other, tick_ms * 1e-3))
+    )
+    steps = round(max(tick_ms, 1)), round(max(1 / tick_ms, 1))
+    rows = min(len(expected) // steps[0], len(found) // steps[1]) - 5
+    errors = abs(expected[:: steps[0]][5:rows] - found[:: steps[1]][5:rows])
+    assert errors.max() <= 0.04 * abs(expected).max()
+
+
+@compiled
+@pytest.mark.parametrize("interval_s", [2e-4, 1e-3, 4e-3, 2e-2])
+@pytest.mark.parametrize("name", PRESETS)
+def test_long_and_fast_ticks_stay_bounded(name, interval_s):
+    velocity = np.zeros((400, 3))
+    velocity[::2, 0], velocity[1::2, 1] = 100.0, -100.0
+    velocity[200:] = 0.0
+    found = force(tank(name), velocity, np.full(400, interval_s))
+    assert np.isfinite(found).all()
+    assert abs(found[300:]).max() <= abs(found[:200]).max()
+
+
+@compiled
+@pytest.mark.parametrize("name", PRESETS)
+def test_no_motion_gains_energy(name):
+    """Net work on the hand since rest, over the work that the hand has done."""
+    for seed in range(12):
+        velocity = random_motion(seed)
+        mean = (velocity + np.concatenate([np.zeros((1, 3)), velocity[:-1]])) / 2
+        power_w = (force(tank(name, scale=3.0), velocity) * mean).sum(axis=1)
+        assert np.cumsum(power_w).max() * 1e-3 <= 1e-3 * abs(power_w).sum() * 1e-3
+
+
+def creep_mps(name, share, *, noise=0.0, scale=3.0):
+    """Return how fast a free handle of 0.1 kg creeps under a share of the yield force, read in counts.
+
+    ``noise`` is a share of samples that are off by a count.
+    """
+    tank_scene = tank(name, scale=scale)
+    pull_n = share * rheology.yield_n(tank_scene.liquids[0].non_newtonian, D)
+    handle = new_handle(mass_kg=0.1, viscous_nspm=0.5, stiffness_npm=1.0, quantum_m=38e-6, delay=1)
+    hand, random = Hand(tank_scene), np.random.default_rng(0)
+    seen_m, place_m = np.zeros(3), np.zeros((4000, 3))
+    for k in range(4000):
+        aim_m = handle.position_m + np.array([min(k / 500, 1.0) * pull_n, 0.0, 0.0])
+        move(handle, aim_m, aim_m, 1e-3)
+        measure(handle, seen_m)
+        sent = hand.tick(seen_m + 38e-6 * random.integers(-1, 2, 3) * (random.random() < noise))
+        push(handle, *sent.device_force_n)
+        place_m[k] = handle.position_m
+    return abs(place_m[-1, 0] - place_m[2000, 0]) / 2.0
+
+
+@compiled
+@pytest.mark.parametrize("name", ["ketchup", "toothpaste"])
+def test_under_half_of_the_yield_force_the_hand_creeps_below_1_mm_per_s(name):
+    assert creep_mps(name, 0.5) <= 0.3e-3
+    assert creep_mps(name, 0.5, noise=0.01) <= 1e-3
+    assert creep_mps(name, 1.5) >= 5e-3
+
+
+@compiled
+def test_the_force_of_thickening_grows_no_steeper_than_the_slope_limit():
+    tank_scene = tank("cornstarch", scale=3.0, velocity=scene().velocity).model_copy(update={"force_limit_n": 20.0})
+    sent, asked = [], []
+    for hand_mps in (0.07, 0.08, 0.09):
+        last = Hand(tank_scene).sweep(hand_mps, 300)[-1]
+        sent.append(-last.device_force_n[0])
+        asked.append(-last.force_n[0])
+        assert last.limiters & LIMITER_SLOPE
+    assert np.diff(asked).min() / 0.01 > 60
+    assert np.diff(sent).max() / 0.01 <= 53 * 1.3  # the inertial factor grows with the speed, too
+    assert sent[1] == pytest.approx(steady_sent(tank_scene, 0.08), rel=1e-3)
+
+
+def steady_sent(tank_scene, hand_mps):
+    return steady(tank_scene, hand_mps).force_n
+
+
+@compiled
+@pytest.mark.parametrize("name", [name for name in PRESETS if name != "cornstarch"])
+def test_the_force_sent_is_the_predicted_one(name):
+    tank_scene = tank(name, scale=3.0)
+    for hand_mps in (0.02, 0.1):
+        last = Hand(tank_scene).sweep(hand_mps, 12_000)[-1]
+        assert -last.device_force_n[0] == pytest.approx(steady_sent(tank_scene, hand_mps), rel=5e-3)
+
+
+@compiled
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_passivity_controller_leaves_strokes_and_stops_alone(name):
+    t_s = np.arange(4000) / 1000
+    swell = np.minimum(t_s, 1) * np.clip(3 - t_s, 0, 1)
+    for hertz, reach_m in ((0.5, 0.03), (1.6, 0.02), (3.0, 0.01)):
+        counts = np.rint(np.outer(reach_m * np.sin(2 * np.pi * hertz * t_s) * swell / 38e-6, [1.0, 0.0, 0.3]))
+        sent = simulate(tank(name, scale=3.0), Motion(t_s, 3 * 38e-6 * counts))
+        assert sent.device_fx_n.any()
+        assert not (sent.limiters & LIMITER_ENERGY).any()
+
+
+def test_a_body_that_drifts_with_the_current_meets_no_force():
+    one = Liquid(
+        id="slime",
+        density_kg_m3=1020,
+        effects=("non_newtonian", "current"),
+        non_newtonian=PRESETS["slime"][1],
+        current=Uniform(velocity_mps=(0.2, 0.0, 0.1)),
+    )
+    for table in (PRESETS["slime"][1], PRESETS["ketchup"][1]):
+        tank_scene = scene(one.model_copy(update={"non_newtonian": table}), format=2)
+        assert abs(force(tank_scene, np.tile([0.2, 0.0, 0.1], (200, 1)))[1:]).max() <= 1e-9
+
+
+def test_after_leaving_the_past_is_forgotten():
+    for name in ("slime", "ketchup"):
+        density_kg_m3, table = PRESETS[name]
+        pool = liquid(density_kg_m3, effects=("non_newtonian",), non_newtonian=table, region=Box(size_m=(1, 1, 1)))
+        velocity = np.zeros((260, 3))
+        velocity[50:100, 0] = 1.0
+        motion = moving(velocity)
+        motion.position_m[:, 0] = np.where(np.arange(260) < 100, motion.position_m[:, 0], 0.0)
+        motion.position_m[100:140, 0] = 2.0
+        found = simulate(scene(pool, format=2), motion).fx_n
+        assert abs(found[99]) > 0.1
+        assert not found[141:].any()
