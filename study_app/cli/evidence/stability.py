@@ -11,9 +11,11 @@ import click
 from study_app.cli.options import EXIT_FOUND, Target
 from study_app.cli.parallel import executor_for, takes_workers
 from study_app.cli.progress import progress
+from study_app.errors import StudyError
 from study_app.workers.executors import Workers
 
 if TYPE_CHECKING:
+    from study_app.validation.stability.case_groups import Group
     from study_app.validation.stability.verdict import Verdict
 
 
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 )
 @click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
 @click.option("--cases", type=click.IntRange(1), metavar="N", help="Only N cases of each group.")
+@click.option("--group", metavar="TEXT", help='Only groups with this text in their name, such as "non-Newtonian".')
 @takes_workers
 def stability(
     to: Path | None,
@@ -40,6 +43,7 @@ def stability(
     delayed: Path | None,
     seed: str,
     cases: int | None,
+    group: str | None,
     workers: Workers,
 ) -> None:
     """Simulate thousands of closed loops with the safety layer off and on, and print the unstable ones.
@@ -53,6 +57,8 @@ def stability(
     from study_app.validation.stability.fidelity import fidelities
     from study_app.validation.stability.stability_cases import parse
 
+    if group is not None and (to, line, table, withheld) != (None, None, None, False):
+        raise StudyError("--group prints a table alone: remove --to, --case, --table and --withheld, or --group")
     if line is not None:
         case = parse(line)
         click.echo(str(case))
@@ -76,20 +82,29 @@ def stability(
         return
     with progress() as show, executor_for(workers) as executor:
         swept = found.run_sweep(
-            some(sweep(seed), cases),
-            groups(seed, cases),
+            some(sweep(seed), cases) if group is None else (),
+            groups(seed, cases) if group is None else _named(groups(seed, cases), group),
             executor,
             lambda done, of: show(f"{done} of {of} verdicts", done / of),
         )
         show("comparing forces")
-        compared = fidelities(executor=executor)
-    click.echo(found.summary(swept, compared))
+        compared = fidelities(executor=executor) if group is None else ()
+    click.echo(found.summary(swept, compared) if group is None else found.group_table(swept))
     if to is not None:
         click.echo("\n" + "\n".join(str(file) for file in found.write(to, swept, compared)))
     if swept.unstable:
         click.echo("\nunstable with safety on; repeat one with --case:", err=True)
         click.echo("\n".join(str(verdict.case) for verdict in swept.unstable), err=True)
     _end(swept.unstable)
+
+
+def _named(groups: Sequence[Group], text: str) -> tuple[Group, ...]:
+    """Return the groups with a text in their name."""
+    chosen = tuple(group for group in groups if text in group.name)
+    if not chosen:
+        names = ", ".join(group.name for group in groups)
+        raise StudyError(f"no group has {text!r} in its name: there are {names}")
+    return chosen
 
 
 def _print_withheld(workers: Workers) -> None:

@@ -27,6 +27,8 @@ from study_app.validation.stability.stability_cases import (
     THROWN,
     Case,
     liquids,
+    materials,
+    scenes,
 )
 
 SCALES: Final = (1.0, 3.0, 10.0, 20.0, 40.0)
@@ -111,8 +113,22 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     found.append(Group(f"{driven}, held", driven_held))
     driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), FALCONS_KG))
     found.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
+    found += _of_materials(seed, light, count)
     fewer = min(KALMAN_CASES, count or KALMAN_CASES)
     return (*found, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
+
+
+def _of_materials(seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None) -> Iterator[Group]:
+    """Yield the non-Newtonian liquids as the sweep has the others, believed another delay, and let go."""
+    name = "non-Newtonian liquids"
+    whole = tuple(_grid(GRIPS, names=materials))
+    yield Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
+    for change in MISJUDGED:
+        cases = [case for case in map(CHANGES[change], whole) if case is not None]
+        few = some(cases, min(CASES, count or CASES))
+        yield Group(f"{name}, {change}", tuple(_drawn(f"{seed} {name} {change}", few, choices)))
+    free = tuple(_releases(f"{seed} {name}", PLANTS, HANDLES_KG, materials))
+    yield Group(f"{name}, let go in mid-stroke", some(free, count))
 
 
 def _with_kalman(group: Group, count: int) -> Group:
@@ -168,10 +184,11 @@ def _grid(
     plants: Iterable[str] = (FIRST,),
     rates_hz: Iterable[float] = RATES_HZ,
     delays: Iterable[int] = range(5),
+    names: Callable[[], Iterable[str]] = liquids,
 ) -> Iterator[Case]:
-    """Yield each liquid at each scale, rate, delay and grip."""
+    """Yield each liquid, by default of the sweep, at each scale, rate, delay and grip."""
     for liquid, scale, rate_hz, delay, hand, plant in itertools.product(
-        liquids(), SCALES, rates_hz, delays, hands, plants
+        names(), SCALES, rates_hz, delays, hands, plants
     ):
         yield Case(liquid=liquid, scale=scale, rate_hz=rate_hz, delay=delay, hand=hand, plant=plant)
 
@@ -183,19 +200,21 @@ def _drawn(seed: str, cases: Iterable[Case], choices: Mapping[str, tuple[Any, ..
         yield dataclasses.replace(case, **{name: _one(draw, values) for name, values in choices.items()})
 
 
-def _releases(seed: str, plants: Iterable[str], masses_kg: Iterable[float]) -> Iterator[Case]:
+def _releases(
+    seed: str, plants: Iterable[str], masses_kg: Iterable[float], names: Callable[[], Iterable[str]] = liquids
+) -> Iterator[Case]:
     """Yield releases at every phase of strokes of 1 to 4 Hz ±30 mm, in the loop of a study.
 
     The damper's are drawn from a stream of their own, so that those of the liquids stay the ones that were judged.
     """
     shared, own = Random(seed), {DAMPER: Random(f"{seed} {DAMPER}")}  # noqa: S311 - the same cases in every run
-    for plant, liquid, mass_kg, phase in itertools.product(plants, liquids(), masses_kg, range(PHASES)):
+    for plant, liquid, mass_kg, phase in itertools.product(plants, names(), masses_kg, range(PHASES)):
         draw = own.get(liquid, shared)
         case = Case(liquid=liquid, hand=LETS_GO, motion=SINE, mass_kg=mass_kg, plant=plant)
         hz = _one(draw, (1.0, 2.0, 4.0))
         yield dataclasses.replace(
             case,
-            scale=liquids()[liquid].scale,
+            scale=scenes()[liquid].scale,
             delay=_one(draw, (0, 1, 1, 2)),
             viscous_nspm=_one(draw, (0.0, 0.5)),
             speed_mps=round(peak_mps(hz, 0.5e-3 * case.way_mm), 5),

@@ -196,9 +196,18 @@ def liquids() -> Mapping[str, Scene]:
 
 @cache
 def scenes() -> Mapping[str, Scene]:
-    """Return what a case may present: what the sweep does, and the liquids of physical2."""
-    study = load(shipped_file("physical2"))
-    return {**liquids(), **{f"physical2_{name}": study.scene_of(name) for name in study.liquids}}
+    """Return what a case may present: what the sweep does, and the liquids of physical2 and slime."""
+    found = dict(liquids())
+    for protocol in ("physical2", "slime"):
+        study = load(shipped_file(protocol))
+        found |= {f"{protocol}_{name}": study.scene_of(name) for name in study.liquids}
+    return found
+
+
+@cache
+def materials() -> tuple[str, ...]:
+    """Return the names of the non-Newtonian liquids among them."""
+    return tuple(name for name, scene in scenes().items() if scene.liquids[0].non_newtonian is not None)
 
 
 def scene_of(case: Case) -> Scene:

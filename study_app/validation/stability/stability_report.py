@@ -62,8 +62,8 @@ class Swept:
 
     @property
     def groups(self) -> tuple[Judged, ...]:
-        """All groups, the sweep with safety on before the others."""
-        return (Judged("first plant", self.on), *self.others)
+        """All groups, the sweep with safety on, if it was judged, before the others."""
+        return (*([Judged("first plant", self.on)] if self.on else []), *self.others)
 
 
 def run_sweep(cases: Sequence[Case], others: Sequence[Group], executor: Executor, tell: Tell | None = None) -> Swept:
@@ -120,7 +120,7 @@ def in_words(verdict: Verdict) -> str:
 
 def summary(swept: Swept, fidelities: Sequence[Fidelity]) -> str:
     """Return what came out, as text: how many are unstable and why, which limiters acted, what they take away."""
-    return "\n".join((*_counts(swept), "", *_groups(swept), "", *_limiters(swept), "", *_fidelity(fidelities)))
+    return "\n".join((*_counts(swept), "", group_table(swept), "", *_limiters(swept), "", *_fidelity(fidelities)))
 
 
 def _counts(swept: Swept) -> Iterator[str]:
@@ -134,8 +134,12 @@ def _counts(swept: Swept) -> Iterator[str]:
         yield f"  {reason:22} {reasons[0][reason]:10d}  {reasons[1][reason]:10d}"
 
 
-def _groups(swept: Swept) -> Iterator[str]:
-    """Yield, for each group, the unstable cases and the most energy that the handle got from a liquid."""
+def group_table(swept: Swept) -> str:
+    """Return, for each group, the unstable cases and the most energy that the handle got from a liquid."""
+    return "\n".join(_group_lines(swept))
+
+
+def _group_lines(swept: Swept) -> Iterator[str]:
     width = max(len(one.name) for one in swept.groups)
     yield f"{'with safety on':{width + 2}}   cases  unstable   given out   beyond the bound, at most [mJ]"
     for one in swept.groups:

@@ -19,7 +19,7 @@ from study_app.validation.stability.case_groups import (
 )
 from study_app.validation.stability.closed_loop import SLOWER_S, begin, play
 from study_app.validation.stability.device_bench import new_bench, new_trace, trace_of
-from study_app.validation.stability.stability_cases import PLANTS, Case, liquids, parse
+from study_app.validation.stability.stability_cases import PLANTS, Case, liquids, materials, parse
 from study_app.validation.stability.verdict import MISJUDGED_ALLOWANCE_J, judge, windows
 from tests.haptics.scenes import COMPILED
 
@@ -34,7 +34,7 @@ def all_groups():
 
 
 def own_plants(all_groups):
-    return {name: cases for name, cases in all_groups.items() if not name.startswith(("through", "kalman"))}
+    return {name: it for name, it in all_groups.items() if not name.startswith(("through", "kalman", "non-Newtonian"))}
 
 
 def test_the_kalman_filter_is_judged_in_each_group(all_groups):
@@ -100,6 +100,25 @@ def test_mass_of_the_handle_changes_every_150_ms(plant):
         rows = slice(round(k * 150) + 2, round(k * 150) + 148)
         found_kg = moved[0][rows].sum() / moved[1][rows].sum() / case.rate_hz
         assert found_kg == pytest.approx((0.1, 0.25)[k % 2], rel=0.02), k
+
+
+def test_groups_of_non_newtonian_liquids_have_each_preset_held_misjudged_and_let_go(all_groups):
+    found = {name: cases for name, cases in all_groups.items() if name.startswith("non-Newtonian")}
+    assert [len(cases) for cases in found.values()] == [2500, 1500, 1500, 1500, 480]
+    for cases in found.values():
+        assert {case.liquid for case in cases} == set(materials())
+    assert [any(case.misjudged for case in cases) for cases in found.values()] == [False, True, True, True, False]
+    released = all_groups["non-Newtonian liquids, let go in mid-stroke"]
+    assert {(case.hand, case.plant, case.mass_kg) for case in released} == set(
+        itertools.product(["lets-go"], PLANTS, HANDLES_KG)
+    )
+
+
+@compiled
+def test_a_sample_of_closed_loops_in_non_newtonian_liquids_is_stable():
+    sampled = [group for group in groups(count=25) if group.name.startswith("non-Newtonian")]
+    unstable = [case for group in sampled for case in group.cases if not judge(case, safe=True).stable]
+    assert not unstable
 
 
 def test_groups_through_the_driver_have_all_liquids_within_its_workspace(all_groups):

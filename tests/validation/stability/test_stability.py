@@ -20,7 +20,7 @@ from study_app.validation.stability.case_groups import Group, groups, some, swee
 from study_app.validation.stability.damping_boundary import measure_limits
 from study_app.validation.stability.device_bench import trace_of
 from study_app.validation.stability.fidelity import LIMITED, STUDY_LOOPS, fidelities
-from study_app.validation.stability.stability_cases import GRIPS, Case, liquids, parse, scene_of
+from study_app.validation.stability.stability_cases import GRIPS, Case, liquids, parse, scene_of, scenes
 from study_app.validation.stability.trace_measures import fast_part, smooth
 from study_app.validation.stability.verdict import judge
 from study_app.validation.stability.withheld_force import measure
@@ -54,7 +54,8 @@ def test_the_sweep_has_5000_cases_and_everything_that_it_should():
     assert {case.liquid for case in cases} == set(liquids())
     for name in shipped():
         study = load(name)
-        assert set(study.liquids) <= {key.removeprefix("physical_") for key in liquids()} or name == "demo"
+        judged = {key.removeprefix("physical_").removeprefix("slime_") for key in scenes()}
+        assert set(study.liquids) <= judged or name == "demo"
     assert liquids()["dense"].liquids[0].density_kg_m3 == 10_000
     assert sweep() == cases != sweep("another")
 
@@ -294,6 +295,27 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     lines = [line for line in ran.stderr.splitlines() if line.startswith("liquid=")]
     assert len(lines) == 2 * (1 + len(groups(count=2)))
     assert {parse(line).plant for line in lines} == {"handle", "arm", "falcon"}
+
+
+@compiled
+def test_the_command_judges_only_the_groups_that_are_named():
+    ran = command("--group", "non-Newtonian", "--cases", "2")
+    assert ran.exception is None
+    _, *lines = ran.stdout.splitlines()
+    assert len(lines) == sum("non-Newtonian" in group.name for group in groups(count=2)) == 10
+    assert all("non-Newtonian" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--group", "mercury"), "no group has 'mercury' in its name: there are second plant, held, "),
+        (("--group", "lost", "--withheld"), "--group prints a table alone"),
+    ],
+)
+def test_groups_that_cannot_be_judged_are_refused(words, said):
+    with pytest.raises(StudyError, match=said):
+        raise command(*words).exception
 
 
 def test_a_line_that_is_none_is_refused():
