@@ -15,6 +15,7 @@ from study_app.evaluation import reference_solutions
 from study_app.evaluation.cost import measure
 from study_app.evaluation.force_error import ROUNDING, Error, error_of
 from study_app.evaluation.hand_motions import COUNT_M, stroke, vectors_x
+from study_app.evaluation.non_newtonian_law import non_newtonian_n
 from study_app.evaluation.reference_model import local_wakes, lowered, resistance_nspm, respond
 from study_app.evaluation.reference_solutions import CYCLES, Case, Truth
 from study_app.evaluation.scene_variants import with_effects
@@ -77,6 +78,9 @@ def _of_one(scene: Scene, index: int) -> tuple[float, float, float, str]:
     if "unsteady_drag" in kept:
         true_n = _unsteady_n(alone, motion, speed_mps, rate_per_s)
         against = "the law of unsteady drag, which is within 8 % of a fluid solver at Re 0.3 to 100, and buoyancy"
+    elif "non_newtonian" in kept:
+        true_n = _non_newtonian_n(alone, motion, speed_mps, rate_per_s)
+        against = f"the {liquid.non_newtonian.kind} law (no reference in unsteady flow), added mass and buoyancy"
     elif liquid.viscosity_pa_s is not None and liquid.drag.law != "linear" and not {"wake", "local_wake"} & set(kept):
         true_n = physical_n(alone, speed_mps, rate_per_s, motion.t_s)
         against = "drag by experiments, added mass, buoyancy and the history of creeping flow (an upper bound)"
@@ -123,6 +127,16 @@ def _unsteady_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s: floa
     v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
     even_s = np.full(len(t_s), 1 / scene.rate_hz)
     force_n: Floats = unsteady_n(scene, vectors_x(v), vectors_x(dv), even_s) + np.array([0.0, _lift_n(scene), 0.0])
+    return force_n
+
+
+def _non_newtonian_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s: float) -> Floats:
+    """Return non-Newtonian drag by the letter, added mass and buoyancy, (n, 3) [N]."""
+    liquid, t_s = scene.liquids[0], motion.t_s
+    v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
+    added_n = 0.5 * liquid.density_kg_m3 * scene.body.volume_m3 * dv
+    drag_n = non_newtonian_n(scene, vectors_x(v), np.full(len(t_s), 1 / scene.rate_hz))
+    force_n: Floats = drag_n - vectors_x(added_n) + np.array([0.0, _lift_n(scene), 0.0])
     return force_n
 
 
