@@ -1,4 +1,4 @@
-"""Measured motion and force from a file, and how a measured motion becomes one that `simulate` can follow."""
+"""Measured motion and force, or a flow curve, from a file; a measured motion as one that `simulate` can follow."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ from study_app.haptics.model.motion import PLACES, VELOCITIES, Floats, Motion
 
 FORCES: Final = ("fx_n", "fy_n", "fz_n")
 ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")
+FLOW_CURVE: Final = ("shear_rate_per_s", "shear_stress_pa")
 LONGEST_S: Final = 0.05
 SMOOTHED_S: Final = 0.025
 HEADER: Final = (
     f"{','.join(PLACES + FORCES)}, with {','.join(VELOCITIES)} where they are known, or {','.join(ALONG_A_LINE)} for a "
-    "motion along one line"
+    f"motion along one line, or {','.join(FLOW_CURVE)} of a rheometer"
 )
 
 
@@ -37,8 +38,22 @@ class Measured:
             raise StudyError(f"a measured force is finite and (n, 3), not {self.force_n.shape}")
 
 
-def read(path: Path) -> Measured:
-    """Read a CSV file with one of the two headers in `HEADER`, its columns in any order; others are not read.
+@dataclass(frozen=True, slots=True, eq=False)
+class FlowCurve:
+    """Shear rates (n,) [1/s] and shear stresses (n,) [Pa] of steady shear, as a rheometer measures them."""
+
+    rate_per_s: Floats
+    stress_pa: Floats
+
+    def __post_init__(self) -> None:
+        for name, values in zip(FLOW_CURVE, (self.rate_per_s, self.stress_pa), strict=True):
+            if values.min() <= 0:
+                row = int(values.argmin()) + 1
+                raise StudyError(f"row {row} has {name} {values.min():g}: it must be above 0; remove the row")
+
+
+def read(path: Path) -> Measured | FlowCurve:
+    """Read a CSV file with one of the headers in `HEADER`, its columns in any order; others are not read.
 
     Lines that begin with # are left out. Along a line, the motion is along x and places are summed from velocities.
 
@@ -61,6 +76,8 @@ def read(path: Path) -> Measured:
         names += VELOCITIES if all(name in header for name in VELOCITIES) else ()
     elif all(name in header for name in ALONG_A_LINE):
         names = ALONG_A_LINE
+    elif all(name in header for name in FLOW_CURVE):
+        names = FLOW_CURVE
     else:
         lacking = ", ".join(name for name in names if name not in header)
         raise StudyError(f"{path} has no column {lacking}: the first line must name {HEADER}")
@@ -95,7 +112,9 @@ def _number(field: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _measured(rows: Floats, names: tuple[str, ...]) -> Measured:
+def _measured(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:
+    if names == FLOW_CURVE:
+        return FlowCurve(rows[:, 0], rows[:, 1])
     if names == ALONG_A_LINE:
         return along_a_line(rows[:, 0], rows[:, 1], rows[:, 2])
     velocity_mps = rows[:, 7:] if len(names) > len(PLACES + FORCES) else None

@@ -9,8 +9,11 @@ from typing import Final
 import numpy as np
 
 from study_app import figure_style as style
-from study_app.evaluation.identify import fit_figure
-from study_app.evaluation.identify.fit import CONFIDENCE, Fit
+from study_app.evaluation.identify import fit_figure, flow_curve_figure
+from study_app.evaluation.identify.estimates import CONFIDENCE, Estimates
+from study_app.evaluation.identify.fit import Fit
+from study_app.evaluation.identify.flow_curve import CurveFit
+from study_app.evaluation.identify.measured_force import FLOW_CURVE
 from study_app.evaluation.identify.parameters import Parameter
 from study_app.haptics.runtime.offline import Table
 from study_app.protocol.scene_file import for_new_file, scene_text
@@ -21,7 +24,7 @@ from study_app.store.tables import csv_files
 COLUMNS: Final = tuple(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz")
 
 
-def text(found: Fit) -> str:
+def text(found: Estimates) -> str:
     """Return the report: the parameters before and after with their intervals, the residual, and warnings."""
     rows = [
         ["parameter", "from", "fitted", f"{100 * CONFIDENCE:g} % interval"],
@@ -34,7 +37,7 @@ def text(found: Fit) -> str:
     return "\n".join((f"{found.liquid_id}: {found.summary()}", *table, *(f"warning: {it}" for it in found.warnings)))
 
 
-def write(found: Fit, to: Path, source: Path) -> tuple[Path, ...]:
+def write(found: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
     """Write preset (TOML), report (text), residuals (CSV) and figure into the folder ``to``; return the files.
 
     ``source`` is the file that was measured: the preset names it with its hash.
@@ -49,13 +52,16 @@ def write(found: Fit, to: Path, source: Path) -> tuple[Path, ...]:
     written = [to / f"{found.liquid_id}.toml", to / f"{name}.txt", to / f"{name}.csv"]
     write_file(written[0], preset(found, source).encode())
     write_file(written[1], f"{text(found)}\n".encode())
-    csv_files.write_columns(written[2], residuals(found))
-    drawn = fit_figure.draw(found)
+    if isinstance(found, CurveFit):
+        table, drawn, what = curve_residuals(found), flow_curve_figure.draw(found), "flow curve"
+    else:
+        table, drawn, what = residuals(found), fit_figure.draw(found), "force"
+    csv_files.write_columns(written[2], table)
     for kind in style.FORMATS:
         written.append(to / f"{name}.{kind}")
         write_file(
             written[-1],
-            style.file_bytes(drawn, kind, f"{found.liquid_id}: measured and fitted force", style.PLOT_SETTINGS),
+            style.file_bytes(drawn, kind, f"{found.liquid_id}: measured and fitted {what}", style.PLOT_SETTINGS),
         )
     return tuple(written)
 
@@ -70,7 +76,17 @@ def residuals(found: Fit) -> Table:
     return table
 
 
-def preset(found: Fit, source: Path) -> str:
+def curve_residuals(found: CurveFit) -> Table:
+    """Return shear rates, measured and fitted stresses and what is left, a row a shear rate."""
+    columns = (found.curve.rate_per_s, found.curve.stress_pa, found.fitted_pa, found.curve.stress_pa - found.fitted_pa)
+    names = (*FLOW_CURVE, "fitted_pa", "residual_pa")
+    table = np.recarray(len(found.fitted_pa), [(name, np.float64) for name in names])
+    for name, column in zip(names, columns, strict=True):
+        table[name] = column
+    return table
+
+
+def preset(found: Estimates, source: Path) -> str:
     """Return the fitted scene as a scene file, each fitted number with its interval in a comment.
 
     The fit takes velocities from the measured motion, never from an estimator; the file names that of new files.
@@ -84,7 +100,7 @@ def preset(found: Fit, source: Path) -> str:
     return scene_text(for_new_file(found.scene), said=said, notes=notes)
 
 
-def _place(it: Parameter, found: Fit) -> tuple[str, ...]:
+def _place(it: Parameter, found: Estimates) -> tuple[str, ...]:
     """Return where a parameter stands in a scene file."""
     if it.table == "body":
         return "scene", "body", it.field

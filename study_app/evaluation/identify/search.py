@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,32 +77,34 @@ class Problem:
     """A scene, the parameters that are searched, and what was measured.
 
     z (p,) are the numbers of the search: u, but for a scaling whose length is searched too, there the logarithm of
-    their ratio. ``least`` and ``most`` (p,) are its range, ``start`` the scene's own values in it, ``axes`` those of
-    the force that count: measured or predicted to be other than zero.
-
-    Raises
-    ------
-    StudyError
-        Too little was measured.
+    their ratio. ``least`` and ``most`` (p,) are its range, ``start`` the scene's own values in it. ``compared``,
+    ``varied`` and ``more`` are words for warnings; ``alike`` is the correlation of two estimates from which their
+    parameters count as not distinguishable.
     """
 
-    def __init__(self, scene: Scene, liquid_id: str, parameters: tuple[Parameter, ...], measured: Measured) -> None:
-        self.parameters, self.measured = parameters, measured
+    alike: ClassVar[float]
+    compared: ClassVar[str]
+    varied: ClassVar[str]
+    more: ClassVar[str]
+
+    def __init__(self, scene: Scene, liquid_id: str, parameters: tuple[Parameter, ...]) -> None:
+        self.parameters = parameters
         self._scene, self._liquid_id = scene, liquid_id
-        self._motion = at_rate(measured.motion, scene.rate_hz)
         self._coordinates = tuple(coordinate(it) for it in parameters)
         self.length = next((k for k, it in enumerate(parameters) if it.whole), None)
         of = None if self.length is None else (parameters[self.length].table, "scaling")
         self.scaling = next((k for k, it in enumerate(parameters) if (it.table, it.field) == of), None)
-        self._spacing = max(1, math.ceil(1000 / scene.rate_hz))
         self.least, self.most = (np.array(ends) for ends in zip(*map(self._range, parameters), strict=True))
         self.start = np.clip(self._to_z([it.value for it in parameters]), self.least, self.most)
-        if not measured.force_n.any():
-            raise StudyError("the measured force is zero throughout: there is nothing to fit to")
-        simulated_n = self.force_n(self.start)
-        self.axes = tuple(axis for axis in range(3) if measured.force_n[:, axis].any() or simulated_n[:, axis].any())
-        if len(measured.force_n) * len(self.axes) <= len(parameters):
-            raise StudyError(f"{len(measured.force_n)} rows are too few for {len(parameters)} parameters")
+
+    @property
+    def columns(self) -> int:
+        """How many values a measured row has."""
+        return 1
+
+    def misfit(self, z: Floats) -> Floats:
+        """Return predicted − measured values, (m,), row by row."""
+        raise NotImplementedError
 
     def values(self, z: Floats) -> list[float]:
         """Return the parameters' values, each in its range; a length not rounded."""
@@ -116,20 +118,6 @@ class Problem:
         if self.length is not None and self.scaling is not None:
             u[self.scaling] += u[self.length]
         return u
-
-    def force_n(self, z: Floats) -> Floats:
-        """Return the force (n, 3) at the measured times; between whole lengths interpolated."""
-        values = self.values(z)
-        if self.length is None:
-            return self._simulated(values)
-        below, above, share = self._neighbours(values, self.length)
-        force_n = self._simulated(below)
-        return force_n if share == 0 else (1 - share) * force_n + share * self._simulated(above)
-
-    def misfit(self, z: Floats) -> Floats:
-        """Return simulated − measured force on the axes that count, (m,)."""
-        misfit: Floats = (self.force_n(z) - self.measured.force_n)[:, self.axes].ravel()
-        return misfit
 
     def slopes(self, z: Floats) -> Floats:
         """Return the derivative of the misfit by z, (m, p), from differences to both sides as far as permitted."""
@@ -170,6 +158,74 @@ class Problem:
         """Return the scene with the values of z, a length rounded."""
         return replace(self._scene, self._liquid_id, self.parameters, self.values(z))
 
+    def _longest(self, values: Sequence[float], k: int) -> float:
+        """Return the greatest whole length that the scaling permits."""
+        scaling = self._beside(self.parameters[k], "scaling") if self.scaling is None else values[self.scaling]
+        return min(self.parameters[k].most, math.floor(scaling * (1 + 1e-12)))
+
+    def _beside(self, it: Parameter, field: str) -> float:
+        """Return another number of a parameter's table."""
+        (liquid,) = (liquid for liquid in self._scene.liquids if liquid.id == self._liquid_id)
+        return float(getattr(getattr(liquid, it.table), field))
+
+    def _range(self, it: Parameter) -> tuple[float, float]:
+        """Return the least and the greatest z."""
+        return u_range(it)
+
+    def _to_z(self, values: Sequence[float]) -> Floats:
+        z = np.array([it.to_u(value) for it, value in zip(self._coordinates, values, strict=True)])
+        if self.length is not None and self.scaling is not None:
+            z[self.scaling] = max(z[self.scaling] - z[self.length], 0.0)
+        return z
+
+
+class ForceProblem(Problem):
+    """The force along a measured motion.
+
+    ``axes`` are those of the force that count: measured or predicted to be other than zero.
+
+    Raises
+    ------
+    StudyError
+        Too little was measured.
+    """
+
+    alike = 0.95
+    compared = "force along this motion"
+    varied = "this motion"
+    more = "measure more kinds of motion"
+
+    def __init__(self, scene: Scene, liquid_id: str, parameters: tuple[Parameter, ...], measured: Measured) -> None:
+        self.measured = measured
+        self._motion = at_rate(measured.motion, scene.rate_hz)
+        self._spacing = max(1, math.ceil(1000 / scene.rate_hz))
+        super().__init__(scene, liquid_id, parameters)
+        if not measured.force_n.any():
+            raise StudyError("the measured force is zero throughout: there is nothing to fit to")
+        simulated_n = self.force_n(self.start)
+        self.axes = tuple(axis for axis in range(3) if measured.force_n[:, axis].any() or simulated_n[:, axis].any())
+        if len(measured.force_n) * len(self.axes) <= len(parameters):
+            raise StudyError(f"{len(measured.force_n)} rows are too few for {len(parameters)} parameters")
+
+    @property
+    def columns(self) -> int:
+        """How many axes count."""
+        return len(self.axes)
+
+    def force_n(self, z: Floats) -> Floats:
+        """Return the force (n, 3) at the measured times; between whole lengths interpolated."""
+        values = self.values(z)
+        if self.length is None:
+            return self._simulated(values)
+        below, above, share = self._neighbours(values, self.length)
+        force_n = self._simulated(below)
+        return force_n if share == 0 else (1 - share) * force_n + share * self._simulated(above)
+
+    def misfit(self, z: Floats) -> Floats:
+        """Return simulated − measured force on the axes that count, (m,)."""
+        misfit: Floats = (self.force_n(z) - self.measured.force_n)[:, self.axes].ravel()
+        return misfit
+
     def _simulated(self, values: Sequence[float]) -> Floats:
         table = simulate(replace(self._scene, self._liquid_id, self.parameters, values), self._motion)
         columns = (table.fx_n, table.fy_n, table.fz_n)
@@ -186,16 +242,6 @@ class Problem:
         share = min(share, 1.0) if share > 1e-9 else 0.0
         return [*values[:k], below, *values[k + 1 :]], [*values[:k], above, *values[k + 1 :]], share
 
-    def _longest(self, values: Sequence[float], k: int) -> float:
-        """Return the greatest whole length that the scaling permits."""
-        scaling = self._beside(self.parameters[k], "scaling") if self.scaling is None else values[self.scaling]
-        return min(self.parameters[k].most, math.floor(scaling * (1 + 1e-12)))
-
-    def _beside(self, it: Parameter, field: str) -> float:
-        """Return another number of a parameter's table."""
-        (liquid,) = (liquid for liquid in self._scene.liquids if liquid.id == self._liquid_id)
-        return float(getattr(getattr(liquid, it.table), field))
-
     def _range(self, it: Parameter) -> tuple[float, float]:
         """Return the least and the greatest z: a length is no longer than its scaling, or than what was measured."""
         if it.field == "scaling":
@@ -206,13 +252,7 @@ class Problem:
             if self.scaling is None:
                 most = min(most, math.floor(self._beside(it, "scaling")))
             return 0.0, max(math.log(max(most, 1)), _LENGTH_STEP)
-        return u_range(it)
-
-    def _to_z(self, values: Sequence[float]) -> Floats:
-        z = np.array([it.to_u(value) for it, value in zip(self._coordinates, values, strict=True)])
-        if self.length is not None and self.scaling is not None:
-            z[self.scaling] = max(z[self.scaling] - z[self.length], 0.0)
-        return z
+        return super()._range(it)
 
 
 def solve(problem: Problem) -> tuple[Floats, bool]:

@@ -299,7 +299,7 @@ def test_another_liquid_is_named():
 
 def test_between_whole_lengths_the_force_is_interpolated_and_at_them_it_is_simulated():
     known = measured_force.Measured(REVERSE, force_of(TANK, REVERSE))
-    problem = search.Problem(TANK, "tank", parameters.find(TANK, "tank", ["length"]), known)
+    problem = search.ForceProblem(TANK, "tank", parameters.find(TANK, "tank", ["length"]), known)
     whole = [force_of(override_all(TANK, {"length": n}), REVERSE) for n in (250, 251)]
     for length, expected_n in ((250, whole[0]), (251, whole[1]), (250.25, 0.75 * whole[0] + 0.25 * whole[1])):
         assert problem.force_n(np.array([math.log(length)])) == pytest.approx(expected_n, abs=1e-9)
