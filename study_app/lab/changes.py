@@ -91,6 +91,8 @@ def _with_effect(scene: Scene, effect: str, *, on: bool) -> Scene:
     values = _named(scene) | {"effects": tuple(it for it in NAMED if it in wanted)}
     if on and NAMED[effect].model is not None and getattr(liquid, effect) is None:
         values[f"liquid.{effect}"] = _begun(scene, effect, "")
+    if on:
+        values |= {f"liquid.{name}": None for name in NAMED[effect].replaces}
     try:
         return override_all(scene, values)
     except StudyError as error:

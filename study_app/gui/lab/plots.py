@@ -168,7 +168,7 @@ SPEED_SENTENCE = f"Speed of the body, and of the wake in settings A and B, over 
 class PlotCard(Card):
     """A plot under its heading and its curves' names; while blind, nothing of it in the same place."""
 
-    def __init__(self, title: str, unit: str, plot: CurvePlot, sentence: str) -> None:
+    def __init__(self, title: str, unit: str, plot: Plot, sentence: str) -> None:
         super().__init__(title, label(unit, "small", "text2"), padding=14, gap=4)
         self.plot, self.legend = plot, Legend()
         describe_plot(plot, title, sentence)

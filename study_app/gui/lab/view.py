@@ -11,6 +11,7 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QScrollArea, QVBoxLayout, QWidget
 
+from study_app.gui.lab.flow_curve_cards import FlowCurveRow
 from study_app.gui.lab.form import FormPanel
 from study_app.gui.lab.header import LabHeader
 from study_app.gui.lab.lab_tank import LabTank
@@ -76,6 +77,7 @@ class LabPlace(Place):
         self.tank = LabTank()
         self.note = TankNote(self.tank)
         self.force, self.speed = ForceCard(), SpeedCard()
+        self.curves = FlowCurveRow(GAP)
         self.cost, self.error, self.limiters = CostCard(), ErrorCard(), LimiterCard()
         self._escape = EscapeAnywhere(self)
         self._lay_out()
@@ -98,7 +100,8 @@ class LabPlace(Place):
         self._middle.addLayout(framed, 0, 0, 1, 2)
         self._middle.addWidget(self.force, 1, 0)
         self._middle.addWidget(self.speed, 1, 1)
-        self._middle.addLayout(self._side, 2, 0, 1, 2)
+        self._middle.addWidget(self.curves, 2, 0, 1, 2)
+        self._middle.addLayout(self._side, 3, 0, 1, 2)
         self._area = _scrolled(self._middle)
         self._side_area = _scrolled(QGridLayout())
         self._body = QGridLayout()
@@ -181,9 +184,11 @@ class LabPlace(Place):
         """Show the lab as of now."""
         self._view = view
         for part in (
-            self.header, self.form, self.tank, self.note, self.force, self.speed, self.cost, self.error, self.limiters,
+            self.header, self.form, self.tank, self.note, self.force, self.speed, self.curves, self.cost, self.error,
+            self.limiters,
         ):  # fmt: skip
             part.show_view(view)
+        self._middle.setRowStretch(1, 0 if self.curves.isVisibleTo(self) else 39)  # the tank makes room for a third row
 
     def ask_where_to_save(self) -> None:
         """Ask for the preset's file; nothing waits meanwhile, and the force can be stopped while the dialog is open."""

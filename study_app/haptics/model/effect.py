@@ -130,6 +130,8 @@ class Effect:
         The effects that it can act through, one of which it needs; the usual one first.
     excludes : tuple of str
         Effects that are models of the same thing.
+    replaces : tuple of str
+        Fields of the liquid that must be empty with it: the lab empties them.
     problem : callable, optional
         What is wrong with a liquid that selects it, in a sentence.
     parameters : tuple, optional
@@ -176,6 +178,7 @@ class Effect:
     missing: str = ""
     through: tuple[str, ...] = ()
     excludes: tuple[str, ...] = ()
+    replaces: tuple[str, ...] = ()
     problem: Callable[[Any], str | None] | None = None
     parameters: Fields | None = None
     state: Fields | None = None

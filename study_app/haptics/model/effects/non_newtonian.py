@@ -150,6 +150,7 @@ EFFECT = Effect(
     model=Rheology,
     missing='kind = "herschel-bulkley", "carreau", "maxwell" or "shear-thickening", ...',
     excludes=_REPLACES,
+    replaces=("viscosity_pa_s",),
     problem=_problem,
     parameters=PARAMETERS,
     state=STATE,

@@ -1,0 +1,40 @@
+"""Flow curves and steady forces of the lab's settings."""
+
+import numpy as np
+import pytest
+
+from study_app.haptics.model.rheology import yield_n
+from study_app.haptics.model.scene import Liquid, Scene
+from study_app.haptics.model.steady_state import steady
+from study_app.lab.changes import changed
+from study_app.lab.steady_curves import RATES_PER_S, SPEEDS_MPS, steady_curves
+from study_app.protocol.load import load_scene
+from tests.haptics.materials import PRESETS
+
+
+def test_ketchup_has_its_flow_curve_and_a_force_at_rest():
+    found = steady_curves(load_scene("slime", "ketchup"))
+    assert found.stress_pa == pytest.approx(15 + 10 * RATES_PER_S**0.25)
+    assert found.force_n[0] == pytest.approx(yield_n(PRESETS["ketchup"][1], 0.068))
+    assert found.force_n[10] == steady(load_scene("slime", "ketchup"), float(SPEEDS_MPS[10])).force_n
+    assert not found.is_newtonian
+
+
+def test_newtonian_liquids_have_a_straight_flow_curve_and_those_without_viscosity_none():
+    honey = steady_curves(load_scene("slime", "honey"))
+    assert honey.is_newtonian
+    assert honey.stress_pa == pytest.approx(10 * RATES_PER_S)
+    plain = steady_curves(Scene(liquids=(Liquid(id="a", density_kg_m3=1000),)))
+    assert plain.stress_pa is None
+    assert plain.force_n[-1] > 0
+
+
+def test_non_newtonian_drag_takes_the_place_of_a_viscosity():
+    honey = load_scene("physical2", "honey")
+    found = changed(honey, "effects.non_newtonian", "on")
+    assert found.liquids[0].viscosity_pa_s is None
+    assert not steady_curves(found).is_newtonian
+    thicker = changed(found, "non_newtonian.yield_stress_pa", 60.0)
+    assert np.all(steady_curves(thicker).stress_pa - steady_curves(found).stress_pa == pytest.approx(45.0))
+    carreau = changed(found, "non_newtonian.kind", "carreau")
+    assert steady_curves(carreau).force_n[0] == 0.0
