@@ -57,7 +57,14 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
         return override_all(scene, by_hand | {f"liquid.{place}": _begun(scene, place, str(value))})
     if read(scene, name) is None and value == value_of(scene, name):  # what is left open, and is so already
         return scene
-    return override_all(scene, by_hand | {name: value})
+    return override_all(scene, by_hand | _without_replaced(scene, place, field) | {name: value})
+
+
+def _without_replaced(scene: Scene, place: str, field: str) -> dict[str, None]:
+    """Return the tables that a field of the liquid replaces, of effects that are off, to be emptied."""
+    taken = resolve(scene).liquids[0].effects
+    replaced = (it.name for it in EFFECTS if place == "liquid" and field in it.replaces and it.name not in taken)
+    return {f"liquid.{name}": None for name in replaced}
 
 
 def _checked(it: Parameter, value: Value) -> Value:
