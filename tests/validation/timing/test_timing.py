@@ -124,7 +124,7 @@ def test_servo_and_bare_loop_count_alike(late_clock):
 
 
 def test_every_effect_that_can_act_at_once_is_on_and_acts():
-    assert set(FULL.liquids[0].effects) == set(Effect.__args__) - {"local_wake", "unsteady_drag"}
+    assert set(FULL.liquids[0].effects) == set(Effect.__args__) - {"local_wake", "unsteady_drag", "non_newtonian"}
     servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
     reader = servo.telemetry.reader()
     servo.load(FULL)
