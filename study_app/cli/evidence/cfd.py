@@ -26,8 +26,11 @@ from study_app.workers.executors import Workers
     "when it is left out of the fit: about two minutes.",
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; default: print.")
+@click.option(
+    "--materials", is_flag=True, help="Only the drag in Herschel–Bulkley liquids; --solve takes half an hour."
+)
 @takes_workers
-def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool) -> None:
+def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, materials: bool) -> None:
     """Fit models of honey and glycerin to the force of a fluid solver; report the remaining error.
 
     A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
@@ -45,6 +48,9 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool) -> None:
         raise click.UsageError("--solve needs --to: the folder for the solver's tables")
     if to is not None:
         make_folder(to)
+    if materials:
+        _materials(to, solve=solve)
+        return
     with progress(lambda text: click.echo(text, err=True)) as show:
         solved: tuple[Path, ...] = ()
         if solve and to is not None:
@@ -68,3 +74,13 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool) -> None:
         return
     for written in write(tables, drag, fits, to):
         click.echo(written)
+
+
+def _materials(to: Path | None, *, solve: bool) -> None:
+    """Print the law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
+    from study_app.validation.cfd.yield_flow import materials_markdown, solve_materials, stored_materials
+
+    if solve and to is not None:
+        with progress(lambda text: click.echo(text, err=True)) as show:
+            click.echo(solve_materials(to, show))
+    click.echo(materials_markdown(stored_materials(to if solve else None)))

@@ -118,7 +118,7 @@ def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = STEP) -> by
         **notes_of(case),
         "motion": profile.description,
         "reynolds": f"{case.reynolds:.6g}",
-        **_made(),
+        **made(),
         "method": f"axisymmetric, order {ORDER}, {flow.unknowns} unknowns, {flow.grid}, steps {steps}",
         "from_coarse": f"{checks['from_coarse']} ({coarse.unknowns} unknowns, steps twice as long)",
         "from_exact": f"{checks['from_exact']} (convection off; Stokes, added mass and Basset)",
@@ -143,7 +143,7 @@ def steady_table() -> bytes:
     method = "; ".join(
         f"{flow.unknowns} unknowns, {it}" for flow, it in zip(solved, (WIDE, WIDE_COARSE, GRID), strict=True)
     )
-    notes = {"title": "steady drag of a sphere", **_made(), "method": f"axisymmetric, order {ORDER}: {method}"}
+    notes = {"title": "steady drag of a sphere", **made(), "method": f"axisymmetric, order {ORDER}: {method}"}
     return text(notes, dict(zip(STEADY, (REYNOLDS, *columns), strict=True)))
 
 
@@ -162,9 +162,10 @@ def _check(case: Case, what: str, difference: Floats, force: Floats, times: Floa
     )
 
 
-def _made() -> dict[str, str]:
+def made(command: str = COMMAND) -> dict[str, str]:
+    """Return the notes that say by what a table was made."""
     return {
-        "command": COMMAND,
+        "command": command,
         "machine": machine(),
         "solver": ", ".join(f"{name} {version(name)}" for name in ("ngsolve", "netgen-mesher")),
     }

@@ -73,7 +73,7 @@ def stored(folder: Traversable | None = None) -> tuple[Table, ...]:
     StudyError
         There is none, or one cannot be understood.
     """
-    return _motions(folder or _package())
+    return _motions(folder or package())
 
 
 def training(folder: Traversable | None = None) -> tuple[Table, ...]:
@@ -84,7 +84,7 @@ def training(folder: Traversable | None = None) -> tuple[Table, ...]:
     StudyError
         There is none, or one cannot be understood.
     """
-    return _motions((folder or _package()) / TRAINING_FOLDER)
+    return _motions((folder or package()) / TRAINING_FOLDER)
 
 
 def held_out(folder: Traversable | None = None) -> tuple[Table, ...]:
@@ -95,7 +95,7 @@ def held_out(folder: Traversable | None = None) -> tuple[Table, ...]:
     StudyError
         There is none, or one cannot be understood.
     """
-    return _motions((folder or _package()) / HELD_OUT_FOLDER)
+    return _motions((folder or package()) / HELD_OUT_FOLDER)
 
 
 def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
@@ -106,7 +106,7 @@ def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
     StudyError
         The file cannot be understood.
     """
-    file = (folder or _package()) / LEFT_OUT_FILE
+    file = (folder or package()) / LEFT_OUT_FILE
     if not file.is_file():
         return {}
     try:
@@ -125,7 +125,7 @@ def _motions(place: Traversable) -> tuple[Table, ...]:
     files = sorted((it for it in names if it.name.endswith("mmps.csv")), key=lambda it: it.name)
     if not files:
         raise StudyError(f"{place} holds no tables of the fluid solver: make them with liquid-study cfd --solve")
-    return tuple(_read(it, MOTION, OF_THE_MODEL) for it in files)
+    return tuple(read(it, MOTION, OF_THE_MODEL) for it in files)
 
 
 def steady(folder: Traversable | None = None) -> Table:
@@ -136,14 +136,22 @@ def steady(folder: Traversable | None = None) -> Table:
     StudyError
         It is not there, or cannot be understood.
     """
-    return _read((folder or _package()) / STEADY_FILE, STEADY)
+    return read((folder or package()) / STEADY_FILE, STEADY)
 
 
-def _package() -> Traversable:
+def package() -> Traversable:
+    """Return the folder of the stored tables."""
     return resources.files("study_app.validation.cfd")
 
 
-def _read(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> Table:
+def read(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> Table:
+    """Return a table with these columns, and numbers in the notes ``noted``.
+
+    Raises
+    ------
+    StudyError
+        It is not there, or cannot be understood.
+    """
     try:
         lines = file.read_text(encoding="utf-8").splitlines()
         said = (line[1:].split(":", 1) for line in lines if line.startswith("#"))
