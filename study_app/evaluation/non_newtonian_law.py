@@ -1,6 +1,6 @@
 """Non-Newtonian drag by the letter of its law: what ``haptics.kernels.effects.non_newtonian`` must equal.
 
-The steady force is that of ``haptics.model.rheology``; the states are integrated here in many steps per tick, and
+The steady force is that of ``haptics.model.laws.rheology``; the states are integrated here in many steps per tick, and
 share no code with the kernel.
 """
 
@@ -12,10 +12,10 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.kernels.compiled import workings
-from study_app.haptics.model import rheology
 from study_app.haptics.model.effects.non_newtonian import STIFFNESS_NPM
+from study_app.haptics.model.laws import rheology
+from study_app.haptics.model.laws.rheology import Maxwell
 from study_app.haptics.model.motion import Floats
-from study_app.haptics.model.rheology import Maxwell
 from study_app.haptics.model.scene import Scene
 
 STEPS: Final = 50

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.laws import Law
+from study_app.haptics.model.laws.drag import Law
 from study_app.haptics.model.scene import Effect, Everywhere, Scene
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.rheology import stress_pa
+from study_app.haptics.model.laws.rheology import stress_pa
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.steady_state import steady
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from study_app.errors import StudyError
-from study_app.haptics.model.rheology import yield_n
+from study_app.haptics.model.laws.rheology import yield_n
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.haptics.model.steady_state import steady
 from study_app.lab.changes import changed

@@ -49,7 +49,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     if to is not None:
         make_folder(to)
     if materials:
-        _materials(to, solve=solve)
+        _materials(to, workers, solve=solve)
         return
     with progress(lambda text: click.echo(text, err=True)) as show:
         solved: tuple[Path, ...] = ()
@@ -76,11 +76,11 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
         click.echo(written)
 
 
-def _materials(to: Path | None, *, solve: bool) -> None:
+def _materials(to: Path | None, workers: Workers, *, solve: bool) -> None:
     """Print the law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
     from study_app.validation.cfd.yield_flow import materials_markdown, solve_materials, stored_materials
 
     if solve and to is not None:
-        with progress(lambda text: click.echo(text, err=True)) as show:
-            click.echo(solve_materials(to, show))
+        with progress(lambda text: click.echo(text, err=True)) as show, executor_for(workers) as executor:
+            click.echo(solve_materials(to, executor, show))
     click.echo(materials_markdown(stored_materials(to if solve else None)))

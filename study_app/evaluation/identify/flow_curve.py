@@ -1,7 +1,7 @@
 """Parameters of a non-Newtonian liquid from a rheometer's flow curve: shear stress over shear rate.
 
 The sum of (fitted/measured stress − 1)² is made least, since flow curves span decades and a rheometer's error is a
-share of the stress. The curve is `study_app.haptics.model.rheology.stress_pa`, that of steady shear.
+share of the stress. The curve is `study_app.haptics.model.laws.rheology.stress_pa`, that of steady shear.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from study_app.evaluation.identify.measured_force import FlowCurve
 from study_app.evaluation.identify.parameters import Parameter, find
 from study_app.evaluation.identify.search import Problem
 from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.laws.rheology import stress_pa
 from study_app.haptics.model.motion import Floats
-from study_app.haptics.model.rheology import stress_pa
 from study_app.haptics.model.scene import Scene
 
 TABLE: Final = "non_newtonian"

@@ -12,7 +12,7 @@ from matplotlib.ticker import ScalarFormatter
 
 from study_app import figure_style as style
 from study_app.evaluation.identify.flow_curve import TABLE, CurveFit
-from study_app.haptics.model.rheology import stress_pa
+from study_app.haptics.model.laws.rheology import stress_pa
 
 MARGIN: Final = 1.3
 LETTERS: Final = 96

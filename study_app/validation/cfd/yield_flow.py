@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Final
@@ -20,14 +21,13 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.errors import StudyError
+from study_app.haptics.model.laws.rheology import HerschelBulkley, creeping_n
 from study_app.haptics.model.motion import Floats
-from study_app.haptics.model.rheology import HerschelBulkley, creeping_n
 from study_app.store.atomic import write_file
 from study_app.store.output_files import make_folder
 from study_app.validation.cfd.flow import ORDER, Flow, Grid, library
 from study_app.validation.cfd.solver import made
 from study_app.validation.cfd.stored_flows import package, read, text
-from study_app.workers.executors import open_executor
 
 COMMAND: Final = "liquid-study cfd --materials --solve"
 FILE: Final = "herschel_bulkley.csv"
@@ -106,8 +106,8 @@ class YieldFlow(Flow):
         return False
 
 
-def solve_materials(to: Path, tell: Callable[[str], None]) -> Path:
-    """Write the table of Herschel–Bulkley liquids into the folder ``to``; return the file.
+def solve_materials(to: Path, executor: Executor, tell: Callable[[str], None]) -> Path:
+    """Write the table of Herschel–Bulkley liquids, solved by an executor, into the folder ``to``; return the file.
 
     Raises
     ------
@@ -117,10 +117,9 @@ def solve_materials(to: Path, tell: Callable[[str], None]) -> Path:
     library()
     make_folder(to)
     rows: list[tuple[float, ...]] = []
-    with open_executor("processes", len(INDICES)) as executor:
-        for index, found in zip(INDICES, executor.map(_solved, INDICES), strict=True):
-            rows += found
-            tell(f"n {index:g}: drag {', '.join(f'{row[2]:.4f}' for row in found)}")
+    for index, found in zip(INDICES, executor.map(_solved, INDICES), strict=True):
+        rows += found
+        tell(f"n {index:g}: drag {', '.join(f'{row[2]:.4f}' for row in found)}")
     notes = {
         "title": "creeping drag of a sphere in Herschel–Bulkley liquids, over 3πD² K (U/D)^n",
         **made(COMMAND),

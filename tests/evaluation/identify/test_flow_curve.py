@@ -10,9 +10,9 @@ from study_app.evaluation.identify import flow_curve_figure, measured_force
 from study_app.evaluation.identify.fit import fit
 from study_app.evaluation.identify.flow_curve import fit_curve
 from study_app.evaluation.identify.measured_force import FlowCurve
+from study_app.haptics.model.laws.rheology import stress_pa
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
-from study_app.haptics.model.rheology import stress_pa
 from study_app.protocol.load import load_scene
 from tests.evaluation.identify.measurements import force_of
 from tests.haptics.materials import PRESETS, tank

@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.errors import StudyError
-from study_app.haptics.model.rheology import shape_factor
+from study_app.haptics.model.laws.rheology import shape_factor
 from study_app.validation.cfd import yield_flow
 from study_app.validation.cfd.flow import Grid
 from study_app.validation.cfd.yield_flow import (

@@ -22,14 +22,14 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import clear, copy, norm, square
-from study_app.haptics.model import rheology
 from study_app.haptics.model.effects.non_newtonian import (
     KIND_CARREAU,
     KIND_HERSCHEL_BULKLEY,
     KIND_MAXWELL,
     VISCOUS_SHARE,
 )
-from study_app.haptics.model.laws import finite_reynolds
+from study_app.haptics.model.laws import rheology
+from study_app.haptics.model.laws.drag import finite_reynolds
 from study_app.haptics.model.layout import GROWS_AS_SPEED, GROWS_LESS, Record
 
 SLACK_COUNTS = 2.0

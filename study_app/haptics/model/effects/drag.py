@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Self, TypeAlias
 from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from study_app.haptics.model.effect import FLOAT, INT, Effect, Fields, Parameter
-from study_app.haptics.model.laws import LAWS, Law, drag_n
+from study_app.haptics.model.laws.drag import LAWS, Law, drag_n
 from study_app.haptics.model.ranges import Frozen, within
 
 if TYPE_CHECKING:

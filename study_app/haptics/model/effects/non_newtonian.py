@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from study_app.haptics.model.effect import FLOAT, INT, Effect, Fields, Parameter
-from study_app.haptics.model.rheology import (
+from study_app.haptics.model.laws.rheology import (
     CARREAU_RATE,
     RESOLVED_S,
     Carreau,

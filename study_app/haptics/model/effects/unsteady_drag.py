@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from study_app.haptics.model.effect import FLOAT, Effect, Fields, rate_per_s, smoothing_s
 from study_app.haptics.model.effects import added_mass, drag, history
-from study_app.haptics.model.laws import finite_reynolds
+from study_app.haptics.model.laws.drag import finite_reynolds
 
 if TYPE_CHECKING:
     from study_app.haptics.model.bounds import Extremes

@@ -6,12 +6,12 @@ from scipy.spatial.transform import Rotation
 
 from study_app.evaluation.non_newtonian_law import non_newtonian_n
 from study_app.haptics.kernels.plant import measure, move, new_handle, push
-from study_app.haptics.model import rheology
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.non_newtonian import steady_n
+from study_app.haptics.model.laws import rheology
+from study_app.haptics.model.laws.rheology import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLOPE
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.rheology import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.scene import Box, Liquid
 from study_app.haptics.model.steady_state import steady
 from study_app.haptics.runtime.offline import simulate

@@ -5,11 +5,11 @@ import pytest
 from pydantic import ValidationError
 
 from study_app.errors import StudyError
-from study_app.haptics.model import rheology
 from study_app.haptics.model.effects.non_newtonian import steady_n
 from study_app.haptics.model.gate import describe_gate, resolve
+from study_app.haptics.model.laws import rheology
+from study_app.haptics.model.laws.rheology import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.overrides import override
-from study_app.haptics.model.rheology import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.scene import Kalman, Liquid, Scene
 from study_app.haptics.model.steady_state import steady
 from tests.haptics.materials import PRESETS, tank

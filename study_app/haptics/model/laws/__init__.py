@@ -1,0 +1,1 @@
+"""Laws of drag and of flow: published formulas, without a scene."""
