@@ -12,7 +12,7 @@ import pandas as pd
 
 from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.designs.thresholds import family, thresholds
-from study_app.analysis.results.levels import LevelAnswers, LevelsFound, LevelTimes, Summary
+from study_app.analysis.results.levels import LevelAnswers, LevelsFound, LevelTimes, PublishedValue, Summary
 from study_app.analysis.results.question_answers import GroupAnswers
 from study_app.analysis.statistics.outcome import Array, clopper_pearson
 from study_app.analysis.statistics.student_interval import student_interval
@@ -80,6 +80,7 @@ def _block(
         sensitivities=() if opened is None else tuple(sensitivities(block, opened)),
         family=family(block),
         adaptive=block.method is not None and block.method.adaptive,
+        published=tuple(PublishedValue(**one.model_dump(exclude={"block"})) for one in block.published),
     )
 
 

@@ -74,7 +74,8 @@ def _picture(study: Study, found: LevelsFound, name: str, forms: Sequence[str]) 
     simulated = "SIMULATED participants, no people; " if study.simulated else ""
     caption = (
         f"{found.title}: Weber fraction of {found.quantity} at the threshold, over the standard. Thin: participants; "
-        f"thick: random-effects mean with its 95 % interval. {simulated}{counted(len(found.people), 'participant')}."
+        f"thick: random-effects mean with its 95 % interval.{_published_words(found)} "
+        f"{simulated}{counted(len(found.people), 'participant')}."
     )
     return Picture(found.block, name, caption, files)
 
@@ -87,7 +88,9 @@ def _draw(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
     axes = sheet.axes(LEFT_PT, TOP_PT, sheet.width_pt - LEFT_PT - RIGHT_PT, sheet.height_pt - TOP_PT - FOOT_PT)
     group = weber_fractions(found, None)
     own = [weber_fractions(found, person) for person in found.people]
-    _frame(axes, group, own)
+    published = published_fractions(found)
+    _frame(axes, group, own, published)
+    _published(axes, published, sheet)
     for points in own:
         axes.plot(
             [one[0] for one in points], [one[1] for one in points], color=style.PARTICIPANT, linewidth=0.5, alpha=0.7
@@ -108,10 +111,50 @@ def _group(axes: Axes, points: Sequence[Point]) -> None:
             axes.plot([x, x], [low, high], color=style.ACCENT, linewidth=1.2, zorder=3)
 
 
-def _frame(axes: Axes, group: Sequence[Point], own: Sequence[Sequence[Point]]) -> None:
+def published_fractions(found: LevelsFound) -> list[tuple[float | None, float]]:
+    """Return standard and Weber fraction of the published values that are one; a standard of None: of all."""
+    points = []
+    for one in found.published:
+        if one.measure == "weber":
+            points.append((one.standard, one.value))
+        elif one.measure == "threshold" and found.level_kind == "difference" and one.standard:
+            points.append((one.standard, one.value / one.standard))
+    return points
+
+
+def _published_words(found: LevelsFound) -> str:
+    listed = "; ".join(one.in_words() for one in found.published)
+    return f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
+
+
+def _published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: Sheet) -> None:
+    for standard, fraction in points:
+        if standard is None:
+            axes.axhline(fraction, color=style.TEXT_SOFT, linewidth=1.0, linestyle=":", zorder=2)
+            axes.annotate(
+                f"published {fraction:g}",
+                (axes.get_xlim()[1], fraction),
+                xytext=(0, -2),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                color=style.TEXT_SOFT,
+                fontproperties=sheet.font(6.5),
+            )
+        else:
+            axes.plot([standard], [fraction], "o", markersize=5, fillstyle="none", color=style.TEXT_SOFT, zorder=4)
+
+
+def _frame(
+    axes: Axes,
+    group: Sequence[Point],
+    own: Sequence[Sequence[Point]],
+    published: Sequence[tuple[float | None, float]],
+) -> None:
     """Draw logarithmic axes: the standards below, round fractions at the left."""
     values = [value for points in own for _, value, _, _ in points]
     values += [value for point in group for value in point[1:] if value is not None]
+    values += [value for _, value in published]
     low = max((tick for tick in FRACTIONS if tick <= min(values)), default=min(values))
     high = min((tick for tick in FRACTIONS if tick >= max(values)), default=max(values))
     standards = [one[0] for one in group]

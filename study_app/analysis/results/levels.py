@@ -35,6 +35,31 @@ class LevelAnswers:
 
 
 @dataclass(frozen=True, slots=True)
+class PublishedValue:
+    """A value of another study that the protocol names: see `protocol.analysis_plan.Published`."""
+
+    measure: str
+    value: float
+    standard: float | None
+    low: float | None
+    high: float | None
+    percent: float | None
+    n: int | None
+    source: str
+
+    def in_words(self) -> str:
+        """Return it with what is known of it."""
+        known = [
+            *([] if self.standard is None else [f"standard {self.standard:g}"]),
+            *([] if self.low is None or self.high is None else [f"{self.low:g} to {self.high:g}"]),
+            *([] if self.percent is None else [f"at {self.percent:g} % correct"]),
+            *([] if self.n is None else [f"n = {self.n}"]),
+        ]
+        source = f"{self.source}: " if self.source else ""
+        return f"{source}{self.measure} {self.value:g}" + (f" ({', '.join(known)})" if known else "")
+
+
+@dataclass(frozen=True, slots=True)
 class ThresholdFound:
     """A participant's threshold at one standard or, where ``participant`` is None, the group's.
 
@@ -141,6 +166,7 @@ class LevelsFound:
     level_times: tuple[LevelTimes, ...] = ()
     family: str | None = None
     adaptive: bool = False
+    published: tuple[PublishedValue, ...] = ()
 
     @property
     def of_group(self) -> tuple[LevelAnswers, ...]:

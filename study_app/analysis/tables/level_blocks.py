@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from study_app.analysis.tables.compared_blocks import Setting, settings_in, spoken, text_in
+from study_app.protocol.analysis_plan import Published
 from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import every_step_of
@@ -24,7 +25,7 @@ class LevelBlock:
     """A block with a design.
 
     ``stimulus`` is what it varies, ``method`` how its levels were chosen: None where it compares conditions, and while
-    the key is sealed.
+    the key is sealed; ``published`` are the values of other studies that the protocol compares it with.
     """
 
     id: str
@@ -34,6 +35,7 @@ class LevelBlock:
     stimulus: Stimulus | None
     settings: tuple[Setting, ...]
     method: Method | None = None
+    published: tuple[Published, ...] = ()
 
     @property
     def has_correct_answer(self) -> bool:
@@ -80,14 +82,19 @@ def _block(protocol: Mapping[str, Any], step: str, key: Key | None, whole: Proto
     table = protocol["blocks"][step]
     stimulus: Stimulus | None = None
     method: Method | None = None
+    published: tuple[Published, ...] = ()
     if whole is not None:
         block = whole.blocks[step]
         design = design_of(whole, block)
         if block.stimulus is not None:
             stimulus, method = stimulus_of(whole, block), method_of(whole, block)
+        if whole.analysis is not None:
+            published = tuple(one for one in whole.analysis.published if one.block == step)
     elif (written := protocol.get("designs", {}).get(table["design"])) is not None:
         design = DESIGN_KINDS[written["kind"]].model_validate(written)
     else:
         design = default_design(table["design"])
     title = text_in(table["title"], spoken(protocol))
-    return LevelBlock(step, title, table["phase"], design, stimulus, settings_in(protocol, step, key), method)
+    return LevelBlock(
+        step, title, table["phase"], design, stimulus, settings_in(protocol, step, key), method, published
+    )

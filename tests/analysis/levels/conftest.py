@@ -104,6 +104,14 @@ stimulus = "damping"
 standards = [8]
 design = "3ifc"
 method = "quest"
+
+[[analysis.published]]
+block = "staircase"
+measure = "weber"
+value = 0.1917
+percent = 71
+n = 10
+source = "Jones et al. 1997"
 """
 
 

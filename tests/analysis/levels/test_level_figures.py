@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,8 @@ from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.designs.track_courses import courses
 from study_app.analysis.figures.plotting import plot
-from study_app.analysis.figures.weber_figure import weber_fractions
-from study_app.analysis.results.levels import LevelsFound, ThresholdFound
+from study_app.analysis.figures.weber_figure import published_fractions, weber_fractions
+from study_app.analysis.results.levels import LevelsFound, PublishedValue, ThresholdFound
 from study_app.analysis.statistics.psychometrics.posterior import fitted, narrowing
 from study_app.analysis.tables.study import load_study
 from study_app.analysis.tables.tracks import tracks
@@ -71,6 +72,22 @@ def test_weber_fractions_are_levels_or_differences_over_their_standards() -> Non
     assert weber_fractions(found("value", *ones), None) == []
 
 
+def test_published_thresholds_are_weber_fractions_over_their_standard_alone() -> None:
+    values = [
+        PublishedValue("weber", 0.2, None, None, None, 71.0, 10, "A"),
+        PublishedValue("threshold", 2.0, 8.0, 1.5, 2.5, None, None, ""),
+        PublishedValue("threshold", 2.0, None, None, None, None, None, ""),
+        PublishedValue("exponent", 1.0, None, None, None, None, None, ""),
+    ]
+    of_differences = replace(found("difference"), published=tuple(values))
+    assert published_fractions(of_differences) == [(None, 0.2), (8.0, 0.25)]
+    assert published_fractions(replace(of_differences, level_kind="weber")) == [(None, 0.2)]
+    assert [one.in_words() for one in values[:2]] == [
+        "A: weber 0.2 (at 71 % correct, n = 10)",
+        "threshold 2 (standard 8, 1.5 to 2.5)",
+    ]
+
+
 @pytest.fixture(scope="module")
 def plotted(opened_adaptive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     to = tmp_path_factory.mktemp("plots")
@@ -118,6 +135,9 @@ def test_weber_fractions_are_drawn_where_there_are_two_standards(opened_adaptive
     assert (plotted / "weber-staircase.png").exists()
     assert not (plotted / "weber-quest.png").exists()
     assert {"4", "8", "Weber fraction"} < set(words_in(plotted / "weber-staircase.svg"))
+    assert "published 0.1917" in words_in(plotted / "weber-staircase.svg")
+    caption = (plotted / "weber-staircase.txt").read_text(encoding="utf-8")
+    assert "published values, Jones et al. 1997: weber 0.1917 (at 71 % correct, n = 10)." in caption
     (block_found,) = (one for one in levels_found(load_study(opened_adaptive)) if one.block == "staircase")
     assert [point[0] for point in weber_fractions(block_found, "P002")] == [4.0, 8.0]
     assert np.all([point[1] > 0 for point in weber_fractions(block_found, None)])

@@ -25,6 +25,8 @@ def section(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str
         yield heading(3, "Thresholds")
         yield _thresholds(found)
         yield paragraph(_threshold_words(found), "soft")
+        if found.published:
+            yield paragraph(f"Published: {'; '.join(one.in_words() for one in found.published)}.")
         yield from drawn(pictures, f"tracks-{found.block}")
         yield from drawn(pictures, f"weber-{found.block}")
     if found.sensitivities:
