@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from study_app.errors import StudyError
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.layout import (
     LIMITER_ENERGY,
     LIMITER_FADE,
@@ -91,10 +92,13 @@ def test_a_faster_line_is_noisier_and_bears_half():
     assert slope_limit(1e-3, 1, Given()) == slope_limit(1e-3, 1, Ewma()) > 4 * slope_limit(1e-3, 1, Line())
 
 
-@pytest.mark.parametrize("noisier", [Line(samples=5), Foaw(samples=8), Foaw(tolerance_m=1e-6)])
-def test_an_estimator_that_smooths_as_little_bears_no_more_than_the_raw_difference(noisier):
-    assert slope_limit(1e-3, 1, noisier) == slope_limit(1e-3, 1, Raw())
-    assert slope_limit(4e-3, 4, noisier) <= slope_limit(4e-3, 4, type(noisier)())
+def test_a_window_without_tolerance_bears_no_more_than_the_raw_difference():
+    assert slope_limit(1e-3, 1, Foaw(tolerance_m=1e-6)) == slope_limit(1e-3, 1, Raw())
+
+
+@pytest.mark.parametrize("shorter", [Line(samples=5), Foaw(samples=8)])
+def test_a_shorter_window_delays_less_and_bears_more(shorter):
+    assert slope_limit(1e-3, 1, Raw()) < slope_limit(1e-3, 1, type(shorter)()) < slope_limit(1e-3, 1, shorter)
 
 
 def test_one_that_smooths_more_bears_as_much_as_the_usual_one():
@@ -117,12 +121,13 @@ def test_below_500_hz_no_participant_is_to_feel_the_limits(rate_hz, may):
 
 
 def test_the_table_has_every_estimator_period_and_delay_and_falls_with_delay():
-    keys = [(entry.estimator, entry.alpha, entry.period_s, entry.delay_ticks) for entry in table()]
+    keys = [(entry.estimator, entry.parameter, entry.period_s, entry.delay_ticks) for entry in table()]
     assert len(set(keys)) == len(keys) == len(measured_estimators()) * 4 * 4
     for entry in table():
         if entry.delay_ticks > 1:
-            velocity = ESTIMATORS[entry.estimator] if entry.alpha is None else Ewma(alpha=entry.alpha)
-            before = damping_limits(entry.period_s, entry.delay_ticks - 1, velocity)
+            kind = NAMED[entry.estimator]
+            named = {} if kind.parameter is None else {kind.parameter: entry.parameter}
+            before = damping_limits(entry.period_s, entry.delay_ticks - 1, kind.model(**named))
             assert entry.limits.drag_nspm <= before.drag_nspm
         assert entry.limits.inertia_nspm < entry.limits.drag_nspm
 

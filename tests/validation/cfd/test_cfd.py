@@ -274,7 +274,9 @@ def test_without_the_library_one_line_says_what_to_install(monkeypatch, tmp_path
 
 def test_cases_are_solved_by_an_executor_and_stored_under_their_names(monkeypatch, tmp_path):
     monkeypatch.setattr(solver, "library", lambda: None)
-    monkeypatch.setattr(solver, "motion_table", lambda case, flow, coarse: f"{case.name} {flow} {coarse}".encode())
+    monkeypatch.setattr(
+        solver, "motion_table", lambda case, flow, coarse, step: f"{case.name} {flow} {coarse} {step}".encode()
+    )
     monkeypatch.setattr(solver, "steady_table", lambda: b"steady")
     monkeypatch.setattr(solver, "Flow", lambda grid: f"ball {grid.ball}")
     said = []
@@ -282,9 +284,15 @@ def test_cases_are_solved_by_an_executor_and_stored_under_their_names(monkeypatc
     with ThreadPoolExecutor(2) as executor:
         written = solver.solve(tmp_path / "new", executor, said.append)
     solver._flow.cache_clear()
-    assert [path.name for path in written] == [*(f"{name}.csv" for name in NAMES), "steady.csv"]
-    assert [path.read_text("utf-8") for path in written] == [*(f"{it} ball 0.1 ball 0.14" for it in NAMES), "steady"]
-    assert said[0] == f"{NAMES[0]}.csv, 1 of 5 ..."
+    of_cases = {f"{it.name}.csv": f"{it.name} ball 0.1 ball 0.14 {_step(it)}" for it in CASES}
+    assert {path.name: path.read_text("utf-8") for path in written} == {**of_cases, "steady.csv": "steady"}
+    folders = [path.parent.relative_to(tmp_path / "new").as_posix() for path in written]
+    assert folders == ["."] * 4 + ["training"] * 8 + ["held_out"] * 5 + ["."]
+    assert said[0] == f"{NAMES[0]}.csv, 1 of 18 ..."
+
+
+def _step(case):
+    return 0.005 if case.reynolds <= 50 else 0.0025
 
 
 @pytest.fixture(scope="module")
