@@ -24,7 +24,7 @@ from tests.store.conftest import SOURCE, choose, study_tables, summary_of_trial
 pytestmark = pytest.mark.slow
 
 ENOUGH = 1  # looks
-MOST = 12  # sessions of a program
+MOST = 100  # sessions of a program, which ends after as many looks as are enough
 
 
 def hold_sessions(study: Path, first: int, enough: Any) -> None:
