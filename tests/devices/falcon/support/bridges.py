@@ -141,6 +141,7 @@ class Server(threading.Thread):
         self.answers = {DESCRIPTOR: (0, IDENTITY.pack(constants.VENDOR_ID, product) + serial.encode())}
         self.incoming = []
         self.hang_up_at = None  # a kind of request upon which the server goes, in the middle of its answer
+        self._client = None
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._listener.bind(str(path))
         self._listener.listen()
@@ -152,6 +153,9 @@ class Server(threading.Thread):
     def __exit__(self, *_):
         self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
+        if self._client is not None:
+            with suppress(OSError):  # it has gone
+                self._client.shutdown(socket.SHUT_RDWR)
         self.join()
 
     def run(self):
@@ -160,6 +164,7 @@ class Server(threading.Thread):
                 client, _ = self._listener.accept()
             except OSError:
                 return
+            self._client = client
             with client, client.makefile("rb") as stream, suppress(BrokenPipeError):
                 self._serve(client, stream)
 
