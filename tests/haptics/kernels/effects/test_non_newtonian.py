@@ -45,8 +45,10 @@ def random_motion(seed, ticks=2000):
 @pytest.mark.parametrize("speed_mps", [0.02, 0.5])
 def test_an_even_motion_meets_the_steady_force(name, speed_mps):
     tank_scene = tank(name, scale=3.0)
-    ticks = {"slime": 2000, "ketchup": 50 / speed_mps, "toothpaste": 350 / speed_mps}.get(name, 20)
-    found = force(tank_scene, np.tile(speed_mps * DIRECTION, (round(ticks if COMPILED else min(ticks, 2500)), 1)))[-1]
+    ticks = round({"slime": 2000, "ketchup": 50 / speed_mps, "toothpaste": 350 / speed_mps}.get(name, 20))
+    if not COMPILED and ticks > 2500:
+        pytest.skip("thousands of ticks are for compiled code")
+    found = force(tank_scene, np.tile(speed_mps * DIRECTION, (ticks, 1)))[-1]
     assert found == pytest.approx(-sum(steady_n(tank_scene, tank_scene.liquids[0], speed_mps)) * DIRECTION, rel=6e-3)
 
 
