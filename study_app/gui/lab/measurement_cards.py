@@ -20,7 +20,7 @@ from study_app.viewmodels.number_words import grouped
 
 NAME_WIDTH = 84
 LINE = 26
-COST_HEIGHT, ERROR_HEIGHT = 236, 3 * LINE + 6  # of what is usual, kept free until it is measured
+COST_HEIGHT, ERROR_HEIGHT = 252, 3 * LINE + 6  # of what is usual, kept free until it is measured
 UNKNOWN = "–"
 LEAST_NS = 1.0  # the smallest cost that a measurement next to a running servo resolves
 LimiterState = Literal["acting", "acted", "quiet"]
