@@ -125,6 +125,7 @@ def test_no_file_tells_a_date(kind: str) -> None:
         assert word not in content
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", style.FORMATS)
 def test_the_users_settings_change_nothing_and_come_back(kind: str) -> None:
     plain = style.file_bytes(drawn(), kind, "Title")

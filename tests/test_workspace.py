@@ -101,6 +101,7 @@ def begin_session(folder: Path, participant: str) -> None:
     ).close()
 
 
+@pytest.mark.slow
 def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documents, tmp_path, monkeypatch, qtbot):
     start_folder(tmp_path / "start", monkeypatch)
     visit = MainController()

@@ -19,6 +19,8 @@ from study_app.gui.home.main_window import FULL, LEAST
 from study_app.gui.theme.theme import DARK
 from study_app.session.request import NewSession
 
+pytestmark = pytest.mark.slow
+
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
 
 

@@ -25,6 +25,8 @@ from study_app.store import workstation
 from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, load, save
 from study_app.user_folder import settings_file
 
+pytestmark = pytest.mark.slow
+
 MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
 FALCON = Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug its cable in")
 

@@ -16,6 +16,7 @@ CURRENT = 'current={kind="uniform", velocity_mps=[1e308, 0, 0]}'
 SAMPLE = str(Path(__file__).parents[2] / "results" / "sample-rek2024")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [

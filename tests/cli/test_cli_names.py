@@ -13,6 +13,8 @@ from study_app.store.exclusions import exclusions
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import load as load_settings
 
+pytestmark = pytest.mark.slow
+
 IN_GROUPS = [name for names in GROUPS.values() for name in names.split()]
 TAKE_A_STUDY = ("export", "plot", "report", "unblind", "exclude", "include", "verify")
 TAKE_A_SESSION = ("resume", "rebuild", "reproduce", "replay")

@@ -24,6 +24,7 @@ PROGRAM = textwrap.dedent(
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "out"),
     [((), "result\n"), (("plainly",), "counting [1]\ncounting [2]\nresult\n")],
@@ -34,6 +35,7 @@ def test_where_nobody_looks_nothing_but_what_was_asked_for_is_printed(words: tup
     assert (done.stdout, done.stderr) == (out, "warning\n")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX's")
 def test_a_terminal_shows_what_is_done_and_standard_output_stays_clean() -> None:
     ours, theirs = os.openpty()

@@ -150,6 +150,7 @@ def test_who_holds_a_device_follows_from_its_name(name, firmware, by_itself, sim
     assert (device.doctor is not None, device.moves_by_itself, device.simulated) == (firmware, by_itself, simulated)
 
 
+@pytest.mark.slow
 def test_naming_the_devices_loads_no_compiler():
     program = "import sys, study_app.devices.registry as d; d.list_devices(); sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

@@ -7,7 +7,7 @@ from study_app.haptics.model.scene import Given, MotionBox
 from tests.haptics.materials import PRESETS, tank
 from tests.haptics.scenes import COMPILED
 
-pytestmark = pytest.mark.skipif(not COMPILED, reason="measures compiled code")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="measures compiled code")]
 
 STROKES = MotionBox(speed_mps=0.6, acceleration_mps2=6)
 

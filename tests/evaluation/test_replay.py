@@ -48,7 +48,7 @@ from tests.faults.support import short
 from tests.session import small
 from tests.store.forging import Lines, forge
 
-pytestmark = needs_servo
+pytestmark = [needs_servo, pytest.mark.slow]
 
 SECONDS = 1000  # ticks
 

@@ -19,6 +19,8 @@ from study_app.session.pages import PausePage
 from study_app.session.transitions.events import Chosen, Continue, ItemShown, LanguageChosen, ResumeAsked, Submitted
 from tests.gui.small import STATEMENTS, ManualClock, questionnaire, text_page
 
+pytestmark = pytest.mark.slow
+
 GIVEN = (6, 5, 4, None, 7, 2, 1, 4, 7)
 KEY = Qt.Key
 

@@ -85,6 +85,7 @@ edits = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(edits)
 def test_undo_takes_everything_back_and_redo_makes_it_again(steps: list[tuple[str, float | None]]) -> None:

@@ -282,6 +282,7 @@ def test_the_pointer_moves_the_mouse_unless_a_path_does() -> None:
     live.close()
 
 
+@pytest.mark.slow
 def test_a_path_beside_a_hand_that_takes_no_orders_is_computed_alone() -> None:
     """The device goes on as it is; trace and tails are those of the path."""
     probe = Probe(velocity_mps=(0.0, 0.0, 0.0))
@@ -315,6 +316,7 @@ def test_the_slew_limit_told_is_that_of_the_estimator() -> None:
     live.close()
 
 
+@pytest.mark.slow
 def test_limiters_are_counted_as_telemetry_has_them() -> None:
     live = live_with(scripted())
     live.feel(bench("light_oil", "water"))

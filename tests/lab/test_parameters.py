@@ -20,6 +20,7 @@ def every(scene: Scene) -> list[Parameter]:
     return [it for section in sections(scene) for it in section.parameters]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_every_value_of_a_preset_can_be_set_again(name: str) -> None:
     scene = SCENES[name]

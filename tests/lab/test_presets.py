@@ -64,6 +64,7 @@ def test_a_preset_that_cannot_be_written_says_why(tmp_path: Path) -> None:
         save(tmp_path / "nowhere" / "water.toml", "")
 
 
+@pytest.mark.slow
 def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_broken_files(tmp_path: Path) -> None:
     origin = load_scene("rek2024", "honey")
     save(tmp_path / "mine.toml", preset_text(Setting("Honey", origin, origin)))

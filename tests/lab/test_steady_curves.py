@@ -13,6 +13,7 @@ from study_app.protocol.load import load_scene
 from tests.haptics.materials import PRESETS
 
 
+@pytest.mark.slow
 def test_ketchup_has_its_flow_curve_and_a_force_at_rest():
     found = steady_curves(load_scene("slime", "ketchup"))
     assert found.stress_pa == pytest.approx(15 + 10 * RATES_PER_S**0.25)

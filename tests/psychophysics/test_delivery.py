@@ -134,6 +134,7 @@ def test_encoder_counts_of_a_falcon_scatter_the_damping_by_a_fifth_of_a_percent(
     assert 1 - np.mean(found) == pytest.approx(0.005, abs=0.003)
 
 
+@pytest.mark.slow
 @needs_servo
 @pytest.mark.parametrize("velocity", [Ewma(), Scene.model_fields["velocity"].get_default(call_default_factory=True)])
 def test_a_linear_law_is_a_damper_at_the_hand_at_any_scale(velocity: Velocity) -> None:

@@ -73,6 +73,7 @@ def test_the_interval_holds_95_percent():
     assert low + high == pytest.approx(LOW + HIGH)
 
 
+@pytest.mark.slow
 def test_posterior_and_levels_are_those_of_the_questplus_package():
     """With flat priors and joint entropy; its normal function has a mean and a standard deviation."""
     package = pytest.importorskip("questplus")

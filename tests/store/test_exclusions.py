@@ -20,6 +20,8 @@ from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.verification.verify_study import verify
 
+pytestmark = pytest.mark.slow
+
 FullDisk = Callable[[int], AbstractContextManager[None]]
 
 NOW = datetime(2026, 3, 2, 9, 30, tzinfo=timezone(timedelta(hours=1)))

@@ -16,6 +16,8 @@ from study_app.store import recording_files as recording
 from study_app.store.recorder import Lost, Recorded, Recorder, recording_files
 from study_app.store.recording_files import SamplesFile, read_facts, read_frames, read_samples
 
+pytestmark = pytest.mark.slow
+
 Make = Callable[..., np.ndarray[Any, Any]]
 FullDisk = Callable[[int], AbstractContextManager[None]]
 

@@ -113,6 +113,7 @@ def test_the_checks_are_those_of_the_exact_forces_second_by_second(tmp_path: Pat
     assert changed.device_force == checks.device_force
 
 
+@pytest.mark.slow
 def test_half_an_hour_takes_at_most_sixty_megabytes(tmp_path: Path, samples_of: Make) -> None:
     """Of places with every digit at random, as an analogue device has them; encoders take half of it."""
     size = write(tmp_path / "trial-003.parquet", samples_of(90_000)).path.stat().st_size
@@ -241,6 +242,7 @@ print([name for name in ("pandas", "numba", "scipy", "PySide6") if name in sys.m
 """
 
 
+@pytest.mark.slow
 def test_neither_the_compiler_nor_the_analysts_libraries_are_loaded(tmp_path: Path) -> None:
     command = [sys.executable, "-c", RECORDING, str(tmp_path / "trial-001.parquet")]
     assert json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout) == []

@@ -32,6 +32,7 @@ def samples(count: int, *, first: int = 0, scene: int = 1, force_n: Any = (0.0, 
     return made
 
 
+@pytest.mark.slow
 def test_a_peak_of_one_tick_is_not_missed_however_it_came_in() -> None:
     pushed = samples(4000, force_n=(0.1, 0.0, 0.0))
     pushed.device_force_n[1234] = (0.0, -7.5, 0.0)

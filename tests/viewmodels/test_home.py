@@ -19,6 +19,8 @@ from study_app.viewmodels.session.record import read_record
 from study_app.viewmodels.sessions import sessions, started_words
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
+pytestmark = pytest.mark.slow
+
 
 def start(results, participant, status=None, *, simulated=False):
     protocol = load("demo")

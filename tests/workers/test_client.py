@@ -97,6 +97,7 @@ def is_last(answer: Any) -> bool:
     return not isinstance(answer, str) or " " not in answer
 
 
+@pytest.mark.slow
 def test_orders_are_carried_out_one_after_the_other_and_a_refusal_is_a_sentence(
     start: Callable[..., Tried],
 ) -> None:
@@ -118,6 +119,7 @@ def test_orders_are_carried_out_one_after_the_other_and_a_refusal_is_a_sentence(
     assert worker.works
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["stop", "another order"])
 def test_an_order_is_given_up_when_that_is_asked_for_or_another_comes(start: Callable[..., Tried], how: str) -> None:
     worker = start()
@@ -149,6 +151,7 @@ def test_a_process_that_ends_answers_every_order_once_with_how_it_ended(
     assert worker.answers() == [(third, Crashed(exit_code))]
 
 
+@pytest.mark.slow
 def test_a_process_that_does_not_listen_is_killed(start: Callable[..., Tried], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clients, "PATIENCE_S", 0.05)
     worker = start()

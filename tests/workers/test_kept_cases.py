@@ -20,6 +20,8 @@ from study_app.workers.kept_cases import OLD_S, KeptCases
 from study_app.workers.processes import CancellingExecutor
 from tests.workers.cases import counted_draw, draw
 
+pytestmark = pytest.mark.slow
+
 
 class Threads(CancellingExecutor):
     """One thread in place of processes."""

@@ -15,6 +15,8 @@ from study_app.analysis.figures import answer_figures, movement_plots, recogniti
 from study_app.analysis.tables.study import load_study
 from tests.analysis.conftest import Results, twelve
 
+pytestmark = pytest.mark.slow
+
 TABLE = ((0, 4, 0, 0, 0, 1, 0), (3, 0, 0, 0, 1, 1, 0), (0, 3, 0, 0, 0, 1, 1))
 
 

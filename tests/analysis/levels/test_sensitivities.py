@@ -21,6 +21,8 @@ from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.detection import different_rate, proportion_correct
 
+pytestmark = pytest.mark.slow
+
 STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(4.0, 8.0))
 ROVING = tuple(Setting(f"V{number}", f"{standard}/1") for number, standard in enumerate((4, 8), start=1))
 ONE = (Setting("V1", "8/1"),)

@@ -17,6 +17,8 @@ from study_app.analysis.statistics.global_permutation import global_permutation
 from study_app.analysis.statistics.paired import paired
 from study_app.analysis.statistics.trend import page
 
+pytestmark = pytest.mark.slow
+
 CLOSE = 5 * np.sqrt(0.25 / permutation_tests.DRAWS)
 """Five standard errors of a drawn p, at most."""
 

@@ -61,6 +61,7 @@ def numbers(value: object) -> Iterator[float]:
         yield value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("test", TESTS)
 @pytest.mark.parametrize("table", TABLES)
 def test_every_result_holds_what_it_promises(test: str, table: str) -> None:

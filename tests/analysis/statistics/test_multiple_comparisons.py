@@ -19,6 +19,7 @@ def test_published_adjustments(ps: list[float], adjusted: list[float]) -> None:
     assert holm(ps) == pytest.approx(adjusted)
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=12), st.randoms(use_true_random=False))
 def test_holm_keeps_order_and_lies_between_p_and_bonferroni(ps, random) -> None:  # type: ignore[no-untyped-def]
     adjusted = holm(ps)

@@ -46,6 +46,7 @@ def test_the_name_is_the_single_highest_rating() -> None:
     assert named(ratings).tolist() == [[0, 2, 1], [UNDECIDED, UNDECIDED, UNANSWERED]]
 
 
+@pytest.mark.slow
 @given(st.lists(st.lists(st.integers(1, 7), min_size=5, max_size=5), min_size=1, max_size=20))
 def test_relabelling_the_labels_relabels_the_names(ratings: list[list[int]]) -> None:
     names = named([ratings])

@@ -36,6 +36,7 @@ def test_published_assembly_times() -> None:
     assert result.p < 0.0015
 
 
+@pytest.mark.slow
 @given(st.integers(3, 5), st.integers(2, 8), st.integers(0, 1000))
 @settings(max_examples=30, deadline=None)
 def test_without_missing_answers_and_ties_it_is_friedmans(k: int, n: int, seed: int) -> None:
@@ -77,6 +78,7 @@ def test_nothing_to_compare_is_said_and_never_nan() -> None:
         skillings_mack(ASSEMBLY[:, :2])
 
 
+@pytest.mark.slow
 def test_many_people_are_approximated_with_their_ties(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(5)
     values = rng.integers(3, 6, (250, 4)).astype(float)  # three levels: many ties

@@ -14,6 +14,8 @@ from tests.analysis.conftest import Results, make_results
 from tests.analysis.tables.results import by_condition, refusal
 from tests.store.earlier import TRIALS_HEADER
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
     assert "nowhere is no folder" in refusal(tmp_path / "nowhere")

@@ -9,6 +9,8 @@ from study_app.protocol.load import parse, source_bytes
 from tests.analysis.conftest import CANNOT_JUDGE, Results, make_results
 from tests.analysis.tables.results import by_condition, refusal
 
+pytestmark = pytest.mark.slow
+
 
 def cell(study: Study, code: str, item: str) -> dict:
     for block in study.blocks:

@@ -18,7 +18,7 @@ from tests.compiled import needs_servo
 
 MakeLab = Callable[..., LabController]
 
-pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
+pytestmark = [needs_servo, pytest.mark.slow, pytest.mark.usefixtures("qapp")]
 
 
 def test_what_is_being_opened_can_be_cancelled_and_is_let_go_of(qtbot: Any) -> None:

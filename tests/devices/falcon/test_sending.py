@@ -11,6 +11,7 @@ from study_app.devices.falcon.sending import limit_growth
 from tests.devices.falcon.support.scripted_bridge import Ticks
 
 
+@pytest.mark.slow
 def test_limited_growth_never_makes_a_force_longer():
     falcon = Ticks().falcon
     random = np.random.default_rng(3)

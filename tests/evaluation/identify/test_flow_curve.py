@@ -18,6 +18,8 @@ from tests.evaluation.identify.measurements import force_of
 from tests.haptics.materials import PRESETS, tank
 from tests.haptics.scenes import COMPILED
 
+pytestmark = pytest.mark.slow
+
 RATES = np.geomspace(0.05, 200, 25)
 STARTS = {
     "ketchup": {"yield_stress_pa": 5.0, "consistency_pa_sn": 3.0, "flow_index": 0.6},

@@ -82,6 +82,7 @@ def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
         assert rows[f"residual_{axis}_n"] == pytest.approx(found.measured_n[:, k] - force_n[:, k], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_figure_is_whole_and_shows_the_residual(fitted):
     found, _ = fitted
     drawn = fit_figure.draw(found)

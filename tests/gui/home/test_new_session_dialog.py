@@ -21,6 +21,8 @@ from study_app.store.workstation import MachineSettings
 from study_app.viewmodels.home import study_facts
 from tests.protocol.groups.grouped import STUDY
 
+pytestmark = pytest.mark.slow
+
 # The platform without a screen cannot limit or raise windows, and says so.
 
 

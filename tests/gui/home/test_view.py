@@ -22,6 +22,8 @@ from study_app.store.workstation import MachineSettings
 from study_app.viewmodels.device_list import devices_shown
 from study_app.viewmodels.home import study_facts
 
+pytestmark = pytest.mark.slow
+
 # The platform without a screen cannot limit or raise windows, and says so.
 
 

@@ -14,6 +14,8 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.lab.plots import POINTS, A, B, CurvePlot, thinned
 from study_app.viewmodels.lab import CostRow, LabView
 
+pytestmark = pytest.mark.slow
+
 
 @dataclass
 class Limiter:

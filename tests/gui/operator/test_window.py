@@ -19,6 +19,8 @@ from study_app.gui.operator.stop_panel import LEAST_HEIGHT, LEAST_WIDTH
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.escape_key import HOLD_MS
 
+pytestmark = pytest.mark.slow
+
 # The platform without a screen cannot limit or raise windows, and says so.
 
 

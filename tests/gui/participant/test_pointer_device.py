@@ -45,6 +45,7 @@ def other_window(captured: Opened, qtbot: Any) -> QWidget:
     return other
 
 
+@pytest.mark.slow
 def test_the_operators_window_lets_the_pointer_go_and_the_trial_goes_on(captured: Opened, qtbot: Any) -> None:
     captured.window.show_page(task_page())
     with qtbot.waitSignal(captured.window.settling.timeout):

@@ -52,6 +52,7 @@ def test_page_value_becomes_its_widget_and_fills_the_window(opened: Opened, page
     assert opened.window.widget.isVisible()
 
 
+@pytest.mark.slow
 def test_no_widget_is_left_behind(opened: Opened) -> None:
     for page, _ in PAGES * 3:
         opened.window.show_page(page)

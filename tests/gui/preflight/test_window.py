@@ -21,6 +21,8 @@ from study_app.session.masking import Masking
 from study_app.session.preflight import Facts, Screen, checks
 from study_app.viewmodels.preflight import WAITING, histogram, preflight_view, resumed_rows
 
+pytestmark = pytest.mark.slow
+
 NOW = datetime(2026, 3, 2, 14, 20)
 WELL = Facts(
     device="mouse",

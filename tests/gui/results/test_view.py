@@ -18,6 +18,8 @@ from study_app.gui.widgets.main_view import Place
 from study_app.viewmodels.results import FigureShown, Going, Opened, Trouble
 from tests.gui.results.sample import LEFT_OUT, STUDY, SVG, facts, view
 
+pytestmark = pytest.mark.slow
+
 USUAL = QSize(1366, 768)
 
 

@@ -104,6 +104,7 @@ def test_a_chosen_answer_is_announced_as_checked(participant, monkeypatch):
     participant.close()
 
 
+@pytest.mark.slow
 def test_a_role_goes_with_its_widget(qtbot):
     window = QWidget()
     qtbot.addWidget(window)

@@ -89,11 +89,13 @@ def test_the_friction_that_makes_a_filtered_damper_passive(alpha, delay, multipl
     assert passivity_multiplier(alpha, delay)[0] == pytest.approx(multiplier, abs=6e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alpha", [1.0, 0.5, 0.2, 0.1, 0.05])
 def test_without_delay_it_is_alpha_over_2_minus_alpha(alpha):
     assert passivity_multiplier(alpha, 0)[0] == pytest.approx(alpha / (2 - alpha), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_more_delay_the_lower_the_frequency_that_is_least_passive():
     worst_hz = [passivity_multiplier(0.1, delay)[1] for delay in (0, 1, 2, 4, 8)]
     assert worst_hz == pytest.approx([500, 112, 76, 50, 32], abs=1.0)

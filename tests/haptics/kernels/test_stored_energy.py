@@ -75,6 +75,7 @@ def test_a_quick_stroke_is_no_debt_of_the_added_mass():
     assert not any(sample.limiters & LIMITER_ENERGY for sample in samples)
 
 
+@pytest.mark.slow
 @compiled
 @pytest.mark.parametrize("name", ["physical_glycerin", "physical_gear_oil"])
 def test_shipped_liquids_with_added_mass_meet_the_goal_of_force_withheld(name):

@@ -97,6 +97,7 @@ def test_after_fifty_milliseconds_without_a_tick_the_force_is_zero_and_returns_a
     assert bench.servo.fault is None
 
 
+@pytest.mark.slow
 def test_a_servo_that_hangs_in_its_device_says_so_and_has_let_go_when_it_returns():
     probe = Probe()
     servo = Servo(probe)

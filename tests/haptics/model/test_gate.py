@@ -181,6 +181,7 @@ def test_the_sum_of_what_is_left_out_stays_within_the_target_and_nothing_more_wo
     assert sum(verdict.share for verdict in verdicts) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @given(scene=scenes)
 def test_what_is_resolved_is_named_valid_and_final(scene):
     named = resolve(scene)
@@ -261,6 +262,7 @@ def test_the_cost_has_a_column_where_it_was_measured():
     assert [line.split()[3] for line in lines[2:5]] == ["–", "4", "–"]
 
 
+@pytest.mark.slow
 def test_neither_the_gate_nor_the_laws_load_the_compiler():
     code = "import sys, study_app.haptics.model.gate; print('numba' in sys.modules, 'numpy' in sys.modules)"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

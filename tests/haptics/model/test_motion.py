@@ -91,6 +91,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path, content):
         read(file)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(50), deadline=None)
 @given(values=arrays(float, st.tuples(st.integers(1, 20), st.just(3)), elements=numbers))
 def test_what_is_written_is_read_back_to_the_last_bit(tmp_path_factory, values):

@@ -59,6 +59,7 @@ def test_what_was_read_is_a_copy():
     assert latest.tick == 1
 
 
+@pytest.mark.slow
 @settings(deadline=None)  # the first example compiles
 @given(st.lists(st.integers(0, 20), max_size=20))
 def test_every_sample_is_read_once_or_counted_as_dropped(bursts):

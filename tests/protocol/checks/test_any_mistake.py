@@ -13,6 +13,8 @@ from tests.protocol.forms.mixed import MIXED
 from tests.protocol.groups.grouped import GROUPS, STUDY
 from tests.protocol.trials.studies import BLOCK, HEAD
 
+pytestmark = pytest.mark.slow
+
 VALUE = re.compile(r'(?<== )("[^"]*"|\[[^\[\]=]*\]|[-\d.]+|true|false)')
 WRONG = ('"rating"', "{}", '{ nl = "x" }', "[1]", "-1e308")
 

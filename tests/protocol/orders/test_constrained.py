@@ -247,6 +247,7 @@ def test_the_same_draws_give_the_same_order_on_every_machine():
     assert "".join(order) == "cdebadceabdeacb"
 
 
+@pytest.mark.slow
 def test_with_a_distance_of_all_codes_the_first_round_decides():
     seen = {arrange("abc", 4, Constraint(min_distance=3), stream(seed, "any").random) for seed in range(200)}
     assert seen == {order * 4 for order in permutations("abc")}

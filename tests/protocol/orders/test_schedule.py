@@ -110,6 +110,7 @@ def test_each_condition_comes_once_in_each_repetition(seed: int, participant: st
     assert sorted(order[:2]) == sorted(order[2:]) == ["L1", "L2"]
 
 
+@pytest.mark.slow
 @given(seeds, participants)
 def test_steps_follow_the_sequence_and_are_counted(seed: int, participant: str):
     schedule = build_schedule(SMALL, participant, seed)

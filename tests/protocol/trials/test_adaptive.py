@@ -93,6 +93,7 @@ def test_the_next_level_depends_on_the_levels_presented_and_not_on_how_answers_a
     assert moved.level != heard[10].level
 
 
+@pytest.mark.slow
 def test_a_track_ends_once_its_interval_is_narrow() -> None:
     whole = answers_of(adaptive('kind = "questplus"\ntrials = 200', ONE_STANDARD), 0.4)
     ended = answers_of(

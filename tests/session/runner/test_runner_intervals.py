@@ -30,7 +30,7 @@ from tests.compiled import needs_servo
 from tests.protocol.trials.studies import key_of, study
 from tests.session.fakes import FakeJournal
 
-pytestmark = needs_servo
+pytestmark = [needs_servo, pytest.mark.slow]
 
 FOLLOWED = (
     ('kind = "explore"\nmin_s = 1\nmax_s = 3', 'kind = "follow"\ncycles = 1\namplitude_mm = 15\nradius_mm = 5'),

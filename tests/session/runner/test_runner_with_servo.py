@@ -295,6 +295,7 @@ def delay_error_ms(delay_ms: float) -> float:
     return float(row["delay_error_mean_ms"])
 
 
+@pytest.mark.slow
 def test_the_error_of_the_delay_does_not_tell_whether_there_is_one() -> None:
     assert delay_error_ms(0) == pytest.approx(delay_error_ms(50), abs=0.05)
 

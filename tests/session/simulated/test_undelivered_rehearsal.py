@@ -145,6 +145,7 @@ def test_journal_recordings_and_answers_agree(study: Path) -> None:
     assert (checked.errors, checked.warnings) == ((), ())
 
 
+@pytest.mark.slow
 def test_a_delivered_value_that_is_not_the_recordings_is_found(session: Path) -> None:
     def edit(lines: list[dict[str, Any]]) -> None:
         next(line for line in lines if line["event"] == "interval_ended")["value_delivered"] += 1e-6

@@ -110,6 +110,7 @@ def _check_order(commands: tuple[Any, ...]) -> None:
     assert sum(isinstance(command, ShowPage) for command in commands) <= 1
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32), st.data())
 @settings(max_examples=30, deadline=None)
 def test_every_trial_that_was_begun_is_ended_once_per_attempt(seed: int, data: st.DataObject) -> None:

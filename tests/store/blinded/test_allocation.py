@@ -188,6 +188,7 @@ def test_a_session_resumed_before_its_allocation_was_journalled_journals_it(
         assert events(again).count("allocated") == 1
 
 
+@pytest.mark.slow
 def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Path) -> None:
     study = StudyFolder(tmp_path / "s")
     for participant in ("P001", "P002", "P003"):
@@ -271,6 +272,7 @@ def test_a_session_that_the_group_does_not_have_is_refused_before_anything_is_cl
     assert not (tmp_path / "s").exists()
 
 
+@pytest.mark.slow
 def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> None:
     source = tmp_path / "grouped.toml"
     source.write_bytes(SOURCE)

@@ -54,6 +54,7 @@ def test_it_opens_whole_and_numpys_numbers_plain() -> None:
     assert opened([START, line], None) == [START, line]
 
 
+@pytest.mark.slow
 @given(
     st.dictionaries(
         st.sampled_from(sorted(SEALED - {"group"})), st.one_of(st.none(), st.integers(0, 10**18), st.floats(0, 1))

@@ -129,6 +129,7 @@ def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
     assert tables_in(folder) == held
 
 
+@pytest.mark.slow
 def test_what_is_not_the_journals_is_left_and_named(tmp_path: Path, start: Start, attend: Attend) -> None:
     """A changed table, a session that runs, a damaged journal: the others are opened, and these are after rebuild."""
     stores = {name: start(name) for name in ("P001", "P002", "P003", "P004")}

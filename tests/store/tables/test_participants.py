@@ -20,6 +20,8 @@ from study_app.store.tables import participants
 from study_app.store.verification.verify_study import verify
 from study_app.viewmodels.sessions import sessions
 
+pytestmark = pytest.mark.slow
+
 
 def table(folder: Path) -> list[dict[str, str]]:
     path = StudyFolder(folder).participants("brackish")

@@ -28,6 +28,8 @@ from study_app.store.verification.verify_study import verify
 from tests.store.conftest import SOURCE
 from tests.store.forging import Lines, cover_up, forge
 
+pytestmark = pytest.mark.slow
+
 P007 = "data/sub-P007/ses-01"
 
 

@@ -32,6 +32,8 @@ from tests.store.verification.findings import (
     without_line,
 )
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_table_of_an_earlier_version_is_compared_in_the_columns_it_has(study: Path) -> None:
     unblind(study, "AB", "done")

@@ -272,6 +272,7 @@ def test_without_the_library_one_line_says_what_to_install(monkeypatch, tmp_path
     assert CliRunner().invoke(cfd, ["--solve"]).exit_code == 2
 
 
+@pytest.mark.slow
 def test_cases_are_solved_by_an_executor_and_stored_under_their_names(monkeypatch, tmp_path):
     monkeypatch.setattr(solver, "library", lambda: None)
     monkeypatch.setattr(

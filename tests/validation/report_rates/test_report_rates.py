@@ -221,6 +221,7 @@ def test_single_tests_are_counted() -> None:
     assert covered.hits >= 2
 
 
+@pytest.mark.slow
 def test_an_interval_that_is_not_printed_covers_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         single_test_rates, "noticed", lambda *_args, **_named: noticed([[np.nan] * 7], single_test_rates.LEVELS_MS)

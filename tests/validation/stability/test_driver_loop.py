@@ -85,6 +85,7 @@ def test_driver_gives_out_no_more_than_the_scripted_device(phase):
     assert verdict.balance_j >= verdict.permitted_j
 
 
+@pytest.mark.slow
 def test_driver_that_lets_go_slowly_gives_out_too_much(monkeypatch):
     """The motors go on with what they push for 5 ms."""
     follow = driver_loop.falcon_trace

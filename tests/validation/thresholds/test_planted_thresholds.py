@@ -21,6 +21,8 @@ from study_app.validation.thresholds.verdicts import Verdict, markdown, spread, 
 from study_app.validation.thresholds.whole_pipeline import run
 from tests.compiled import needs_servo
 
+pytestmark = pytest.mark.slow
+
 SMALL = """\
 format = 2
 study.name = "small"

@@ -121,6 +121,7 @@ def test_files_are_written_and_the_figure_is_the_same_each_time(tmp_path):
     assert b"1 frame" in files[-1].read_bytes()
 
 
+@pytest.mark.slow
 def test_a_percentile_off_the_scale_is_written(tmp_path):
     files = write(found(shown(np.where(np.arange(1000) < 20, 87.0, 3.0))), tmp_path)
     assert b">87<" in files[-1].read_bytes()

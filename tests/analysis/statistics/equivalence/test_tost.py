@@ -75,6 +75,7 @@ def test_equivalence_needs_so_many_participants_that_one_in_five_would_be_seen()
     assert (fewest(0.05), fewest(0.05, equal=True), fewest(0.01)) == (14, 11, 21)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "others"), [(5, (0,)), (5, (-1, 0, 1)), (12, (-1, 0, 1)), (24, (0,)), (24, (-1, 0, 1))])
 def test_where_a_few_notice_strongly_equivalence_is_seldom_shown(n: int, others: tuple[int, ...]) -> None:
     # One in five answers five points higher: the mean lies on the bound.
@@ -188,6 +189,7 @@ def test_a_bound_that_means_nothing_is_refused(bound: float) -> None:
         tost([1.0, 2.0], bound)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "power"), [(5, 0.02), (20, 0.17), (30, 0.47)])
 def test_published_power_at_no_difference(n: int, power: float) -> None:
     # Paired differences of whole answers whose spread is 2.36 points; the bound is 1.

@@ -19,6 +19,7 @@ def test_deviance_is_that_worked_by_hand_and_0_where_shares_are_as_expected() ->
     assert deviances([0, 40], [40, 40], [0.5, 0.5]) == pytest.approx([80 * math.log(2)] * 2)
 
 
+@pytest.mark.slow
 def test_p_of_fit_is_uniform_where_the_function_is_true() -> None:
     draw = np.random.default_rng(7)
     found = np.array([p_of_fit(draw.binomial(N, PSI), N, PSI) for _ in range(400)])

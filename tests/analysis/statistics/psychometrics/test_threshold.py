@@ -8,6 +8,8 @@ from study_app.analysis.statistics.psychometrics.psychometric import Counts, Cur
 from study_app.analysis.statistics.psychometrics.threshold import DROP, noticed, threshold
 from study_app.errors import AnalysisError
 
+pytestmark = pytest.mark.slow
+
 DELAYS = (0, 50, 100, 125, 150, 200, 300)
 POOLED = [0, 0, 1, 2, 4, 5, 5]
 STUDY = (0, 50, 75, 100, 125, 150, 200)

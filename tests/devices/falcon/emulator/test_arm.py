@@ -52,6 +52,7 @@ def force_of(arms, torque, place):
     return arms.force_n.copy()
 
 
+@pytest.mark.slow
 @given(geometries, places)
 def test_angles_are_those_of_the_law_of_cosines(name, place):
     assert arms_of(name, place).angle_rad == pytest.approx(closed_form(name, place), abs=1e-12)
@@ -99,6 +100,7 @@ def test_out_of_reach_it_points_there():
     assert np.isfinite(force_of(arms, [500] * 3, (0.0, 0.0, 0.3))).all()
 
 
+@pytest.mark.slow
 @given(geometries, places, st.tuples(*[st.floats(-4, 4)] * 3))
 def test_what_the_driver_tells_the_motors_makes_the_force_it_wants(name, place, wanted_n):
     """The driver's statics and these are made in different ways: neither knows the other's mistakes."""

@@ -86,6 +86,7 @@ def test_frozen_encoders_say_the_same_wherever_the_handle_goes():
     assert counts_in(exchanged(emulator, flags=HOMING)) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["drop", "truncate", "stall"])
 def test_chances_come_true_as_often_as_they_should(name):
     emulator = at_work()

@@ -13,6 +13,8 @@ from study_app.devices.falcon.wire import constants
 from tests.devices.falcon.emulator.test_arm import closed_form
 from tests.devices.falcon.support.emulated import HOMING, at_work, counts_in, exchanged, home, packet, status_in
 
+pytestmark = pytest.mark.slow
+
 
 def true_counts(emulator, place=None):
     """Return the counts (3,) at a place, by the law of cosines."""

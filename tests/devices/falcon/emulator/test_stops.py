@@ -45,6 +45,7 @@ def test_from_its_stop_it_comes_back():
     assert emulator.position_m == pytest.approx((0.01, 0.0, 0.0), abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("geometry", sorted(GEOMETRIES))
 def test_no_place_in_use_is_at_a_stop(geometry):
     emulator = at_work(geometry=geometry, workspace_m=STOPS_M)

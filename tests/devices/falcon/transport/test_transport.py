@@ -248,6 +248,7 @@ def test_every_failure_is_one_line_that_says_what_to_do():
     assert "libusb error -3" in str(usb_failure(constants.ERROR_ACCESS, "trying"))
 
 
+@pytest.mark.slow
 def test_importing_the_ways_to_the_bridge_loads_no_compiler():
     modules = "transport, usb, unix_socket, ftdi"
     code = f"import sys; from study_app.devices.falcon.transport import {modules}; sys.exit('numba' in sys.modules)"

@@ -104,6 +104,7 @@ def test_a_reply_is_read():
     assert (stream.parser.packets, stream.parser.skipped, stream.parser.held) == (1, 0, 0)
 
 
+@pytest.mark.slow
 @given(
     st.tuples(*[st.integers(-(1 << 15), (1 << 15) - 1)] * 3),
     st.integers(0, 15),

@@ -13,6 +13,8 @@ from study_app.protocol.questions.rating import RatingView
 from study_app.session.transitions.events import Chosen, ItemShown, PauseAsked, Retracted, Submitted
 from tests.gui.participant.forms.opened_form import FIVE, KEY, Opened, click, form
 
+pytestmark = pytest.mark.slow
+
 
 def test_answer_shows_a_question_and_hides_it_with_its_answer(opened: Opened) -> None:
     assert "since" not in opened.asked

@@ -16,6 +16,8 @@ from study_app.protocol.questions.rating import RatingView
 from study_app.protocol.questions.slider import SliderView
 from tests.gui.participant.forms.opened_form import FIVE, QUESTIONS, Opened, form, place_of
 
+pytestmark = pytest.mark.slow
+
 TLX = tuple(
     SliderView(
         f"scale{n}", n, "How much of it was required, and how easy or demanding was it, taken as a whole? " * 2, True,

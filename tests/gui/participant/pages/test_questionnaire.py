@@ -21,6 +21,8 @@ from study_app.session.pages import ItemView, QuestionnairePage
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
 from tests.gui.small import LABELS, ManualClock, questionnaire
 
+pytestmark = pytest.mark.slow
+
 KEY = Qt.Key
 DUTCH_LABELS = (
     "Helemaal mee oneens",

@@ -96,6 +96,7 @@ def test_a_coasting_ball_slows_down_as_the_exact_solution_says():
     assert v[0] == pytest.approx(0.10526316, abs=1e-8)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(200), deadline=None)
 @given(
     velocity=st.tuples(speeds, speeds, speeds),

@@ -18,6 +18,8 @@ from study_app.haptics.runtime.offline import simulate
 from tests.haptics.materials import PRESETS, tank
 from tests.haptics.scenes import COMPILED, UNBENT, Hand, liquid, moving, scene, vectors
 
+pytestmark = pytest.mark.slow
+
 D = 0.068
 DIRECTION = np.array([2.0, -1.0, 2.0]) / 3
 compiled = pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")

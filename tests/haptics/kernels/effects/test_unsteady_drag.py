@@ -236,6 +236,7 @@ def test_after_a_stop_the_slope_limit_leaves_the_force_as_it_is():
     assert sent_n > 0
 
 
+@pytest.mark.slow
 @compiled
 @pytest.mark.parametrize(
     "line",

@@ -121,6 +121,7 @@ def test_length_and_scaling_are_stated_at_1_khz():
     assert elements_needed(felt) == 50
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(50), deadline=None)
 @given(angle=st.floats(0, 2 * np.pi), legs=LEGS)
 @example(angle=np.pi / 4, legs=[(5, 1.0, 0, 0.0, 0.0), (5, 1.0, 90, 0.0, 0.0)])

@@ -23,6 +23,8 @@ from tests.haptics.scenes import (
 )
 from tests.haptics.tails import pass_time, tank
 
+pytestmark = pytest.mark.slow
+
 ALL = {**THESIS, **EVERYTHING}
 
 

@@ -55,6 +55,7 @@ def at_the_hand(**wake):
     return tank(**wake).model_copy(update={"scale": 1.0, "velocity": Raw()})
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="hours are for compiled code")
 def test_hazard_01_the_scale_does_not_underflow_after_hours():
     hand = Hand(at_the_hand(decay=LAMBDA, resolution_m=2e-4))
@@ -69,6 +70,7 @@ def test_hazard_01_the_scale_does_not_underflow_after_hours():
         assert sample.wake_mps[0] == pytest.approx(expected, rel=1e-9, abs=1e-100)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="millions of ticks are for compiled code")
 def test_hazard_02_what_is_stored_does_not_grow_without_bound():
     length, angle = 1700, np.linspace(0, 2 * np.pi, 1000, endpoint=False)
