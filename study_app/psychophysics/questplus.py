@@ -43,25 +43,27 @@ class Search:
     noise: bool = False
 
     @cached_property
-    def _psi(self) -> NDArray[np.float64]:
+    def psi(self) -> NDArray[np.float64]:
+        """The probability of success at each level of each cell, of shape (levels, …)."""
         return self.grid.success(self.levels)
 
     @cached_property
-    def _logarithms(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return np.log(self._psi), np.log1p(-self._psi)
+    def logarithms(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The logarithms of ψ and of 1 − ψ, of shape (levels, …)."""
+        return np.log(self.psi), np.log1p(-self.psi)
 
     def posterior(self, successes: ArrayLike, failures: ArrayLike) -> NDArray[np.float64]:
         """Return the posterior of the grid's cells from counts per level, each of shape (levels,)."""
-        return self.grid.weighted(*self._logarithms, successes, failures)
+        return self.grid.weighted(*self.logarithms, successes, failures)
 
     def expected_entropy(self, posterior: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the entropy [nat] expected after an answer to each level, of shape (levels,)."""
         if self.learn == "threshold":
-            succeeded = np.einsum("kabcd,abcd->ka", self._psi, posterior)
+            succeeded = np.einsum("kabcd,abcd->ka", self.psi, posterior)
             before = np.einsum("abcd->a", posterior)[None, :]
         else:
             before = posterior.reshape(1, -1)
-            succeeded = self._psi.reshape(len(self.levels), -1) * before
+            succeeded = self.psi.reshape(len(self.levels), -1) * before
         return _weighted_entropy(succeeded) + _weighted_entropy(before - succeeded)
 
     def next(self, successes: ArrayLike, failures: ArrayLike) -> int:

@@ -9,6 +9,7 @@ from typing import Final
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.estimator_response import fastest_hz
+from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.checks.pace import ends, highest_damping
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.tracks import design_of, method_of, tracks_of
@@ -28,6 +29,7 @@ def level_warnings(protocol: Protocol) -> Iterator[str]:
                 *_without_catch(protocol, block),
                 *_seen(protocol, block),
                 *_unpaced(protocol, block),
+                *imprecise(protocol, block),
             ):
                 if sentence not in yielded:
                     yielded.add(sentence)

@@ -14,6 +14,12 @@ from study_app.protocol.table import Table
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.stimuli import Stimulus
 
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+    from study_app.psychophysics.families import Floats
+    from study_app.psychophysics.simulated_tracks import Answers, Observers
+
 TrackOrder: TypeAlias = Literal["interleaved", "blocked"]
 Answer: TypeAlias = tuple[float, bool]
 """The level presented, and whether the answer was a success."""
@@ -155,6 +161,24 @@ class Method(Table):
 
     def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
         """Return the classical estimate of a track, a level; None where it has none."""
+        return None
+
+    def simulated(
+        self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None
+    ) -> Answers | None:
+        """Return the answers of simulated observers to one track each; None: the method has no such tracks.
+
+        Parameters
+        ----------
+        track : TrackSetting
+            What is varied, and how it is asked.
+        observers : Observers
+            Who answers.
+        random : random.Generator
+            Where their answers are drawn from.
+        noise : (tracks, noise trials) array or None
+            The uniform numbers of the answers to noise trials.
+        """
         return None
 
     def rounds(self, stimulus: Stimulus) -> int:

@@ -8,6 +8,7 @@ from itertools import product
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
+from study_app.protocol.checks.expected_precision import precision_rows
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.stimuli import DELAY
@@ -61,3 +62,4 @@ def design_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
         scene = protocol.scene_for(condition_of(protocol, stimulus))
         felt_n = [steady(override(scene, stimulus.vary, one), pace_mps).drag_n for one in (*standards, *compared)]
         yield "Force at the pace", f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s"
+    yield from precision_rows(protocol, block)

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from study_app.protocol.streams import Draw, shuffle
 from study_app.protocol.trials.method import Heard, Method, TrackSetting
 from study_app.protocol.trials.stimuli import CONSTANT_LEVELS, LEVELS_MOST, Stimulus
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+    from study_app.psychophysics.families import Floats
+    from study_app.psychophysics.simulated_tracks import Answers, Observers
 
 Count = Annotated[int, Field(ge=1, le=LEVELS_MOST)]
 Listed = Annotated[tuple[float, ...], Field(min_length=1, max_length=LEVELS_MOST)]
@@ -48,3 +54,11 @@ class Constant(Method):
         """Return the level of comparison ``number``: answers change nothing."""
         levels = self.asked(track.stimulus)
         return shuffle(levels, draws[number // len(levels)])[number % len(levels)]
+
+    def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
+        """Return the answers of simulated observers to every level, equally often."""
+        from study_app.psychophysics.simulated_tracks import constant_tracks  # noqa: PLC0415 - loads numpy
+
+        levels = [track.stimulus.coordinate(level) for level in self.asked(track.stimulus)]
+        draws = random.random((len(observers.thresholds), len(levels) * self.repetitions))
+        return constant_tracks(levels, self.repetitions, observers, draws)

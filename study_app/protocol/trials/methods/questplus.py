@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -22,7 +23,11 @@ from study_app.protocol.trials.psychometric import (
 from study_app.protocol.trials.stimuli import Stimulus
 
 if TYPE_CHECKING:
+    from numpy.random import Generator
+
+    from study_app.psychophysics.families import Floats
     from study_app.psychophysics.questplus import Search
+    from study_app.psychophysics.simulated_tracks import Answers, Observers
 
 Positive = Annotated[float, Field(gt=0)]
 Lapse = Annotated[float, Field(ge=0, lt=0.5)]
@@ -88,6 +93,16 @@ class QuestPlus(Adaptive):
         if not any(one.level > 0 for one in heard) and (first := self.first(track.number)) is not None:
             return levels[_nearest(_coordinates(track), track.stimulus.coordinate(first))]
         return levels[self._search(track).next(*self._counts(track, heard))]
+
+    def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
+        """Return the tracks of simulated observers; a track ends early only where levels have logarithms."""
+        from study_app.psychophysics.simulated_tracks import search_tracks  # noqa: PLC0415 - loads numpy
+
+        draws = random.random((len(observers.thresholds), self.presentations(track.stimulus)))
+        first, log = self.first(track.number), track.stimulus.spacing == "log"
+        begin = None if first is None else _nearest(_coordinates(track), track.stimulus.coordinate(first))
+        stop = None if self.stop is None or not log else (math.log10(self.stop.ratio), self.stop.after)
+        return search_tracks(self._search(track), observers, draws, begin, noise, stop)
 
     def _search(self, track: TrackSetting) -> Search:
         from study_app.psychophysics.questplus import search_of  # noqa: PLC0415 - loads numpy

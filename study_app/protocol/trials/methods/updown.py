@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
@@ -12,6 +12,12 @@ from study_app.protocol.trials.adaptive import Adaptive
 from study_app.protocol.trials.method import Answer, Heard, TrackSetting
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.updown import RATIOS, Staircase, converges_to
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+    from study_app.psychophysics.families import Floats
+    from study_app.psychophysics.simulated_tracks import Answers, Observers
 
 
 class Reversals(Table):
@@ -98,6 +104,14 @@ class UpDown(Adaptive):
         low, high = track.stimulus.levels
         u = self.staircase(track.stimulus, track.number).next(_answers(track, heard))
         return min(max(track.stimulus.level_of(u), low), high)
+
+    def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
+        """Return the tracks of simulated observers."""
+        from study_app.psychophysics.simulated_tracks import staircase_tracks  # noqa: PLC0415 - loads numpy
+
+        draws = random.random((len(observers.thresholds), self.presentations(track.stimulus)))
+        stop = None if self.stop is None else (self.stop.reversals, self.stop.after)
+        return staircase_tracks(self.staircase(track.stimulus, track.number), observers, draws, stop)
 
     def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...]:
         """Return the places of the answers at which the direction changed; those to a level of zero have none."""

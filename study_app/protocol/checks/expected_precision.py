@@ -1,0 +1,209 @@
+"""How precise the thresholds of a block are expected to be, from simulated tracks with a fixed seed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
+from study_app.protocol.quantities import quantity
+from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.method import Method, TrackSetting
+from study_app.protocol.trials.psychometric import analysis_grid, family_of, guesses_of, rises, width_prior_of
+from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of, tracks_of
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+    from study_app.psychophysics.families import Floats
+    from study_app.psychophysics.precision import Estimates, Expected
+
+OBSERVERS: Final = 200
+SEED: Final = 1
+LAPSES: Final = 0.02
+FALSE_ALARMS: Final = 0.1
+"""Of simulated observers, where the guess rate is free. [choice]"""
+MOST_WORK: Final = 700_000_000
+"""Cells × levels × trials × observers of one simulation, so that a check stays fast: fewer observers beyond it."""
+FEWEST: Final = 20
+CELLS: Final = 41 * 9 * 3
+"""Of the grid over which levels are chosen."""
+MOST_TRIALS: Final = 200
+"""Of a track that is simulated; beyond it the variance is taken to be inversely proportional to the trials."""
+
+
+@dataclass(frozen=True)
+class ThresholdPlan:
+    """What decides how precise the threshold of one standard is.
+
+    Attributes
+    ----------
+    stimulus, design, method : Stimulus, Design, Method
+        What is varied, how it is asked, and how levels are chosen.
+    catch : int
+        Catch trials of each track.
+    standards : int
+        How many standards the block has.
+    """
+
+    stimulus: Stimulus
+    design: Design
+    method: Method
+    catch: int
+    standards: int
+
+    @property
+    def trials(self) -> int:
+        """Comparisons of each standard, at most."""
+        return self.method.presentations(self.stimulus) * self.method.tracks
+
+    def with_trials(self, trials: int) -> ThresholdPlan:
+        """Return the plan with so many trials for each standard, rounded to what its method divides them into."""
+        method, stimulus = self.method, self.stimulus
+        least = method.tracks * (1 if method.adaptive else len(method.asked(stimulus)))
+        each = max(1, round(trials / least))
+        changed = {"trials": each * method.tracks} if method.adaptive else {"repetitions": each}
+        catch = round(self.catch * each / max(1, self.trials // least))
+        return ThresholdPlan(stimulus, self.design, method.model_copy(update=changed), catch, self.standards)
+
+    def middle_half(self, count: int) -> Floats:
+        """Return thresholds [u], evenly spaced over the middle half of the levels."""
+        import numpy as np  # noqa: PLC0415
+
+        low, high = self.stimulus.domain
+        return low + (high - low) * (0.25 + 0.5 * (np.arange(count) + 0.5) / count)
+
+    def simulate(self, thresholds: Floats, random: Generator) -> Estimates | None:
+        """Return what the analysis estimates of observers with these thresholds [u]; None: tracks are not simulated.
+
+        Parameters
+        ----------
+        thresholds : (observers,) array
+            In u.
+        random : random.Generator
+            Where answers are drawn from.
+        """
+        import numpy as np  # noqa: PLC0415
+
+        from study_app.psychophysics.precision import estimated  # noqa: PLC0415
+        from study_app.psychophysics.simulated_tracks import Observers  # noqa: PLC0415
+
+        stimulus, design = self.stimulus, self.design
+        family, prior, guess = family_of(stimulus, design), width_prior_of(stimulus), design.guess_rate
+        if guess is None:
+            guess = LAPSES if guesses_of(stimulus, design) is None else FALSE_ALARMS
+        observers = Observers(family, thresholds, prior[0], guess, LAPSES)
+        noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
+        tracks, yes = [], np.zeros(len(thresholds))
+        for number in range(1, self.method.tracks + 1):
+            noise = random.random((len(thresholds), noise_trials)) if noise_trials else None
+            one = self.method.simulated(TrackSetting(stimulus, design, number), observers, random, noise)
+            if one is None:
+                return None
+            tracks.append(one)
+            yes += 0 if noise is None else (noise < guess).sum(axis=1)
+        presented = np.unique(np.concatenate([one.levels[~np.isnan(one.levels)] for one in tracks]))
+        if len(presented) > OBSERVERS:
+            presented = np.linspace(*stimulus.domain, OBSERVERS)
+        places = np.append(presented[presented < high], high)
+        counts = np.sum([one.counts(places.tolist()) for one in tracks], axis=0)
+        drawn = random.random((self.catch * len(tracks), len(thresholds)))
+        caught = observers.probability(high) > drawn
+        counts[:, :, -1] += caught.sum(axis=0), (~caught).sum(axis=0)
+        if noise_trials:
+            no = noise_trials * len(tracks) - yes
+            counts = np.concatenate((np.array([yes, no])[:, :, None], counts), axis=2)
+            places = np.append(stimulus.coordinate(0.0), places)
+        return estimated(analysis_grid(stimulus, design, family, prior), places, counts[0], counts[1])
+
+
+def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
+    """Return what decides how precise a block's thresholds are; None where it has none."""
+    if block.stimulus is None or block.design is None or block.phase != "main":
+        return None
+    stimulus = stimulus_of(protocol, block)
+    design = design_of(protocol, block).model_copy(update={"question": None})  # a dictionary has no hash
+    if not rises(stimulus, design):
+        return None
+    catch, standards = len(tracks_of(protocol, block)[0].catch), len(standards_of(protocol, block))
+    return ThresholdPlan(stimulus, design, method_of(protocol, block), catch, standards)
+
+
+@lru_cache(maxsize=32)
+def expected(plan: ThresholdPlan) -> Expected | None:
+    """Return how precise thresholds are expected to be; None where the method's tracks are not simulated."""
+    import numpy as np  # noqa: PLC0415
+
+    from study_app.psychophysics.precision import Expected  # noqa: PLC0415
+
+    simulated, observers = _affordable(plan)
+    truth = plan.middle_half(observers)
+    found = simulated.simulate(truth, np.random.default_rng(SEED))
+    if found is None:
+        return None
+    shrunk = (simulated.trials / plan.trials) ** 0.5
+    return Expected(
+        spacing=plan.stimulus.spacing,
+        trials=plan.trials,
+        standards=plan.standards,
+        half=shrunk * float((found.highs - found.lows).mean()) / 2,
+        spread=shrunk * float((found.medians - truth).std()),
+        threshold=plan.stimulus.level_of(float(np.median(truth))),
+    )
+
+
+def _affordable(plan: ThresholdPlan) -> tuple[ThresholdPlan, int]:
+    """Return the plan with as many trials as are simulated, and the number of observers."""
+    method = plan.method
+    cells = CELLS * (6 if plan.design.has_noise else 1) * (30 if getattr(method, "learn", "") == "all" else 1)
+    per_trial = cells * plan.stimulus.steps
+    trials = min(plan.trials, MOST_TRIALS, max(10, MOST_WORK // (per_trial * FEWEST)))
+    simulated = plan if trials == plan.trials else plan.with_trials(trials)
+    return simulated, max(FEWEST, min(OBSERVERS, MOST_WORK // (per_trial * simulated.trials)))
+
+
+def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
+    """Yield the expected 95 % intervals of one participant and of the planned group; nothing without thresholds."""
+    plan = threshold_plan(protocol, block)
+    found = None if plan is None else expected(plan)
+    if plan is None or found is None:
+        return
+    unit = f" {quantity(plan.stimulus.vary).unit}".rstrip() if plan.stimulus.level_kind != "weber" else ""
+    one = f"±{found.half:.2g}{unit}" if found.factor is None else f"×/÷ {found.factor:.1f}"
+    people, precision = _planned(protocol)
+    over = "" if found.standards == 1 else " over all standards"
+    group = ""
+    if people is not None:
+        group = f"; {people} participants ±{100 * found.of_group(people):.0f} %{over}"
+    elif precision is not None and (needed := found.participants_for(precision)) is not None:
+        group = f"; ±{100 * precision:g} %{over} takes {needed} participants"
+    yield "Expected precision", f"one participant {one}{group} (95 % intervals)"
+
+
+def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield that the planned participants and trials do not reach the planned precision."""
+    plan, (people, precision) = threshold_plan(protocol, block), _planned(protocol)
+    if plan is None or people is None or precision is None or (found := expected(plan)) is None:
+        return
+    if (reached := found.of_group(people)) <= precision:
+        return
+    key = "trials" if plan.method.adaptive else "repetitions"
+    trials, wanted = found.trials_for(precision, people), found.participants_for(precision)
+    ways = [
+        *([] if trials is None else [f"about {trials} trials"]),
+        *([] if wanted is None else [f"{wanted} participants"]),
+    ]
+    yield (
+        f"methods.{block.method}.{key}: {plan.trials} trials per standard give ±{100 * reached:.0f} % with "
+        f"{people} participants, not ±{100 * precision:g} %: {', or '.join(ways) or 'a larger analysis.precision'}"
+    )
+
+
+def _planned(protocol: Protocol) -> tuple[int | None, float | None]:
+    """Return how many participants and which precision are planned."""
+    decided = protocol.analysis
+    return (None, None) if decided is None else (decided.participants, decided.precision)

@@ -1,0 +1,213 @@
+"""Many tracks of simulated observers at once: the levels that a method chooses, and the answers to them.
+
+The observers answer by a psychometric function, so that what their tracks show is what a method can achieve. Levels
+are in the coordinate u; answers follow from uniform numbers that the caller draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from study_app.psychophysics.families import Family, Floats, success
+from study_app.psychophysics.grid import quantile
+from study_app.psychophysics.questplus import TIE_NATS, Search
+from study_app.psychophysics.updown import Staircase
+
+Counts: TypeAlias = tuple[Floats, Floats]
+"""Successes and failures of each track at each level, (tracks, levels) arrays."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observers:
+    """Who answers: one observer for each track.
+
+    Attributes
+    ----------
+    family : {"weibull", "normal", "logistic"}
+        Their psychometric function.
+    thresholds : (tracks,) array
+        In u.
+    width : float
+        From 5 to 95 %, in u.
+    guess, lapse : float
+        Guess rate and lapse rate.
+    """
+
+    family: Family
+    thresholds: Floats
+    width: float
+    guess: float
+    lapse: float
+
+    def probability(self, levels: ArrayLike) -> Floats:
+        """Return the probability of a success at ``levels``, one for each track or one for all."""
+        return success(self.family, levels, self.thresholds, self.width, self.guess, self.lapse)
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """What was presented and answered.
+
+    Attributes
+    ----------
+    levels : (tracks, trials) array
+        In u; NaN after the end of a track.
+    successes : (tracks, trials) array of bool
+        False after the end of a track.
+    """
+
+    levels: Floats
+    successes: NDArray[np.bool_]
+
+    def counts(self, places: Sequence[float]) -> Counts:
+        """Return how often each track succeeded and failed at each of ``places``, counted at the nearest one.
+
+        Parameters
+        ----------
+        places : sequence of float
+            Levels, in u, ascending.
+        """
+        ascending = np.asarray(places, float)
+        nearest = np.searchsorted((ascending[1:] + ascending[:-1]) / 2, self.levels)
+        row, trial = np.nonzero(~np.isnan(self.levels))
+        found = np.zeros((2, len(self.levels), len(ascending)))
+        np.add.at(found, (np.where(self.successes[row, trial], 0, 1), row, nearest[row, trial]), 1.0)
+        return found[0], found[1]
+
+
+def constant_tracks(levels: Sequence[float], repetitions: int, observers: Observers, draws: Floats) -> Answers:
+    """Return the answers to constant stimuli: each level so many times.
+
+    Parameters
+    ----------
+    levels : sequence of float
+        In u.
+    repetitions : int
+        Presentations of each level.
+    observers : Observers
+        Who answers.
+    draws : (tracks, trials) array
+        Uniform numbers in [0, 1).
+    """
+    presented = np.tile(np.asarray(levels, float), (len(draws), repetitions))
+    return Answers(presented, draws < observers.probability(presented.T).T)
+
+
+def staircase_tracks(
+    staircase: Staircase, observers: Observers, draws: Floats, stop: tuple[int, int] | None = None
+) -> Answers:
+    """Return the tracks of an up–down rule.
+
+    Parameters
+    ----------
+    staircase : Staircase
+        The rule.
+    observers : Observers
+        Who answers.
+    draws : (tracks, trials) array
+        Uniform numbers in [0, 1).
+    stop : tuple of int, optional
+        A track ends after so many reversals, at the earliest after so many answers.
+    """
+    tracks, trials = draws.shape
+    levels, successes = np.full(draws.shape, np.nan), np.zeros(draws.shape, bool)
+    now, running = np.full(tracks, staircase.begin), np.ones(tracks, bool)
+    in_a_row, reversals, before = np.zeros(tracks, int), np.zeros(tracks, int), np.zeros(tracks)
+    for trial in range(trials):
+        right = draws[:, trial] < observers.probability(now)
+        levels[running, trial], successes[:, trial] = now[running], right & running
+        in_a_row = np.where(right, in_a_row + 1, 0)
+        steps_down = in_a_row == staircase.down_after
+        move = np.where(right, np.where(steps_down, -staircase.ratio * staircase.step_up, 0.0), staircase.step_up)
+        in_a_row[steps_down] = 0
+        reversals += move * before < 0.0
+        before = np.where(move != 0.0, move, before)
+        now = np.clip(now + move, staircase.low, staircase.high)
+        if stop is not None:
+            running &= (trial + 1 < stop[1]) | (reversals < stop[0])
+    return Answers(levels, successes)
+
+
+def search_tracks(
+    search: Search,
+    observers: Observers,
+    draws: Floats,
+    begin: int | None = None,
+    noise: Floats | None = None,
+    stop: tuple[float, int] | None = None,
+) -> Answers:
+    """Return the tracks of QUEST+.
+
+    Parameters
+    ----------
+    search : Search
+        What levels are chosen from.
+    observers : Observers
+        Who answers.
+    draws : (tracks, trials) array
+        Uniform numbers in [0, 1).
+    begin : int, optional
+        Index of the first level; by default the search chooses it.
+    noise : (tracks, noise trials) array, optional
+        Uniform numbers for noise trials; the search knows their answers from the first trial on.
+    stop : tuple, optional
+        A track ends where its 95 % interval is so narrow [u], at the earliest after so many answers.
+    """
+    tracks, trials = draws.shape
+    levels, running = np.full(draws.shape, np.nan), np.ones(tracks, bool)
+    successes = np.zeros(draws.shape, bool)
+    at = np.asarray(search.levels, float)
+    log_success, log_failure = (one.reshape(len(at), len(search.grid.thresholds), -1) for one in search.logarithms)
+    log_likelihood = np.zeros((tracks, *log_success.shape[1:]))
+    if noise is not None:
+        yes = (noise < observers.guess).sum(axis=1)[:, None, None]
+        log_likelihood += yes * log_success[0] + (noise.shape[1] - yes) * log_failure[0]
+    rows = np.arange(tracks)
+    for trial in range(trials):
+        posterior = _posterior(search, log_likelihood)
+        if stop is not None and trial >= stop[1]:
+            running &= _interval_widths(search, posterior) > stop[0]
+        place = _next(search, posterior) if trial or begin is None else np.full(tracks, begin)
+        right = draws[:, trial] < observers.probability(at[place])
+        levels[running, trial], successes[:, trial] = at[place[running]], right & running
+        log_likelihood += np.where(right[rows, None, None], log_success[place], log_failure[place])
+    return Answers(levels, successes)
+
+
+def _posterior(search: Search, log_likelihood: Floats) -> Floats:
+    """Return the posterior of each track, (tracks, thresholds, other cells)."""
+    prior = search.grid.prior.reshape(log_likelihood.shape[1:])
+    weights = prior * np.exp(log_likelihood - log_likelihood.max(axis=(1, 2), keepdims=True))
+    return np.asarray(weights / weights.sum(axis=(1, 2), keepdims=True), float)
+
+
+def _next(search: Search, posterior: Floats) -> NDArray[np.int64]:
+    """Return the index of the next level of each track; `Search.next` of many tracks."""
+    first = int(search.noise)
+    psi = search.psi.reshape(len(search.levels), *posterior.shape[1:])[first:]
+    if search.learn == "threshold":
+        succeeded = np.einsum("kac,tac->tka", psi, posterior)
+        before = posterior.sum(axis=2)[:, None, :]
+    else:
+        succeeded = (psi[None] * posterior[:, None]).reshape(len(posterior), len(psi), -1)
+        before = posterior.reshape(len(posterior), 1, -1)
+    entropy = _weighted_entropy(succeeded) + _weighted_entropy(before - succeeded)
+    return first + np.asarray((entropy <= entropy.min(axis=1, keepdims=True) + TIE_NATS).argmax(axis=1), np.int64)
+
+
+def _weighted_entropy(joint: Floats) -> Any:
+    """Return p × the entropy of joint/p, for the sum p over the last axis of ``joint``."""
+    total, kept = joint.sum(axis=-1), np.maximum(joint, 1e-300)
+    return total * np.log(total) - np.einsum("tkc,tkc->tk", joint, np.log(kept))
+
+
+def _interval_widths(search: Search, posterior: Floats) -> Floats:
+    """Return the width of each track's equal-tailed 95 % interval [u]."""
+    marginals = posterior.sum(axis=2)
+    ends = [[quantile(search.grid.thresholds, one, share) for share in (0.025, 0.975)] for one in marginals]
+    return np.diff(np.asarray(ends, float), axis=1)[:, 0]

@@ -1,0 +1,104 @@
+"""Simulated tracks: many at once choose the levels that each would choose alone."""
+
+import math
+
+import numpy as np
+import pytest
+
+from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, geometric
+from study_app.psychophysics.questplus import Search
+from study_app.psychophysics.simulated_tracks import (
+    Answers,
+    Observers,
+    constant_tracks,
+    search_tracks,
+    staircase_tracks,
+)
+from study_app.psychophysics.updown import Staircase
+
+LOW, HIGH = -1.7, -0.2
+LEVELS = evenly(LOW, HIGH, 15)
+
+
+def observers(count=6, guess=0.5):
+    return Observers("weibull", np.linspace(-1.2, -0.6, count), 1.4, guess, 0.02)
+
+
+def draws(trials, count=6, seed=1):
+    return np.random.default_rng(seed).random((count, trials))
+
+
+def search(learn="threshold", guesses=(0.5,), noise=False):
+    grid = Grid("weibull", evenly(LOW, HIGH, 21), geometric(0.5, 4.0, 5), (1.4, 1.5), (0.0, 0.02), (0.5, 0.5), guesses)
+    return Search(grid, (-math.inf, *LEVELS) if noise else LEVELS, learn, noise)
+
+
+@pytest.mark.parametrize("learn", ["threshold", "all"])
+@pytest.mark.parametrize("noise", [False, True])
+def test_search_tracks_choose_the_levels_that_the_search_chooses_one_by_one(learn, noise):
+    one = search(learn, FREE_GUESSES if noise else (0.5,), noise)
+    heard = draws(4, seed=2) if noise else None
+    found = search_tracks(one, observers(guess=0.1), draws(25), noise=heard)
+    for track in range(6):
+        counts = np.zeros((2, len(one.levels)))
+        if heard is not None:
+            yes = int((heard[track] < 0.1).sum())
+            counts[:, 0] = yes, 4 - yes
+        for level, success in zip(found.levels[track], found.successes[track], strict=True):
+            place = one.next(*counts)
+            assert one.levels[place] == level
+            counts[0 if success else 1, place] += 1
+
+
+def test_search_tracks_begin_where_they_are_told_to():
+    found = search_tracks(search(), observers(), draws(3), begin=14)
+    assert (found.levels[:, 0] == LEVELS[14]).all()
+
+
+def test_search_tracks_end_when_the_interval_is_narrow_enough():
+    one, most = search(), 0.9
+    found = search_tracks(one, observers(), draws(80), stop=(most, 10))
+    lengths = (~np.isnan(found.levels)).sum(axis=1)
+    assert lengths.min() >= 10
+    assert lengths.max() < 80
+    for track, length in enumerate(lengths):
+        for stop in (length - 1, length):  # the interval is wider one answer earlier
+            if stop < 10:
+                continue
+            counts = np.zeros((2, len(LEVELS)))
+            for level, success in list(zip(found.levels[track], found.successes[track], strict=True))[:stop]:
+                counts[0 if success else 1, LEVELS.index(level)] += 1
+            low, high = one.interval(*counts)
+            assert (high - low <= most) == (stop == length)
+    assert not found.successes[np.isnan(found.levels)].any()
+
+
+@pytest.mark.parametrize("down_after", [1, 2, 3])
+@pytest.mark.parametrize("stop", [None, (6, 20)])
+def test_staircase_tracks_present_the_levels_of_the_rule(down_after, stop):
+    one = Staircase(down_after, 0.2, 0.55, LOW, HIGH, HIGH)
+    found = staircase_tracks(one, observers(), draws(60), stop)
+    for levels, successes in zip(found.levels, found.successes, strict=True):
+        answers = []
+        for level, success in zip(levels, successes, strict=True):
+            ended = stop is not None and len(answers) >= stop[1] and len(one.reversals(answers)) >= stop[0]
+            assert np.isnan(level) == ended
+            if ended:
+                break
+            assert level == pytest.approx(one.next(answers))
+            answers.append((one.next(answers), bool(success)))
+
+
+def test_constant_tracks_are_answered_with_the_probability_of_the_level():
+    found = constant_tracks(LEVELS, 4000, observers(2), draws(4000 * 15, 2))
+    successes, failures = found.counts(LEVELS)
+    assert (successes + failures == 4000).all()
+    expected = observers(2).probability(np.array(LEVELS)[:, None]).T
+    assert np.abs(successes / 4000 - expected).max() < 4 * math.sqrt(0.25 / 4000)
+
+
+def test_answers_are_counted_at_the_nearest_level_and_not_after_the_end():
+    found = Answers(np.array([[-1.0, -0.42, math.nan], [-0.9, -0.9, 5.0]]), np.array([[1, 0, 0], [1, 0, 1]], bool))
+    successes, failures = found.counts((-1.0, -0.8, -0.4))
+    assert successes.tolist() == [[1, 0, 0], [1, 0, 1]]
+    assert failures.tolist() == [[0, 0, 1], [1, 0, 0]]
