@@ -2,28 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from concurrent.futures import Executor
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from study_app.cli.options import FILE, Target
 from study_app.cli.parallel import EXIT_CANCELLED, executor_for, takes_workers
-from study_app.cli.progress import progress
+from study_app.cli.progress import ShowProgress, progress
 from study_app.workers.executors import Workers
+
+if TYPE_CHECKING:
+    from study_app.analysis.power.power_curves import Powers
+    from study_app.analysis.power.threshold_studies import ThresholdPlans
+    from study_app.analysis.power.threshold_tables import Precisions
+    from study_app.protocol.model import Protocol
 
 SIZES = (5, 8, 12, 16, 20, 24)
 
 
-def _sizes(_context: click.Context, _option: click.Parameter, value: str) -> tuple[int, ...]:
+TRIALS = (1, 1000)
+STUDIES, THRESHOLD_STUDIES = 1000, 200
+
+
+def _numbers(value: str, least: int, most: int, what: str) -> tuple[int, ...]:
+    """Return a list of numbers, ascending."""
     try:
-        sizes = sorted({int(part) for part in value.split(",")})
+        numbers = sorted({int(part) for part in value.split(",")})
     except ValueError as error:
-        raise click.BadParameter(
-            f"{value!r} is not a list of numbers: give numbers of participants such as 5,8,12"
-        ) from error
-    if not sizes or sizes[0] < 2 or sizes[-1] > 1000:
-        raise click.BadParameter(f"{value!r}: give numbers of participants from 2 to 1000, such as 5,8,12")
-    return tuple(sizes)
+        raise click.BadParameter(f"{value!r} is not a list of numbers: give {what} such as 5,8,12") from error
+    if not numbers or numbers[0] < least or numbers[-1] > most:
+        raise click.BadParameter(f"{value!r}: give {what} from {least} to {most}, such as 5,8,12")
+    return tuple(numbers)
+
+
+def _sizes(_context: click.Context, _option: click.Parameter, value: str) -> tuple[int, ...]:
+    return _numbers(value, 2, 1000, "numbers of participants")
+
+
+def _trials(_context: click.Context, _option: click.Parameter, value: str | None) -> tuple[int, ...]:
+    return () if value is None else _numbers(value, *TRIALS, "numbers of trials")
 
 
 @click.command()
@@ -37,11 +57,15 @@ def _sizes(_context: click.Context, _option: click.Parameter, value: str) -> tup
     help="Numbers of participants.",
 )
 @click.option(
+    "--trials",
+    callback=_trials,
+    metavar="N,N,…",
+    help="Trials of each standard, for studies of thresholds; default: the protocol's.",
+)
+@click.option(
     "--studies",
     type=click.IntRange(1, 1_000_000),
-    default=1000,
-    show_default=True,
-    help="Simulated studies for each size.",
+    help=f"Simulated studies for each size; default: {STUDIES}, of thresholds {THRESHOLD_STUDIES}.",
 )
 @takes_workers
 @click.option("--engine", type=click.Choice(["processes", "dask"]), hidden=True)
@@ -50,7 +74,8 @@ def _sizes(_context: click.Context, _option: click.Parameter, value: str) -> tup
 def power(
     protocol: str,
     sizes: tuple[int, ...],
-    studies: int,
+    trials: tuple[int, ...],
+    studies: int | None,
     workers: Workers,
     engine: str | None,
     seed: int,
@@ -59,37 +84,90 @@ def power(
     """Estimate the power of the protocol's own tests on simulated studies, and the smallest detectable difference.
 
     Four sessions are rehearsed to obtain the features of each condition; then thousands of participants answer with
-    the rehearsals' answer model, which is plausible but not measured. Ctrl-C ends with the results so far.
+    the rehearsals' answer model, which is plausible but not measured. Of a study of thresholds: the standard deviation
+    of one participant, half the group's 95 % interval, and how many studies reach analysis.precision, for each number
+    of participants and of --trials. Ctrl-C ends with the results so far.
     """
     if engine == "processes":
         workers = Workers(workers.count)
     elif engine == "dask" and workers.cluster is None:
         raise click.UsageError("--engine dask needs a cluster: give --cluster tcp://HOST:8786")
-    from study_app.analysis.power.plan import plan
-    from study_app.analysis.power.power_curves import Powers, powers
-    from study_app.analysis.power.power_files import write
-    from study_app.analysis.power.power_sweep import sweep
-    from study_app.analysis.power.power_tables import power_markdown
+    from study_app.analysis.power.plan import compares_statements
+    from study_app.analysis.power.threshold_studies import plans
     from study_app.protocol.load import load
-    from study_app.session.simulated.trial_features import feelings
 
     study = load(protocol)
-    found: Powers | None = None
+    planned = plans(study, trials)
+    if trials and not planned:
+        raise click.UsageError(f"--trials: {study.study.name} has no main block of thresholds")
+    found: Powers | Precisions | None = None
+    steps: Iterator[Powers] | Iterator[Precisions]
     cancelled = False
     try:
         with progress() as show, executor_for(workers) as executor:
-            show("simulating every condition")
-            planned = plan(study, feelings(study, seed=seed, progress=show))
-            for done, counts in sweep(planned, sizes, studies, seed, executor):
-                show(f"{done} of {studies} studies of each size", done / studies)
-                found = powers(planned, sizes, done, studies, seed, counts)
+            if planned and (trials or not compares_statements(study)):
+                steps = _of_thresholds(study, planned, sizes, studies or THRESHOLD_STUDIES, seed, show, executor)
+            else:
+                steps = _of_statements(study, sizes, studies or STUDIES, seed, show, executor)
+            for found in steps:
+                show(f"{found.studies} of {found.asked} studies of each size", found.studies / found.asked)
     except KeyboardInterrupt:
         cancelled = True
     if found is not None:
-        click.echo(power_markdown(found), nl=False)
-        if to is not None:
-            for path in write(found, to):
-                click.echo(path)
+        _write(found, to)
     if cancelled:
         click.echo("ended early" if found else "ended before the first studies were complete", err=True)
         click.get_current_context().exit(EXIT_CANCELLED)
+
+
+def _of_statements(
+    study: Protocol, sizes: tuple[int, ...], studies: int, seed: int, show: ShowProgress, executor: Executor
+) -> Iterator[Powers]:
+    """Yield the power of the tests of statements, from ever more studies."""
+    from study_app.analysis.power.plan import plan
+    from study_app.analysis.power.power_curves import powers
+    from study_app.analysis.power.power_sweep import sweep
+    from study_app.session.simulated.trial_features import feelings
+
+    show("simulating every condition")
+    planned = plan(study, feelings(study, seed=seed, progress=show))
+    for done, counts in sweep(planned, sizes, studies, seed, executor):
+        yield powers(planned, sizes, done, studies, seed, counts)
+
+
+def _of_thresholds(
+    study: Protocol,
+    planned: ThresholdPlans,
+    sizes: tuple[int, ...],
+    studies: int,
+    seed: int,
+    show: ShowProgress,
+    executor: Executor,
+) -> Iterator[Precisions]:
+    """Yield the precision of thresholds, from ever more studies."""
+    from study_app.analysis.power.threshold_studies import sweep
+    from study_app.analysis.power.threshold_tables import Precisions
+
+    show("simulating observers")
+    for done, found in sweep(planned, sizes, studies, seed, executor):
+        yield Precisions(study, sizes, done, studies, seed, found)
+
+
+def _write(found: Powers | Precisions, to: Path | None) -> None:
+    """Print the tables; write them and the figures into a folder."""
+    from study_app.analysis.power.power_curves import Powers
+    from study_app.analysis.power.power_files import write
+    from study_app.analysis.power.power_tables import power_markdown
+    from study_app.analysis.power.threshold_tables import threshold_csv, threshold_markdown
+    from study_app.store.output_files import write_files
+
+    if isinstance(found, Powers):
+        click.echo(power_markdown(found), nl=False)
+        written = write(found, to) if to is not None else ()
+    else:
+        words = threshold_markdown(found)
+        click.echo(words, nl=False)
+        files = {"power.md": words.encode(), "power.csv": threshold_csv(found)}
+        written = write_files(to, files) if to is not None else ()
+    for path in written:
+        click.echo(path)

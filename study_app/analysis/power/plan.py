@@ -70,7 +70,7 @@ def plan(protocol: Protocol, felt: Feelings) -> Plan:
         No block of it compares settings and asks about them.
     """
     language = spoken({"study": {"languages": protocol.study.languages}})
-    asked = [block for block in protocol.main_blocks if _statements(protocol, block) and len(block.conditions) > 1]
+    asked = _compared(protocol)
     if not asked:
         raise AnalysisError(
             f"{protocol.study.name} compares nothing: power needs a main block of two or more conditions and a "
@@ -84,6 +84,15 @@ def plan(protocol: Protocol, felt: Feelings) -> Plan:
         tuple(_planned(protocol, block, felt, language) for block in asked),
         decided.read([table]),
     )
+
+
+def compares_statements(protocol: Protocol) -> bool:
+    """Return whether a main block compares conditions by statements."""
+    return bool(_compared(protocol))
+
+
+def _compared(protocol: Protocol) -> list[Block]:
+    return [block for block in protocol.main_blocks if _statements(protocol, block) and len(block.conditions) > 1]
 
 
 def _planned(protocol: Protocol, block: Block, felt: Feelings, language: str) -> Planned:

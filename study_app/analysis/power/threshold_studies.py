@@ -1,0 +1,189 @@
+"""Simulated studies of thresholds: how precisely one participant's threshold and a group's mean are known.
+
+The observers answer through the block's method; their thresholds are estimated as in the report. The thresholds of a
+study's people differ by a factor of 1.2 about a mean that is drawn from the middle half of the levels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.analysis.statistics.random_effects import FEWEST, group_mean
+from study_app.analysis.tables.measures import Array
+from study_app.errors import AnalysisError
+from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
+from study_app.protocol.model import Protocol
+from study_app.psychophysics.precision import BETWEEN_PEOPLE
+
+BATCH: Final = 10
+"""Studies of one case; which studies these are does not depend on how many are asked for."""
+TRACKS_AT_ONCE: Final = 200
+
+ThresholdPlans: TypeAlias = Mapping[str, Mapping[int, ThresholdPlan]]
+"""Block → trials of each standard → what is simulated."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A batch of studies of one block with so many trials for each standard.
+
+    Attributes
+    ----------
+    block : str
+        Id of the block.
+    plan : ThresholdPlan
+        What is simulated.
+    seed : tuple of int
+        Of its draws.
+    """
+
+    block: str
+    plan: ThresholdPlan
+    seed: tuple[int, ...]
+
+
+@dataclass
+class Found:
+    """What studies of one block found with so many trials for each standard.
+
+    Attributes
+    ----------
+    errors : list of array
+        Of each study the errors of the participants' thresholds, (people, standards), in natural logarithms; as shares
+        of the threshold on linear spacing.
+    halves : list of array
+        Of each study half the group's 95 % interval as a share of the mean, (sizes,); NaN below three participants.
+    """
+
+    errors: list[Array] = field(default_factory=list)
+    halves: list[Array] = field(default_factory=list)
+
+    @property
+    def spread(self) -> float:
+        """The standard deviation of one participant's error at one standard."""
+        return float(np.std(np.concatenate([one.ravel() for one in self.errors])))
+
+    def half(self, place: int) -> float:
+        """Return the median of half the group's interval at one of the sizes."""
+        return float(np.median([one[place] for one in self.halves]))
+
+    def within(self, place: int, precision: float) -> float:
+        """Return the share of studies whose half interval is within the precision, at one of the sizes."""
+        return float(np.mean([one[place] <= precision for one in self.halves]))
+
+
+def plans(protocol: Protocol, trials: Sequence[int]) -> ThresholdPlans:
+    """Return for each block with thresholds the plan for each number of trials; none given: the protocol's.
+
+    Raises
+    ------
+    AnalysisError
+        A method cannot have so few trials.
+    """
+    found = {}
+    for block in protocol.main_blocks:
+        plan = threshold_plan(protocol, block)
+        if plan is None:
+            continue
+        changed = [plan.with_trials(one) for one in trials] or [plan]
+        for asked, one in zip(trials, changed, strict=False):
+            if abs(one.trials - asked) > max(1, asked / 2):
+                raise AnalysisError(
+                    f"{asked} trials cannot be divided among the tracks and levels of {block.id}: give at least "
+                    f"{one.trials}"
+                )
+        found[block.id] = {one.trials: one for one in changed}
+    return found
+
+
+def study_batch(case: Case, sizes: Sequence[int]) -> Found:
+    """Return what the studies of a batch find.
+
+    Parameters
+    ----------
+    case : Case
+        The batch.
+    sizes : sequence of int
+        Numbers of participants, ascending; smaller studies have the first participants of the largest.
+    """
+    plan, rng, people = case.plan, np.random.default_rng(case.seed), sizes[-1]
+    low, high = plan.stimulus.domain
+    means = low + (high - low) * (0.25 + 0.5 * rng.random((BATCH, 1, 1)))
+    apart = math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people, 1))
+    log = plan.stimulus.spacing == "log"
+    own = means + apart / math.log(10) if log else means * np.exp(apart)
+    truth = np.broadcast_to(own, (BATCH, people, plan.standards)).reshape(-1)
+    medians, variances = _estimates(plan, truth, rng)
+    errors = (medians - truth) * (math.log(10) if log else 1 / truth)
+    found, shape = Found(), (BATCH, people, plan.standards)
+    for one, median, variance in zip(*(it.reshape(shape) for it in (errors, medians, variances)), strict=True):
+        of_people, of_variances = median.mean(axis=1), variance.sum(axis=1) / plan.standards**2
+        halves = []
+        for n in sizes:
+            group = group_mean(of_people[:n].tolist(), of_variances[:n].tolist()) if n >= FEWEST else None
+            if group is None or group.low is None or group.high is None:
+                halves.append(math.nan)
+            else:
+                half = (group.high - group.low) / 2
+                halves.append(10.0**half - 1 if log else half / abs(group.mean))
+        found.errors.append(one)
+        found.halves.append(np.array(halves))
+    return found
+
+
+def _estimates(plan: ThresholdPlan, truth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return posterior medians and variances of observers with these thresholds [u]."""
+    medians: list[NDArray[np.float64]] = []
+    variances: list[NDArray[np.float64]] = []
+    for first in range(0, len(truth), TRACKS_AT_ONCE):
+        found = plan.simulate(truth[first : first + TRACKS_AT_ONCE], rng)
+        if found is None:
+            raise AnalysisError(f'power simulates no tracks of the method "{plan.method.name}"')
+        medians.append(found.medians)
+        variances.append(found.variances)
+    return np.concatenate(medians), np.concatenate(variances)
+
+
+def sweep(
+    planned: ThresholdPlans, sizes: Sequence[int], studies: int, seed: int, executor: Executor
+) -> Iterator[tuple[int, dict[tuple[str, int], Found]]]:
+    """Yield after every round of batches how many studies were simulated so far, and what was found in them all.
+
+    Parameters
+    ----------
+    planned : mapping
+        From `plans`.
+    sizes : sequence of int
+        Numbers of participants, ascending.
+    studies : int
+        How many studies for each block and number of trials.
+    seed : int
+        Of all randomness; every batch draws from a seed of its own, so the numbers do not depend on the executor.
+    executor : concurrent.futures.Executor
+        Simulates the batches.
+    """
+    keys = [(block, trials) for block, of_trials in planned.items() for trials in of_trials]
+    rounds = math.ceil(studies / BATCH)
+    cases = [
+        Case(block, planned[block][trials], (seed, place, trials, number))
+        for number in range(rounds)
+        for place, block in enumerate(planned)
+        for trials in planned[block]
+    ]
+    total = {key: Found() for key in keys}
+    found = executor.map(study_batch, cases, [tuple(sizes)] * len(cases))
+    for number, (case, one) in enumerate(zip(cases, found, strict=True), start=1):
+        done = (number - 1) // len(keys) * BATCH
+        kept = min(BATCH, studies - done)
+        held = total[case.block, case.plan.trials]
+        held.errors += one.errors[:kept]
+        held.halves += one.halves[:kept]
+        if number % len(keys) == 0:
+            yield done + kept, total

@@ -1,0 +1,118 @@
+"""The precision of thresholds as tables: CSV with a row for each pair of sizes, and Markdown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from study_app import __version__
+from study_app.analysis.power.power_curves import interval
+from study_app.analysis.power.threshold_studies import Found
+from study_app.analysis.tables.compared_blocks import spoken, text_in
+from study_app.protocol.model import Protocol
+from study_app.store.tables.column import Column
+from study_app.store.tables.csv_files import csv_bytes
+
+COLUMNS: Final = (
+    Column("study", "text", "Short name of the study, from its protocol."),
+    Column("simulated", "flag", "true: all of these answers come from a model, none from people."),
+    Column("block", "text", "Id of the block of trials."),
+    Column("trials", "integer", "Trials of each standard.", minimum=1),
+    Column("participants", "integer", "Participants of each study.", minimum=2),
+    Column("studies", "integer", "Simulated studies.", minimum=1),
+    Column("spread", "number", "Standard deviation of the logarithm of one participant's threshold.", minimum=0),
+    Column(
+        "half_interval",
+        "number",
+        "Half the 95 % interval of the group's mean, as a share of it: median of the studies.",
+        minimum=0,
+        may_miss=True,
+    ),
+    Column("precision", "number", "The planned half interval; n/a: none.", minimum=0, may_miss=True),
+    Column("within", "number", "Share of the studies that reach it.", minimum=0, maximum=1, may_miss=True),
+    Column("within_low", "number", "Lower end of the share's 95 % interval.", minimum=0, maximum=1, may_miss=True),
+    Column("within_high", "number", "Upper end of it.", minimum=0, maximum=1, may_miss=True),
+)
+
+
+@dataclass(frozen=True)
+class Precisions:
+    """What so many simulated studies of each size found.
+
+    ``found`` is by block and trials of each standard; ``asked`` says how many studies were to be simulated.
+    """
+
+    protocol: Protocol
+    sizes: tuple[int, ...]
+    studies: int
+    asked: int
+    seed: int
+    found: Mapping[tuple[str, int], Found]
+
+    @property
+    def precision(self) -> float | None:
+        """The planned half interval, as a share of the mean."""
+        decided = self.protocol.analysis
+        return None if decided is None else decided.precision
+
+
+def threshold_csv(precisions: Precisions) -> bytes:
+    """Return a row for every block, number of trials and size."""
+    return csv_bytes(COLUMNS, _rows(precisions))
+
+
+def _rows(all_of_it: Precisions) -> Iterator[dict[str, Any]]:
+    precision = all_of_it.precision
+    for (block, trials), found in all_of_it.found.items():
+        for place, size in enumerate(all_of_it.sizes):
+            half = found.half(place)
+            known = precision is not None and not math.isnan(half)
+            within = found.within(place, precision) if precision is not None and known else None
+            low, high = (None, None) if within is None else interval(within, all_of_it.studies)
+            yield {
+                "study": all_of_it.protocol.study.name,
+                "simulated": True,
+                "block": block,
+                "trials": trials,
+                "participants": size,
+                "studies": all_of_it.studies,
+                "spread": round(found.spread, 4),
+                "half_interval": None if math.isnan(half) else round(half, 4),
+                "precision": precision,
+                "within": None if within is None else round(within, 4),
+                "within_low": None if low is None else round(low, 4),
+                "within_high": None if high is None else round(high, 4),
+            }
+
+
+def threshold_markdown(precisions: Precisions) -> str:
+    """Return a table for each block, with what it is based on."""
+    study, precision = precisions.protocol.study, precisions.precision
+    language = spoken({"study": {"languages": study.languages}})
+    lines = [
+        f"# Precision of thresholds in {text_in(study.title, language)} ({study.name} {study.version})",
+        "",
+        f"**SIMULATED.** {precisions.studies} studies for each row (seed {precisions.seed}, liquid-study "
+        f"{__version__}). Observers answer by a psychometric function with a lapse rate of 2 %; people differ by a "
+        "factor of 1.2 about a mean in the middle half of the levels. Thresholds are estimated as in the report; the "
+        "group's interval is that of the mean over all standards (Hartung–Knapp).",
+    ]
+    if precisions.studies < precisions.asked:
+        lines += ["", f"**Ended early: {precisions.studies} of {precisions.asked} studies.**"]
+    wanted = [] if precision is None else [f"studies within ±{100 * precision:g} %"]
+    heads = ["trials per standard", "participants", "SD of one participant", "half the group's 95 % interval", *wanted]
+    blocks = precisions.protocol.blocks
+    for block in dict.fromkeys(block for block, _ in precisions.found):
+        lines += ["", f"## {text_in(blocks[block].title, language)} (block {block})", ""]
+        lines += [f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|"]
+        for (of_block, trials), found in precisions.found.items():
+            if of_block != block:
+                continue
+            for place, size in enumerate(precisions.sizes):
+                half = found.half(place)
+                share = "–" if math.isnan(half) else f"{found.within(place, precision or 0.0):.0%}"
+                cells = (str(trials), str(size), f"{found.spread:.0%}", "–" if math.isnan(half) else f"±{half:.0%}")
+                lines.append(f"| {' | '.join((*cells, *([share] if wanted else [])))} |")
+    return "\n".join(lines) + "\n"

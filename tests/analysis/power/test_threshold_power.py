@@ -1,0 +1,162 @@
+"""The precision of thresholds over participants and trials: simulated studies, and what the command prints."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.power import threshold_studies
+from study_app.analysis.power.threshold_studies import BATCH, Case, plans, study_batch, sweep
+from study_app.analysis.power.threshold_tables import Precisions, threshold_markdown
+from study_app.cli import commands
+from study_app.errors import AnalysisError
+from study_app.protocol.load import load, parse
+from study_app.protocol.model import Protocol
+
+TEXT = """
+format = 2
+study.name = "smallest"
+liquids.damper.drag = { law = "linear", damping_nspm = 8 }
+tasks.stir.kind = "follow"
+stimuli.damping = { vary = "damping_nspm", levels = [0.02, 0.6], standards = [4, 8], steps = 15 }
+blocks.thicker = { stimulus = "damping", design = "2ifc", method = "m" }
+methods.m = { kind = "questplus", trials = 20 }
+analysis = { participants = 20, precision = 0.3 }
+"""
+
+
+def study(*edits: tuple[str, str]) -> Protocol:
+    text = TEXT
+    for old, new in edits:
+        assert old in text
+        text = text.replace(old, new)
+    return parse(text.encode(), "smallest.toml")
+
+
+class Here(Executor):
+    def submit(self, function: Any, /, *words: Any, **options: Any) -> Future[Any]:
+        done: Future[Any] = Future()
+        done.set_result(function(*words, **options))
+        return done
+
+
+def swept(
+    protocol: Protocol, trials: tuple[int, ...], sizes: tuple[int, ...], studies: int, seed: int = 1
+) -> Precisions:
+    *_, (done, found) = sweep(plans(protocol, trials), sizes, studies, seed, Here())
+    return Precisions(protocol, sizes, done, studies, seed, found)
+
+
+@pytest.mark.slow
+def test_thresholds_become_more_precise_with_trials_and_groups_with_participants_too() -> None:
+    of = swept(study(), (10, 40), (5, 20), 20)
+    few, many = of.found["thicker", 10], of.found["thicker", 40]
+    assert few.spread > 1.3 * many.spread
+    for found in (few, many):
+        assert found.half(0) > 1.5 * found.half(1)
+        assert found.within(0, 0.3) < found.within(1, 0.3)
+    assert few.half(1) > many.half(1)
+    assert few.within(1, 0.2) < many.within(1, 0.2)
+
+
+@pytest.mark.slow
+def test_the_errors_are_those_that_check_expects() -> None:
+    from study_app.protocol.checks.expected_precision import expected, threshold_plan
+
+    protocol = study(("trials = 20", "trials = 50"))
+    found = swept(protocol, (), (20,), 20).found["thicker", 50]
+    plan = threshold_plan(protocol, protocol.blocks["thicker"])
+    assert plan is not None
+    alone = expected(plan)
+    assert alone is not None
+    assert found.spread == pytest.approx(alone.spread * math.log(10), rel=0.15)
+    assert found.half(0) == pytest.approx(alone.of_group(20), rel=0.15)
+
+
+@pytest.mark.slow
+def test_smaller_studies_have_the_first_participants_and_fewer_studies_are_the_first_ones() -> None:
+    many, few = swept(study(), (10,), (3, 9), BATCH + 4), swept(study(), (10,), (3, 9), BATCH + 1)
+    assert (few.studies, many.studies) == (BATCH + 1, BATCH + 4)
+    for one, other in zip(few.found["thicker", 10].errors, many.found["thicker", 10].errors, strict=False):
+        assert np.array_equal(one, other)
+    assert len(few.found["thicker", 10].halves) == BATCH + 1
+    plan = plans(study(), (10,))["thicker"][10]
+    large = study_batch(Case("thicker", plan, (1, 0, 10, 0)), (3, 9))
+    assert [one.shape for one in large.errors] == [(9, 2)] * BATCH
+    assert np.array_equal(large.errors[0], many.found["thicker", 10].errors[0])
+
+
+def test_two_participants_have_no_interval() -> None:
+    found = swept(study(), (10,), (2,), 2)
+    assert math.isnan(found.found["thicker", 10].half(0))
+    assert "| 10 | 2 | " in threshold_markdown(found)
+    assert threshold_markdown(found).rstrip().endswith("| – | – |")
+
+
+def test_trials_are_rounded_to_what_the_method_divides_them_into() -> None:
+    constant = study(('kind = "questplus", trials = 20', 'kind = "constant", levels = 7'))
+    assert list(plans(constant, (30,))["thicker"]) == [28]
+    two = study(("trials = 20", "trials = 20, tracks = 2"))
+    assert list(plans(two, (31,))["thicker"]) == [32]
+    assert list(plans(two, ())["thicker"]) == [20]
+    with pytest.raises(AnalysisError, match="give at least 7"):
+        plans(constant, (3,))
+    assert plans(load("rek2024"), (30,)) == {}
+
+
+@pytest.mark.slow
+def test_the_command_writes_the_same_bytes_with_one_worker_two_and_a_cluster(
+    worker_options: tuple[tuple[str, str], ...], tmp_path: Path
+) -> None:
+    file = tmp_path / "smallest.toml"
+    file.write_text(TEXT)
+    written = []
+    for number, words in enumerate(worker_options):
+        to = tmp_path / str(number)
+        asked = ("power", str(file), "--sizes", "3,5", "--trials", "8,12", "--studies", "25", "--to", str(to))
+        result = CliRunner().invoke(commands, [*asked, *words])
+        assert result.exit_code == 0, result.output
+        written.append({path.name: path.read_bytes() for path in to.iterdir()})
+    assert written[0].keys() == {"power.csv", "power.md"}
+    assert all(files == written[0] for files in written)
+    rows = list(csv.DictReader(written[0]["power.csv"].decode().splitlines()))
+    assert [(row["trials"], row["participants"]) for row in rows] == [("8", "3"), ("8", "5"), ("12", "3"), ("12", "5")]
+    assert all(float(row["half_interval"]) > 0 and 0 <= float(row["within"]) <= 1 for row in rows)
+
+
+def test_the_command_ended_by_the_user_writes_what_it_has(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    first = next(sweep(plans(study(), (10,)), (3,), 30, 1, Here()))
+
+    def until(*_: Any, **__: Any) -> Iterator[Any]:
+        yield first
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(threshold_studies, "sweep", until)
+    file = tmp_path / "smallest.toml"
+    file.write_text(TEXT)
+    asked = ["power", str(file), "--sizes", "3", "--trials", "10", "--to", str(tmp_path / "to")]
+    result = CliRunner().invoke(commands, asked)
+    assert result.exit_code == 130
+    assert "Ended early: 10 of 200 studies" in (tmp_path / "to" / "power.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("rek2024", "--trials", "30"), "rek2024 has no main block of thresholds"),
+        (("viscosityjnd", "--trials", "0"), "give numbers of trials from 1 to 1000"),
+        (("viscosityjnd", "--trials", "30,few"), "is not a list of numbers"),
+    ],
+)
+def test_trials_that_make_no_sense_are_a_usage_error(words: tuple[str, ...], line: str) -> None:
+    result = CliRunner().invoke(commands, ["power", *words])
+    assert result.exit_code == 2
+    assert line in " ".join(result.output.split())
