@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from functools import partial
 from pathlib import Path
 
 import click
@@ -31,33 +30,34 @@ from study_app.workers.executors import Workers
 def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, to: Path | None) -> None:
     """Recover planted thresholds: by the methods and the analysis alone, and through the whole program.
 
-    For each protocol (default: viscosityjnd, delaydetect, delayjnd) many studies of ten equal observers choose levels
-    and are analysed; then three participants are rehearsed with servo, store, unblinding and analysis. Every value is
-    printed with its limit. Ends with exit code 3 if one exceeds it.
+    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness) many studies of ten equal observers
+    choose levels and are analysed; in magnitude estimation an exponent is planted. Then three participants are
+    rehearsed with servo, store, unblinding and analysis. Every value is printed with its limit. Ends with exit code 3
+    if one exceeds it.
     """
     from study_app.protocol.load import load
     from study_app.store.output_files import write_files
-    from study_app.validation.thresholds.methods_alone import simulate
-    from study_app.validation.thresholds.planted import SHIPPED, planted
-    from study_app.validation.thresholds.verdicts import Verdict, markdown, spread, table, verdicts
+    from study_app.validation.thresholds.many_studies import NAMES, methods_alone, plant
+    from study_app.validation.thresholds.verdicts import Verdict, markdown, table
     from study_app.validation.thresholds.whole_pipeline import PEOPLE, run
 
     try:
-        chosen = [(name, planted(Path(name).stem, load(name))) for name in files or tuple(SHIPPED)]
+        chosen = [(name, plant(Path(name).stem, load(name))) for name in files or NAMES]
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     begun = time.monotonic()
     judged: list[Verdict] = []
     with progress() as show, executor_for(workers) as executor:
         for source, one in chosen:
-            found = []
-            for study in executor.map(partial(simulate, one, seed=seed), range(studies)):
-                found.append(study)
-                show(f"{one.name}: {len(found)} of {studies} studies", len(found) / studies)
-            judged += verdicts(one, found)
+
+            def counted(done: int, name: str = one.name) -> None:
+                show(f"{name}: {done} of {studies} studies", done / studies)
+
+            of_methods, spread = methods_alone(one, studies, seed, executor, counted)
+            judged += of_methods
             show(f"{one.name}: rehearsing {PEOPLE} participants")
             with tempfile.TemporaryDirectory() as folder:
-                judged += run(one, source, Path(folder) / "study", spread(found, PEOPLE), seed=seed)
+                judged += run(one, source, Path(folder) / "study", spread, seed=seed)
     used_s = sum(os.times()[:4])  # with the workers', which have ended
     took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
     words = f"{studies} studies of each protocol, seed {seed}, in {took}\n\n{markdown(judged)}"

@@ -2,8 +2,9 @@
 
 What reaches the observer is a resistance (mean force over speed) or a delay, with Gaussian noise: in proportion to the
 resistance (Weber's law), of constant spread for a delay; `Observer` plants both thresholds. Estimates follow a power
-law with exponent 1/2 (Stevens 1957, Psychological Review 64, 153). The observer's numbers are plausible, not measured
-**[choice]**. Only sums, products, quotients and square roots are used, so that answers are the same on every machine.
+law with exponent 1/2 (Stevens 1957, Psychological Review 64, 153) unless another is planted. The observer's numbers are
+plausible, not measured **[choice]**. Only sums, products, quotients and square roots are used, but for planted
+exponents, so that answers are the same on every machine.
 """
 
 from __future__ import annotations
@@ -44,11 +45,15 @@ class Observer:
         Of a delay, likewise [s].
     lapses : float
         So often an answer is given at random.
+    estimates : tuple of float, optional
+        Exponent of estimates over resistance, and the standard deviation of their logarithm; None: 1/2 of the noisy
+        resistance.
     """
 
     weber_fraction: float = 0.24
     delay_jnd_s: float = 0.025
     lapses: float = 0.02
+    estimates: tuple[float, float] | None = None
 
     @property
     def resistance_noise(self) -> float:
@@ -139,6 +144,8 @@ def answer(
     mean, first = sum(known) / len(known), known[0]
     if isinstance(item, ChoiceView):
         return attended.choose(design_of(protocol, block), sensed, mean, draw)
+    if observer.estimates is not None and not isinstance(item, RatingView) and first > 0 and sensed[-1] > 0:
+        return plain_number(max(0.01, round(estimate(observer, sensed[-1] / first, draw), 2)))
     taken = [attended.noisy(one, draw) for one in sensed]
     ratio = taken[-1] / (first if not isinstance(item, RatingView) else mean) if mean > 0 and first > 0 else 1.0
     if isinstance(item, RatingView):
@@ -146,3 +153,11 @@ def answer(
         middle = (points + 1) / 2
         return min(points, max(1, math.floor(middle + (ratio - 1) * (points - 1) + 0.5)))
     return plain_number(max(0.01, round(MODULUS * math.sqrt(max(ratio, 0.0)), 2)))
+
+
+def estimate(observer: Observer, ratio: float, draw: Draw) -> float:
+    """Return the number for a resistance that is ``ratio`` times the block's first, which is called `MODULUS`."""
+    assert observer.estimates is not None  # noqa: S101 - planted
+    exponent, spread = observer.estimates
+    noise = sum(draw() for _ in range(12)) - 6  # nearly normal
+    return MODULUS * math.exp(exponent * math.log(ratio) + spread * noise)

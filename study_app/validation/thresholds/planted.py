@@ -75,4 +75,7 @@ def planted(name: str, protocol: Protocol) -> Planted:
         stimulus = stimulus_of(protocol, block)
         if stimulus.level_kind != "value" and not all(one is None for one in standards_of(protocol, block)):
             return Planted(name, protocol, block, SHIPPED.get(name, OBSERVER))
-    raise ValueError(f"{name} has no main block with levels above a standard: nothing can be planted in it")
+    raise ValueError(
+        f"{name} has no main block with levels above a standard, or with magnitude estimation of a liquid at a pace: "
+        "nothing can be planted in it"
+    )

@@ -16,6 +16,7 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
+from study_app.validation.thresholds.estimated_exponents import PlantedExponent, recovered_exponent
 from study_app.validation.thresholds.planted import Planted
 from study_app.validation.thresholds.verdicts import Verdict
 
@@ -25,7 +26,7 @@ SPREADS: Final = 3
 
 
 def run(
-    one: Planted,
+    one: Planted | PlantedExponent,
     source: str,
     folder: Path,
     spread: float,
@@ -44,7 +45,7 @@ def run(
     folder : Path
         A study folder that is not there yet.
     spread : float
-        Standard deviation of ln threshold over studies of `PEOPLE`, from `verdicts.spread`.
+        Standard deviation of ln threshold, or of the exponent, over studies of `PEOPLE`.
     seed : int
         Of all randomness.
     progress : callable, optional
@@ -67,6 +68,9 @@ def run(
         delivered >= DELIVERED_LEAST,
     )
     yield Verdict(one.name, "findings of verify, reproduce and replay", str(findings), "0", findings == 0)
+    if isinstance(one, PlantedExponent):
+        yield recovered_exponent(one, tracks(study), spread, PEOPLE)
+        return
     block = next(block for block in study.levels if block.id == one.block.id)
     values = [row.threshold for row in thresholds(block, tracks(study)) if row.participant is not None]
     error = sum(math.log(value / one.threshold) for value in values) / len(values)

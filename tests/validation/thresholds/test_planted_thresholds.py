@@ -79,9 +79,9 @@ def test_the_shipped_studies_have_a_planted_threshold_within_their_levels(name: 
 
 
 def test_what_has_no_threshold_is_refused() -> None:
-    with pytest.raises(ValueError, match="thickness has no main block"):
-        planted("thickness", load("thickness"))
-    ran = CliRunner().invoke(commands, ["validate", "thickness"])
+    with pytest.raises(ValueError, match="rek2024 has no main block"):
+        planted("rek2024", load("rek2024"))
+    ran = CliRunner().invoke(commands, ["validate", "rek2024"])
     assert ran.exit_code == 2
     assert "nothing can be planted in it" in ran.output
 

@@ -1,0 +1,100 @@
+"""The exponent of magnitude estimation is planted over the varied number and recovered."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from study_app.protocol.load import load, parse, source_bytes
+from study_app.validation.thresholds import estimated_exponents
+from study_app.validation.thresholds.estimated_exponents import (
+    EXPONENT,
+    ExponentsFound,
+    PlantedExponent,
+    exponent_of,
+    exponent_verdicts,
+    found_of,
+    planted_exponent,
+    simulate_estimates,
+    spread_of_exponents,
+)
+from study_app.validation.thresholds.many_studies import NAMES, plant
+from study_app.validation.thresholds.verdicts import markdown
+from study_app.validation.thresholds.whole_pipeline import run
+from tests.compiled import needs_servo
+
+
+@pytest.fixture(scope="module")
+def one() -> PlantedExponent:
+    found = plant("thickness", load("thickness"))
+    assert isinstance(found, PlantedExponent)
+    return found
+
+
+@pytest.fixture(scope="module")
+def studies(one: PlantedExponent) -> list[ExponentsFound]:
+    return [simulate_estimates(one, number, seed=1) for number in range(12)]
+
+
+def test_the_observers_exponent_follows_from_the_resistance_at_the_pace(one: PlantedExponent) -> None:
+    assert one.resistance_exponent == pytest.approx(0.73, abs=0.01)
+    assert one.observer.estimates is not None
+    assert one.observer.estimates[0] == pytest.approx(0.60, abs=0.01)
+    assert list(one.resistances) == sorted(one.resistances)
+
+
+def test_without_noise_the_planted_exponent_is_found(
+    one: PlantedExponent, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(estimated_exponents, "ESTIMATE_NOISE", 1e-6)
+    found = simulate_estimates(one, 0, seed=1, people=3)
+    assert found.own == pytest.approx((EXPONENT,) * 3, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_studies_recover_it_and_a_wrong_exponent_is_found(one: PlantedExponent, studies: list[ExponentsFound]) -> None:
+    judged = list(exponent_verdicts(one, studies))
+    assert [row.what for row in judged] == ["exponent over viscosity_pa_s", "coverage of the group's 95 % intervals"]
+    assert all(row.holds for row in judged), markdown(judged)
+    assert simulate_estimates(one, 0, seed=1) == studies[0] != simulate_estimates(one, 0, seed=2)
+    steeper = [found_of([1.1 * value for value in found.own]) for found in studies]
+    assert not next(iter(exponent_verdicts(one, steeper))).holds
+    narrow = [ExponentsFound(found.own, found.mean, found.mean, found.mean) for found in studies]
+    assert not list(exponent_verdicts(one, narrow))[1].holds
+    assert spread_of_exponents(studies, 10) < spread_of_exponents(studies, 3) < 0.05
+
+
+def test_the_exponent_is_the_slope_of_mean_logarithms() -> None:
+    levels = [1.0, 1.0, math.e, math.e, math.e]
+    answers = [math.exp(value) for value in (0.0, 2.0, 1.0, 1.5, 2.0)]  # means 1 and 1.5
+    assert exponent_of(levels, answers) == pytest.approx(0.5)
+
+
+def test_studies_without_estimation_at_a_pace_have_no_exponent() -> None:
+    assert "thickness" in NAMES
+    assert planted_exponent("viscosityjnd", load("viscosityjnd")) is None
+    protocol = load("thickness")
+    task = load("delayjnd").tasks["reach"]
+    assert planted_exponent("x", protocol.model_copy(update={"tasks": {"stir": task}})) is None
+
+
+@pytest.mark.slow
+@needs_servo
+def test_the_whole_program_recovers_it(tmp_path: Path) -> None:
+    text = source_bytes("thickness").decode()
+    for old, new in (
+        ("levels = 9 ", "levels = 4 "),
+        ("repetitions = 4", "repetitions = 2"),
+        ("cycles = 4", "cycles = 1"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "short.toml").write_text(text)
+    short = plant("short", parse(text.encode(), "short.toml"))
+    assert isinstance(short, PlantedExponent)
+    spread = spread_of_exponents([simulate_estimates(short, number, seed=1) for number in range(10)], 3)
+    judged = list(run(short, str(tmp_path / "short.toml"), tmp_path / "study", spread, seed=1))
+    assert [row.holds for row in judged] == [True, True, True], markdown(judged)
+    assert judged[2].what == "exponent of 3 people"
