@@ -75,9 +75,9 @@ def answers_of(rows: pd.DataFrame) -> list[Answer]:
 
 
 def _heard(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows whose answers moved their track, in order: no catch trials."""
-    moves = rows["success"].notna() & rows["level"].notna() & ~rows["catch"].fillna(False).astype(bool)
-    return rows[moves].sort_values("trial")
+    """Return the rows whose answers moved their track, in order: neither catch trials nor the standard alone."""
+    compared = rows["success"].notna() & rows["level"].notna() & rows["arrangement"].str.contains("C").fillna(False)
+    return rows[compared & ~rows["catch"].fillna(False).astype(bool)].sort_values("trial")
 
 
 def _reversals(found: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Series[Any]:

@@ -47,7 +47,8 @@ def heard_of(
     design = design_of(protocol, block)
     stimulus = None if block.stimulus is None else stimulus_of(protocol, block)
     correct = design.is_correct(arrangement, answer) if has_correct_answer(design, stimulus) else None
-    return Heard(trial, code, level or 0.0, design.success(arrangement, answer), correct, catch)
+    success, noise = design.success(arrangement, answer), not any(design.arrangements[arrangement])
+    return Heard(trial, code, level or 0.0, success, correct, catch, noise)
 
 
 def heard_in(protocol: Protocol, lines: Iterable[Mapping[str, Any]]) -> tuple[Heard, ...]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 TrackOrder: TypeAlias = Literal["interleaved", "blocked"]
 Answer: TypeAlias = tuple[float, bool]
-"""The level presented, and whether the answer was a success."""
+"""The level of a comparison, and whether the answer was a success."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +63,8 @@ class Heard:
         Whether the answer was correct; None where no answer is.
     catch : bool
         Whether it was a catch trial: no level follows from its answer.
+    noise : bool
+        Whether it presented the standard alone, so that it has no level of its own.
     """
 
     trial: int
@@ -71,6 +73,7 @@ class Heard:
     success: bool | None
     correct: bool | None
     catch: bool = False
+    noise: bool = False
 
 
 class Method(Table):

@@ -22,6 +22,7 @@ from study_app.protocol.trials.answered import heard_of
 from study_app.protocol.trials.due import Due, next_level
 from study_app.protocol.trials.keyed import Key, draw_secret
 from study_app.protocol.trials.method import Heard
+from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import DELAY
 from study_app.protocol.trials.tracks import design_of, method_of, stimulus_of
 from study_app.session.simulated.design_observer import Comparison
@@ -29,8 +30,8 @@ from study_app.validation.thresholds.planted import Planted
 
 PEOPLE: Final = 10
 COLUMNS: Final = (
-    "participant", "session", "block", "code", "track", "trial", "catch", "standard", "level", "level_delivered",
-    "analysed", "success",
+    "participant", "session", "block", "code", "track", "trial", "catch", "arrangement", "standard", "level",
+    "level_delivered", "analysed", "success",
 )  # fmt: skip
 
 
@@ -131,14 +132,12 @@ def _rows(one: Planted, key: Key, person: str, seed: int) -> Iterator[tuple[Any,
         total, count = total + sum(sensed), count + len(sensed)
         draw = keyed_draw(key, person, trial.number)
         answer = attended.choose(design, sensed, total / count, draw)
-        answered = heard_of(protocol, block, trial.number, trial.code, due.level, due.arrangement, answer)
-        heard.append(
-            Heard(answered.trial, answered.code, answered.level, answered.success, answered.correct, due.catch)
-        )
+        what = (trial.number, trial.code, due.level, due.arrangement, answer)
+        heard.append(heard_of(protocol, block, *what, catch=due.catch))
         track = key.codes[block.id][trial.code]
         yield (
             *(person, 1, block.id, trial.code, track, trial.number, due.catch),
-            *(due.standard, due.level, due.level, True, answered.success),
+            *(arrangement_text(design, due.arrangement), due.standard, due.level, due.level, True, heard[-1].success),
         )
 
 

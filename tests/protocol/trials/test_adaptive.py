@@ -15,8 +15,9 @@ from study_app.protocol.describe import describe
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.due import next_level
-from study_app.protocol.trials.method import Heard
-from study_app.protocol.trials.tracks import tracks_of
+from study_app.protocol.trials.method import Heard, TrackSetting
+from study_app.protocol.trials.methods.updown import UpDown
+from study_app.protocol.trials.tracks import design_of, tracks_of
 from tests.protocol.trials.studies import answered, key_of, study
 
 CONSTANT = 'kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 8'
@@ -30,13 +31,15 @@ def adaptive(method: str, *edits: tuple[str, str]) -> Protocol:
 def answers_of(protocol: Protocol, threshold: float, seed: int = 1) -> list[Heard]:
     """Return the answers of one session of an observer who is right above the threshold, and half of the time below."""
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", seed)
+    design = design_of(protocol, protocol.blocks["viscosity"])
     draw, heard = np.random.default_rng(seed), []
     for trial in schedule.trials:
         due = next_level(protocol, key, schedule, trial, heard)
         if due is not None:
             assert due.level is not None
             right = draw.random() < (0.98 if due.level > threshold else 0.5)
-            heard.append(Heard(trial.number, trial.code, due.level, right, right))
+            noise = not any(design.arrangements[due.arrangement])
+            heard.append(Heard(trial.number, trial.code, due.level, right, right, noise=noise))
     return heard
 
 
@@ -224,6 +227,41 @@ def test_check_says_at_what_percentage_a_method_aims() -> None:
     assert "(questplus: threshold at 50 % comparison chosen)" in shown
     assert "% comparison chosen" in describe(adaptive('kind = "updown"', value))
     assert "threshold at" not in describe(adaptive('kind = "questplus"', ('design = "2ifc"', 'design = "yesno"')))
+
+
+FROM_ZERO = ("levels = [0.1, 0.8]", 'levels = [0, 0.8]\nspacing = "linear"')
+"""Levels from zero on: the smallest comparison is the standard itself."""
+
+
+def test_a_staircase_moves_on_from_answers_at_a_level_of_zero() -> None:
+    method = 'kind = "updown"\nrule = "1down1up"\nratio = 1\nstep_up = 0.2\nbegin = 0'
+    protocol = adaptive(method, ONE_STANDARD, FROM_ZERO)
+    key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
+    heard: list[Heard] = []
+    for trial, right in zip(schedule.trials, (False, True, False, False), strict=False):
+        due = next_level(protocol, key, schedule, trial, heard)
+        assert due is not None
+        assert due.level is not None
+        heard.append(Heard(trial.number, trial.code, due.level, right, right))
+    assert [one.level for one in heard] == pytest.approx([0, 0.2, 0, 0.2])
+
+
+def test_reversals_at_a_level_of_zero_count() -> None:
+    protocol = adaptive('kind = "updown"', ONE_STANDARD, FROM_ZERO)
+    track = TrackSetting(protocol.stimuli["viscosity"], design_of(protocol, protocol.blocks["viscosity"]), 1)
+    answers = [(0.16, True), (0.08, True), (0.0, False), (0.08, True), (0.0, False)]
+    assert UpDown(rule="1down1up", ratio=1, step_up=0.08).reversals(track, answers) == (2, 3, 4)
+
+
+@pytest.mark.parametrize(
+    "method", ['kind = "questplus"\nbegin = 0', 'kind = "questplus"\nstop = { ratio = 1e9, after = 3 }']
+)
+def test_questplus_counts_answers_at_a_level_of_zero(method: str) -> None:
+    protocol = adaptive(method, ONE_STANDARD, FROM_ZERO)
+    key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
+    heard = [Heard(one.number, one.code, 0.0, False, False) for one in schedule.trials[:6]]
+    due = next_level(protocol, key, schedule, schedule.trials[6], heard)
+    assert due is None if "stop" in method else due is not None and due.level != 0
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.due import next_level
 from study_app.protocol.trials.method import Heard
-from study_app.protocol.trials.tracks import tracks_of
+from study_app.protocol.trials.tracks import design_of, tracks_of
 from tests.protocol.trials.studies import answered, key_of, study
 
 CATCH = ("task =", "catch = { share = 0.1 }\ntask =")
@@ -100,6 +100,7 @@ def test_a_track_that_has_ended_presents_no_catch_trial_and_no_noise() -> None:
     updown = 'kind = "updown"\ntrials = 60\nstop = { reversals = 2, after = 5 }'
     protocol = study((constant, updown), CATCH, YES_NO)
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
+    design = design_of(protocol, protocol.blocks["viscosity"])
     ended: set[str] = set()
     heard: list[Heard] = []
     for trial in schedule.trials:
@@ -110,7 +111,8 @@ def test_a_track_that_has_ended_presents_no_catch_trial_and_no_noise() -> None:
         assert trial.code not in ended
         assert due.level is not None
         success = len(heard) % 2 == 0
-        heard.append(Heard(trial.number, trial.code, due.level, success, success, due.catch))
+        noise = not any(design.arrangements[due.arrangement])
+        heard.append(Heard(trial.number, trial.code, due.level, success, success, due.catch, noise))
     assert ended == {track.code for track in schedule.trials}
 
 

@@ -82,7 +82,7 @@ class QuestPlus(Adaptive):
 
     def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
         """Return whether the threshold's interval is narrow enough."""
-        if self.stop is None or sum(one.level > 0 for one in heard) < self.stop.after:
+        if self.stop is None or sum(not one.noise for one in heard) < self.stop.after:
             return False
         search, counts = self._search(track), self._counts(track, heard)
         return ratio_in_u(track.stimulus, *search.interval(*counts)) <= self.stop.ratio
@@ -90,7 +90,7 @@ class QuestPlus(Adaptive):
     def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
         """Return the level after these answers: their order does not matter."""
         levels = _levels(track)
-        if not any(one.level > 0 for one in heard) and (first := self.first(track.number)) is not None:
+        if all(one.noise for one in heard) and (first := self.first(track.number)) is not None:
             return levels[_nearest(_coordinates(track), track.stimulus.coordinate(first))]
         return levels[self._search(track).next(*self._counts(track, heard))]
 

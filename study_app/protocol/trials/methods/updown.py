@@ -114,10 +114,8 @@ class UpDown(Adaptive):
         return staircase_tracks(self.staircase(track.stimulus, track.number), observers, draws, stop)
 
     def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...]:
-        """Return the places of the answers at which the direction changed; those to a level of zero have none."""
-        kept = [place for place, (level, _) in enumerate(answers) if level > 0]
-        at = self.staircase(track.stimulus, track.number).reversals_at(_in_u(track.stimulus, answers))
-        return tuple(kept[place] for place in at)
+        """Return the places of the answers at which the direction changed."""
+        return tuple(self.staircase(track.stimulus, track.number).reversals_at(_in_u(track.stimulus, answers)))
 
     def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
         """Return the level of the mean of the last reversals; None where there are too few."""
@@ -140,9 +138,9 @@ class UpDown(Adaptive):
 
 
 def _answers(track: TrackSetting, heard: Sequence[Heard]) -> list[Answer]:
-    return _in_u(track.stimulus, [(one.level, bool(one.success)) for one in heard])
+    """Return the answers to comparisons, with their levels in u: noise trials move no track."""
+    return _in_u(track.stimulus, [(one.level, bool(one.success)) for one in heard if not one.noise])
 
 
 def _in_u(stimulus: Stimulus, answers: Sequence[Answer]) -> list[Answer]:
-    """Return the answers to comparisons with their levels in u; noise trials, at a level of zero, move no track."""
-    return [(stimulus.coordinate(level), success) for level, success in answers if level > 0]
+    return [(stimulus.coordinate(level), success) for level, success in answers]
