@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis.designs.sensitivities import sensitivities
-from study_app.analysis.designs.thresholds import family, thresholds
+from study_app.analysis.designs.thresholds import thresholds
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound, LevelTimes, PublishedValue, Summary
 from study_app.analysis.results.question_answers import GroupAnswers
 from study_app.analysis.statistics.outcome import Array, clopper_pearson
@@ -78,7 +78,7 @@ def _block(
         thresholds=() if opened is None else tuple(thresholds(block, opened)),
         level_times=() if opened is None else tuple(_level_times(block, opened)),
         sensitivities=() if opened is None else tuple(sensitivities(block, opened)),
-        family=family(block),
+        family=None if block.assumed is None else block.assumed.family,
         adaptive=block.method is not None and block.method.adaptive,
         published=tuple(PublishedValue(**one.model_dump(exclude={"block"})) for one in block.published),
     )

@@ -22,7 +22,7 @@ from study_app.analysis.statistics.psychometrics.posterior import fitted
 from study_app.analysis.statistics.random_effects import group_mean
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.tracks import TRACK, answers_of, setting_of
-from study_app.protocol.trials.psychometric import Family, analysis_grid, family_of, rises, width_prior_of
+from study_app.protocol.trials.psychometric import analysis_grid
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.families import CLIP, success
 from study_app.psychophysics.grid import Grid
@@ -39,18 +39,6 @@ class Counts:
     successes: Array
     failures: Array
     places: NDArray[np.int64]
-
-
-def family(block: LevelBlock) -> Family | None:
-    """Return the psychometric function of a block; None where no answer enters one."""
-    if block.stimulus is None or not rises(block.stimulus, block.design):
-        return None
-    return family_of(block.stimulus, block.design)
-
-
-def grid_of(block: LevelBlock, stimulus: Stimulus, shape: Family) -> Grid:
-    """Return the grid over which thresholds of a block are estimated."""
-    return analysis_grid(stimulus, block.design, shape, width_prior_of(stimulus))
 
 
 def counts_of(stimulus: Stimulus, rows: pd.DataFrame) -> Counts:
@@ -78,10 +66,10 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdFou
     opened : DataFrame
         The rows of `tracks`.
     """
-    shape, stimulus = family(block), block.stimulus
-    if shape is None or stimulus is None:
+    assumed, stimulus = block.assumed, block.stimulus
+    if assumed is None or stimulus is None:
         return
-    grid = grid_of(block, stimulus, shape)
+    grid = analysis_grid(stimulus, block.design, assumed)
     all_rows = opened[(opened["block"] == block.id) & opened["success"].notna()].sort_values(["session", "trial"])
     for standard, at_standard in all_rows.groupby("standard", dropna=False, sort=True):
         own = [

@@ -10,10 +10,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from study_app.analysis.designs.thresholds import counts_of, family, grid_of
+from study_app.analysis.designs.thresholds import counts_of
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.psychometrics.posterior import narrowing
 from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.protocol.trials.psychometric import analysis_grid
 
 Flags = NDArray[np.bool_]
 
@@ -38,10 +39,10 @@ class TrackCourse:
 
 def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[TrackCourse]:
     """Yield the first ``most`` courses of a block by participant and standard, from the rows of `tracks`."""
-    shape, stimulus = family(block), block.stimulus
-    if shape is None or stimulus is None:
+    assumed, stimulus = block.assumed, block.stimulus
+    if assumed is None or stimulus is None:
         return
-    grid = grid_of(block, stimulus, shape)
+    grid = analysis_grid(stimulus, block.design, assumed)
     rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["success"].notna()]
     rows = rows.sort_values(["participant", "session", "trial"])
     for number, (_, own) in enumerate(rows.groupby(["participant", "standard"], dropna=False)):

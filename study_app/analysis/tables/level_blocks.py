@@ -14,6 +14,7 @@ from study_app.protocol.orders.block_orders import every_step_of
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
 from study_app.protocol.trials.method import Method
+from study_app.protocol.trials.psychometric import Assumed, assumed_for, rises
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
 from study_app.store.blinded.blinding import Key
@@ -52,6 +53,15 @@ class LevelBlock:
         """Whether trials of several standards alternate."""
         standards = {one.standard for one in self.settings}
         return len(standards) > 1 and self.method is not None and self.method.order == "interleaved"
+
+    @property
+    def assumed(self) -> Assumed | None:
+        """What is assumed about its psychometric function; None where no answer enters one, or the key is sealed."""
+        if self.stimulus is None or not rises(self.stimulus, self.design):
+            return None
+        if self.method is None:
+            return assumed_for(self.stimulus, self.design)
+        return self.method.assumed(self.stimulus, self.design)
 
     def presents_modulus(self, index: int) -> bool:
         """Return whether the trial at this place in the block presents the modulus, which is not analysed."""

@@ -12,6 +12,7 @@ from pydantic import Field
 from study_app.protocol.streams import Draw
 from study_app.protocol.table import Table
 from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.psychometric import Assumed, assumed_for
 from study_app.protocol.trials.stimuli import Stimulus
 
 if TYPE_CHECKING:
@@ -128,6 +129,10 @@ class Method(Table):
         draws : sequence of callable
             Secret uniform numbers in [0, 1), one source per round of levels.
         """
+
+    def assumed(self, stimulus: Stimulus, design: Design) -> Assumed:
+        """Return what is assumed about the psychometric function of its answers."""
+        return assumed_for(stimulus, design)
 
     def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
         """Return whether a track has ended with these answers, before its last trial."""

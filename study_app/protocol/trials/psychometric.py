@@ -6,6 +6,7 @@ The prior is flat in the threshold, log-normal in the width and listed for the l
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from study_app.protocol.trials.design import Design
@@ -28,6 +29,30 @@ ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.05)
 ANALYSIS_LAPSE_PRIOR: Final = (0.25, 0.3, 0.2, 0.15, 0.1)
 BEYOND_DECADES: Final = 0.2
 """How far beyond the ends of the levels a threshold is looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """What is assumed about the psychometric function of a block, while levels are chosen and in the analysis.
+
+    Attributes
+    ----------
+    family : "weibull" | "normal" | "logistic"
+        Its shape.
+    widths : tuple of float
+        The smallest and the largest width, in u.
+    width_prior : tuple of float
+        Median and factor of the log-normal prior on the width, in u.
+    """
+
+    family: Family
+    widths: tuple[float, float]
+    width_prior: tuple[float, float]
+
+
+def assumed_for(stimulus: Stimulus, design: Design) -> Assumed:
+    """Return what is assumed where the method states nothing else."""
+    return Assumed(family_of(stimulus, design), widths_of(stimulus), width_prior_of(stimulus))
 
 
 def is_distance(stimulus: Stimulus) -> bool:
@@ -74,44 +99,34 @@ def width_prior_of(stimulus: Stimulus) -> tuple[float, float]:
     return (stimulus.domain[1] - stimulus.domain[0]) / 2, 2.0
 
 
-def running_grid(
-    stimulus: Stimulus,
-    design: Design,
-    family: Family,
-    widths: tuple[float, float],
-    width_prior: tuple[float, float] | None,
-    lapses: tuple[float, ...],
-) -> Grid:
+def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: tuple[float, ...]) -> Grid:
     """Return the grid over which levels are chosen during a session."""
     from study_app.psychophysics.grid import Grid, evenly, geometric  # noqa: PLC0415 - loads numpy
 
     return Grid(
-        family=family,
+        family=assumed.family,
         thresholds=evenly(*stimulus.domain, RUNNING_THRESHOLDS),
-        widths=geometric(*widths, RUNNING_WIDTHS),
-        width_prior=width_prior,
+        widths=geometric(*assumed.widths, RUNNING_WIDTHS),
+        width_prior=assumed.width_prior,
         lapses=lapses,
         lapse_prior=LAPSE_PRIOR if lapses == LAPSES else (1.0 / len(lapses),) * len(lapses),
         guesses=guesses_of(stimulus, design),
     )
 
 
-def analysis_grid(stimulus: Stimulus, design: Design, family: Family, width_prior: tuple[float, float] | None) -> Grid:
-    """Return the grid over which thresholds are estimated: finer, and beyond both ends of the levels.
-
-    ``width_prior`` is median and factor of the width, None: flat.
-    """
+def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed) -> Grid:
+    """Return the grid over which thresholds are estimated: finer, and beyond both ends of the levels."""
     from study_app.psychophysics.grid import Grid, evenly, geometric  # noqa: PLC0415 - loads numpy
 
     low, high = stimulus.domain
     log = stimulus.spacing == "log"
     beyond = BEYOND_DECADES if log else (high - low) / 10
-    least, most = widths_of(stimulus)
+    least, most = assumed.widths
     return Grid(
-        family=family,
+        family=assumed.family,
         thresholds=evenly(low - beyond, high + beyond, 81),
         widths=geometric(0.8 * least, most, 15),
-        width_prior=width_prior,
+        width_prior=assumed.width_prior,
         lapses=ANALYSIS_LAPSES,
         lapse_prior=ANALYSIS_LAPSE_PRIOR,
         guesses=guesses_of(stimulus, design),

@@ -20,7 +20,7 @@ from study_app.analysis.statistics.psychometrics.posterior import fitted, narrow
 from study_app.analysis.tables.study import load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.psychometric import analysis_grid, width_prior_of
+from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
 from tests.analysis.levels.test_thresholds import STIMULUS, block, rows
 from tests.compiled import needs_servo
 
@@ -34,7 +34,7 @@ def threshold(participant: str | None, standard: float | None, level: float) -> 
 
 
 def test_the_interval_after_the_last_answer_is_that_of_all_answers() -> None:
-    grid = analysis_grid(STIMULUS, default_design("2ifc"), "weibull", width_prior_of(STIMULUS))
+    grid = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")))
     own = rows({"P001": 0.2}, trials=60)
     counts, right = counts_of(STIMULUS, own), own["success"].to_numpy(dtype=bool)
     low, high = narrowing(counts.levels, counts.places, right, grid)

@@ -9,14 +9,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.designs.thresholds import counts_of, family, thresholds
+from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.results.levels import ThresholdFound
+from study_app.analysis.statistics.psychometrics.goodness import p_of_fit
 from study_app.analysis.statistics.psychometrics.posterior import band, fitted
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.method import Heard, TrackSetting
+from study_app.protocol.trials.methods.questplus import QuestPlus
 from study_app.protocol.trials.methods.updown import UpDown
-from study_app.protocol.trials.psychometric import analysis_grid, width_prior_of
+from study_app.protocol.trials.psychometric import analysis_grid, assumed_for
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.families import success
 
@@ -135,19 +137,38 @@ def test_noise_trials_determine_the_guess_rate_of_yes_no() -> None:
 
 def test_answers_that_enter_no_psychometric_function_have_no_threshold() -> None:
     for design in ("samedifferent", "estimation"):
-        assert family(block(design)) is None
+        assert block(design).assumed is None
         assert list(thresholds(block(design), rows({"P001": 0.2}))) == []
 
 
 @pytest.mark.parametrize(("design", "shape"), [("2ifc", "normal"), ("4ifc", "normal"), ("oddity", None), ("abx", None)])
 def test_of_values_only_a_choice_of_more_has_a_threshold(design: str, shape: str | None) -> None:
     around = Stimulus(vary="damping_nspm", level="value", levels=(4.0, 16.0), standards=(8.0,))
-    assert family(block(design, around)) == shape
-    assert family(block(design)) == "weibull"
+    assumed, of_distances = block(design, around).assumed, block(design).assumed
+    assert (None if assumed is None else assumed.family) == shape
+    assert of_distances is not None
+    assert of_distances.family == "weibull"
+
+
+def test_family_and_prior_on_the_width_are_those_that_questplus_states() -> None:
+    plain = rows({"P001": 0.2}, trials=60)
+    _, default = thresholds(replace(block(), method=QuestPlus()), plain)
+    assert default == list(thresholds(block(), plain))[1]
+    _, logistic = thresholds(replace(block(), method=QuestPlus(family="logistic")), plain)
+    u = [math.log10(level) for level in LEVELS]
+    psi = success("logistic", u, math.log10(logistic.threshold), logistic.width or 0, 0.5, logistic.lapse or 0)
+    counts = counts_of(STIMULUS, plain)
+    answers = counts.successes + counts.failures
+    assert logistic.fit_p == pytest.approx(p_of_fit(counts.successes, answers, psi), abs=1e-9)
+    _, wide = thresholds(replace(block(), method=QuestPlus(width_prior=(3.5, 1.05))), plain)
+    assert wide.width == pytest.approx(3.5, rel=0.1)
+    _, narrow = thresholds(replace(block(), method=QuestPlus(widths=(0.1, 0.3), width_prior=(0.2, 1.05))), plain)
+    assert narrow.width == pytest.approx(0.2, rel=0.1)
+    assert wide.flat_width == default.flat_width
 
 
 def test_the_band_holds_the_function_and_is_narrow_with_many_answers() -> None:
-    grid = analysis_grid(STIMULUS, default_design("2ifc"), "weibull", width_prior_of(STIMULUS))
+    grid = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")))
     u = [math.log10(level) for level in LEVELS]
     psi = success("weibull", u, -0.7, 1.4, 0.5, 0.02)
     for n, widest in ((20, 0.5), (2000, 0.05)):

@@ -16,7 +16,7 @@ import numpy as np
 
 from study_app.analysis.statistics.psychometrics.posterior import fitted
 from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.psychometric import LAPSES, analysis_grid, running_grid, width_prior_of, widths_of
+from study_app.protocol.trials.psychometric import LAPSES, analysis_grid, assumed_for, running_grid
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.questplus import search_of
 
@@ -40,9 +40,9 @@ def proportion(level: float, level_75: float) -> float:
 def main(observers: str = "1000", seed: str = "1") -> int:
     """Print a row for each number of trials; return the exit code."""
     draw = np.random.default_rng(int(seed))
-    prior = width_prior_of(STIMULUS)
-    running = running_grid(STIMULUS, DESIGN, "weibull", widths_of(STIMULUS), prior, LAPSES)
-    analysis = analysis_grid(STIMULUS, DESIGN, "weibull", prior)
+    assumed = assumed_for(STIMULUS, DESIGN)
+    running = running_grid(STIMULUS, DESIGN, assumed, LAPSES)
+    analysis = analysis_grid(STIMULUS, DESIGN, assumed)
     levels = STIMULUS.grid
     coordinates = tuple(STIMULUS.coordinate(level) for level in levels)
     search = search_of(running, coordinates, "threshold")

@@ -10,7 +10,7 @@ from study_app.analysis.results.words import listed
 from study_app.analysis.statistics.psychometrics.goodness import SETS
 from study_app.analysis.statistics.random_effects import FEWEST
 from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.protocol.trials.psychometric import ANALYSIS_LAPSES, width_prior_of
+from study_app.protocol.trials.psychometric import ANALYSIS_LAPSES
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 LEVELS: Final = {"weber": "Weber fractions", "difference": "differences", "value": "values"}
@@ -51,11 +51,11 @@ def _of_block(block: LevelBlock, found: LevelsFound) -> Iterator[str]:
         f"In “{found.title}” {found.quantity} was judged by {block.design.paper_name}, at {kind}{against} from {low:g} "
         f"to {high:g}{chosen}."
     )
-    if found.thresholds and found.family is not None:
-        median, factor = width_prior_of(stimulus)
-        log = stimulus.spacing == "log"
+    if found.thresholds and block.assumed is not None:
+        median, factor = block.assumed.width_prior
+        family, log = FAMILIES[block.assumed.family], stimulus.spacing == "log"
         yield (
-            f"A {FAMILIES[found.family]} function of the {'logarithm of the ' if log else ''}level was fitted, with a "
+            f"A {family} function of the {'logarithm of the ' if log else ''}level was fitted, with a "
             f"flat prior on the threshold, a log-normal one on the width (median {median:.3g} "
             f"{'decades' if log else 'units of the level'}, factor {factor:.3g}) and lapse rates up to "
             f"{100 * max(ANALYSIS_LAPSES):.0f} %."

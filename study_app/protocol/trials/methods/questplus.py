@@ -10,16 +10,9 @@ from pydantic import Field
 
 from study_app.protocol.table import Table
 from study_app.protocol.trials.adaptive import Adaptive
+from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.method import Heard, TrackSetting
-from study_app.protocol.trials.psychometric import (
-    LAPSES,
-    Family,
-    family_of,
-    ratio_in_u,
-    running_grid,
-    width_prior_of,
-    widths_of,
-)
+from study_app.protocol.trials.psychometric import LAPSES, Assumed, Family, assumed_for, ratio_in_u, running_grid
 from study_app.protocol.trials.stimuli import Stimulus
 
 if TYPE_CHECKING:
@@ -104,18 +97,18 @@ class QuestPlus(Adaptive):
         stop = None if self.stop is None or not log else (math.log10(self.stop.ratio), self.stop.after)
         return search_tracks(self._search(track), observers, draws, begin, noise, stop)
 
+    def assumed(self, stimulus: Stimulus, design: Design) -> Assumed:
+        """Return the family and the prior on the width that its keys state, else the defaults."""
+        default = assumed_for(stimulus, design)
+        return Assumed(
+            self.family or default.family, self.widths or default.widths, self.width_prior or default.width_prior
+        )
+
     def _search(self, track: TrackSetting) -> Search:
         from study_app.psychophysics.questplus import search_of  # noqa: PLC0415 - loads numpy
 
         stimulus, design = track.stimulus, track.design
-        grid = running_grid(
-            stimulus,
-            design,
-            self.family or family_of(stimulus, design),
-            self.widths or widths_of(stimulus),
-            self.width_prior or width_prior_of(stimulus),
-            self.lapses,
-        )
+        grid = running_grid(stimulus, design, self.assumed(stimulus, design), self.lapses)
         return search_of(grid, _coordinates(track), self.learn, design.has_noise)
 
     def _counts(self, track: TrackSetting, heard: Sequence[Heard]) -> tuple[list[int], list[int]]:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from study_app.analysis.statistics.psychometrics.posterior import fitted
 from study_app.protocol.trials.kinds import default_design
-from study_app.protocol.trials.psychometric import Family, analysis_grid, width_prior_of
+from study_app.protocol.trials.psychometric import Family, analysis_grid, assumed_for
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.families import success
 
@@ -53,9 +54,10 @@ def test_threshold_and_interval_are_those_of_psignifit(
     n = np.full(levels, each)
     assert n.sum() >= 300
     right = np.random.default_rng(levels).binomial(n, success(family, u, threshold, width, guess, lapse))
-    grid = analysis_grid(stimulus, default_design(design), family, width_prior_of(stimulus))
+    assumed = replace(assumed_for(stimulus, default_design(design)), family=family)
+    grid = analysis_grid(stimulus, default_design(design), assumed)
     ours = fitted(u, right, n - right, grid)
-    median, factor = width_prior_of(stimulus)
+    median, factor = assumed.width_prior
     theirs = psignifit.psignifit(
         np.c_[u, right, n],
         sigmoid=SIGMOIDS[family],
