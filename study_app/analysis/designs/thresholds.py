@@ -46,7 +46,8 @@ def counts_of(stimulus: Stimulus, rows: pd.DataFrame) -> Counts:
     groups = rows.groupby("level", sort=True)
     delivered = groups["level_delivered"].mean().astype("Float64").to_numpy(dtype=float, na_value=math.nan)
     asked = groups["level"].first().to_numpy(dtype=float)
-    placed = np.where(np.isfinite(delivered) & (delivered > 0) & (asked != 0), delivered, asked)
+    has_place = np.isfinite(delivered) & ((delivered > 0) | (stimulus.spacing == "linear"))
+    placed = np.where(has_place & (asked != 0), delivered, asked)
     successes = groups["success"].sum().to_numpy(dtype=float)
     return Counts(
         levels=np.array([stimulus.coordinate(float(level)) for level in placed]),

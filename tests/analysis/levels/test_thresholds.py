@@ -111,6 +111,12 @@ def test_a_level_that_was_not_measured_counts_as_requested() -> None:
     assert counts_of(STIMULUS, one).levels == pytest.approx([math.log10(level) for level in LEVELS])
 
 
+def test_values_below_zero_are_placed_where_they_were_delivered() -> None:
+    values = Stimulus(vary="delay_ms", level="value", levels=(-10, 10), spacing="linear")
+    one = rows({"P001": 0.2}, levels=(-8.0, -2.0, 4.0), delivered=1.25)
+    assert counts_of(values, one).levels == pytest.approx([-10, -2.5, 5])
+
+
 @pytest.mark.parametrize(("planted", "beyond"), [(0.009, "below"), (1.2, "above")])
 def test_a_threshold_beyond_the_levels_presented_is_said_to_be(planted: float, beyond: str) -> None:
     _, found = thresholds(block(), rows({"P001": planted}))
