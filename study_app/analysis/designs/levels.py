@@ -108,13 +108,14 @@ def _median(seconds: Array) -> tuple[int, float | None]:
 
 
 def _answers(block: LevelBlock, opened: pd.DataFrame, bounds: tuple[float, float] | None) -> Iterator[LevelAnswers]:
-    """Yield the answers at each level: those of all participants, then those of each."""
+    """Yield the answers at each level, and apart those to catch trials: of all participants, then of each."""
     rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["response"].notna()]
     if block.stimulus is None:
         rows = rows.assign(comparison=rows["track"], place=rows["track"].map(_places(block)))
         by = ["place"]
     else:
-        by = ["standard", "level"]
+        rows = rows.assign(catch=rows["catch"].fillna(False).astype(bool))
+        by = ["standard", "level", "catch"]
     for _, at_level in rows.groupby(by, dropna=False, sort=True):
         yield from _at_level(block, at_level, bounds)
 
@@ -136,6 +137,7 @@ def _at_level(block: LevelBlock, rows: pd.DataFrame, bounds: tuple[float, float]
         standard=_number(first["standard"]),
         level=_number(first["level"]),
         comparison=first["comparison"] if isinstance(first["comparison"], str) else _number(first["comparison"]),
+        catch=block.stimulus is not None and bool(first["catch"]),
     )
     people = rows["participant"].to_numpy()
     own = {person: numbers[people == person] for person in sorted(set(people))}

@@ -23,7 +23,8 @@ Flags = NDArray[np.bool_]
 class TrackCourse:
     """The answers of one participant at one standard in the order of the trials, shape (n,) each.
 
-    ``levels`` were requested; ``tracks`` count from 1; ``low`` and ``high`` are the ends, as levels, of the 95 %
+    ``levels`` were requested; ``tracks`` count from 1; ``catches`` are catch trials, ``noises`` presented the standard
+    alone: neither has a level that its track chose; ``low`` and ``high`` are the ends, as levels, of the 95 %
     interval of the threshold from the answers so far.
     """
 
@@ -33,6 +34,8 @@ class TrackCourse:
     levels: Array
     successes: Flags
     reversals: Flags
+    catches: Flags
+    noises: Flags
     low: Array
     high: Array
 
@@ -58,6 +61,8 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
             levels=own["level"].to_numpy(dtype=float),
             successes=own["success"].to_numpy(dtype=bool),
             reversals=own["reversal"].fillna(False).to_numpy(dtype=bool),
+            catches=own["catch"].fillna(False).to_numpy(dtype=bool),
+            noises=~own["arrangement"].str.contains("C").to_numpy(dtype=bool),
             low=_levels(stimulus.level_of, low),
             high=_levels(stimulus.level_of, high),
         )

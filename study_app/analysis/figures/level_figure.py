@@ -75,14 +75,15 @@ def _picture(study: Study, found: LevelsFound, name: str, forms: Sequence[str]) 
 
 
 def _panels(found: LevelsFound) -> str:
+    crosses = "; crosses: catch trials" if found.has_catch_trials else ""
     if found.own_thresholds:
         return (
             "Curves: psychometric functions at the posterior medians, with the 95 % interval of the threshold; "
-            "circles: answers at each level, area by their number. First panel: all participants."
+            f"circles: answers at each level, area by their number{crosses}. First panel: all participants."
         )
     return (
         f"First panel: {mean_words(found)} over the participants, bars: its 95 % interval (Student's t); thin: "
-        f"participants. Other panels: each participant with the 95 % interval of the answers."
+        f"participants. Other panels: each participant with the 95 % interval of the answers{crosses}."
     )
 
 
@@ -168,12 +169,15 @@ def _panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -
             continue
         span = 0.0 if found.own_thresholds else max(places.values()) - min(places.values())
         aside = ASIDE * (number - (len(groups) - 1) / 2) * span
-        shown = [one for one in found.answers if one.standard == standard]
+        shown = [one for one in found.answers if one.standard == standard and not one.catch]
         if person is None and len(groups) == 1 and not found.own_thresholds:
             for somebody in found.people:
                 _line(axes, [one for one in shown if one.participant == somebody], places, found)
         shifted = {level: place + aside for level, place in places.items()}
         _points(axes, [one for one in shown if one.participant == person], shifted, found, colour)
+        caught = [one for one in found.answers if one.standard == standard and one.catch and one.participant == person]
+        heights = [_height(found, one.value) for one in caught]
+        axes.plot([shifted[_where(one)] for one in caught], heights, "x", color=colour, markersize=4, zorder=4)
 
 
 def _line(axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsFound) -> None:
@@ -230,7 +234,7 @@ def _height(found: LevelsFound, value: float) -> float:
 
 def _places(found: LevelsFound) -> dict[Any, float]:
     """Return the place of each level on the horizontal axis: its logarithm where levels are spaced so."""
-    levels = list(dict.fromkeys(_where(one) for one in found.of_group))
+    levels = list(dict.fromkeys(_where(one) for one in found.answers if one.participant is None))
     if found.vary is None:
         return {level: float(place) for place, level in enumerate(levels)}
     if found.spacing == "linear":

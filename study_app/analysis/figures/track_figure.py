@@ -30,7 +30,8 @@ PANEL_PT: Final = 84.0
 FOOT_PT: Final = 28.0
 MARK_PT2: Final = 7.0
 RING_PT2: Final = 26.0
-"""Areas of the circles of answers and reversals."""
+CROSS_PT2: Final = 11.0
+"""Areas of the marks of answers, reversals and catch trials."""
 LEAST_LEVELS: Final = 3
 """Ticks at 1, 2 and 5 in each decade, as long as so many lie within the axis."""
 
@@ -73,6 +74,7 @@ def _picture(
     success = "correct" if found.counts == "correct" else f"“{found.counts}”"
     marks = " Colours: tracks." if any(one.tracks.max() > 1 for one in shown) else ""
     marks += " Rings: reversals." if any(one.reversals.any() for one in shown) else ""
+    marks += " × and +: catch trials, answered correctly and not." if any(one.catches.any() for one in shown) else ""
     caption = (
         f"{found.title}: the level of each trial. Filled: {success}; hollow: not.{marks} Band: 95 % interval of "
         f"the threshold from the answers so far.{left_out} {simulated}{counted(len(found.people), 'participant')}."
@@ -155,11 +157,18 @@ def _panel(axes: Axes, course: TrackCourse) -> None:
     )
     levels = np.maximum(course.levels, low)
     for track, colour in zip(sorted(set(course.tracks.tolist())), COLOURS, strict=False):
-        own = course.tracks == track
-        axes.plot(trials[own & (course.levels > 0)], levels[own & (course.levels > 0)], color=colour, linewidth=0.6)
+        of_track = course.tracks == track
+        own = of_track & ~course.catches
+        chosen = own & ~course.noises
+        axes.plot(trials[chosen], levels[chosen], color=colour, linewidth=0.6)
         _marks(axes, trials, levels, own & course.successes, colour, colour)
         _marks(axes, trials, levels, own & ~course.successes, "white", colour)
         _marks(axes, trials, levels, own & course.reversals, "none", colour, RING_PT2)
+        for marker, answered in (("x", course.successes), ("+", ~course.successes)):
+            which = of_track & course.catches & answered
+            axes.scatter(
+                trials[which], levels[which], s=CROSS_PT2, marker=marker, color=colour, linewidths=0.8, clip_on=False
+            )
 
 
 def _marks(

@@ -16,6 +16,7 @@ Summary: TypeAlias = Literal["share", "mean", "geometric mean"]
 class LevelAnswers:
     """The answers at one level, of one participant or, where ``participant`` is None, of all.
 
+    Those to catch trials are apart, with ``catch``.
     A block that compares conditions has ``comparison`` in place of ``standard`` and ``level``. ``n`` answers of
     ``participants`` are summarised in ``value``, ``count`` of them are what a share counts. ``low`` and ``high`` are
     the ends of the 95 % interval: of a participant's share by Clopper and Pearson, otherwise by Student's t, over the
@@ -32,6 +33,7 @@ class LevelAnswers:
     value: float
     low: float | None
     high: float | None
+    catch: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,8 +172,13 @@ class LevelsFound:
 
     @property
     def of_group(self) -> tuple[LevelAnswers, ...]:
-        """The answers of all participants together, in order of standard and level."""
-        return tuple(one for one in self.answers if one.participant is None)
+        """The answers of all participants together, in order of standard and level; without catch trials."""
+        return tuple(one for one in self.answers if one.participant is None and not one.catch)
+
+    @property
+    def has_catch_trials(self) -> bool:
+        """Whether some of the answers are to catch trials."""
+        return any(one.catch for one in self.answers)
 
     @property
     def own_thresholds(self) -> tuple[ThresholdFound, ...]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from tests.protocol.trials.studies import FIVE_POINTS, SHORT, text_of
@@ -121,6 +122,17 @@ def opened_adaptive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("adaptive")
     (folder / "adaptive.toml").write_text(ADAPTIVE)
     study = rehearse(folder / "adaptive.toml", participants=3, seed=1, results=folder / "study", recordings=False)
+    assert unblind(study, "AB", "to analyse").left == ()
+    return study
+
+
+@pytest.fixture(scope="session")
+def opened_catch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the study of adaptive tracks with catch trials, answered without servo, its key open."""
+    folder = tmp_path_factory.mktemp("catch")
+    text = ADAPTIVE.replace('method = "', 'catch = { share = 0.2, wrong_most = 1 }\nmethod = "').replace("24", "48")
+    (folder / "catch.toml").write_text(text)
+    study = rehearse_answers(folder / "catch.toml", participants=2, seed=1, results=folder / "study", felt={})
     assert unblind(study, "AB", "to analyse").left == ()
     return study
 

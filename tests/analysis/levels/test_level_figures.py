@@ -48,7 +48,9 @@ def test_the_interval_after_the_last_answer_is_that_of_all_answers() -> None:
 
 
 def test_courses_are_in_the_order_of_the_trials_and_end_at_the_threshold() -> None:
-    frame = rows({"P001": 0.1, "P002": 0.2}, trials=40).assign(track="8/2", reversal=pd.NA)
+    frame = rows({"P001": 0.1, "P002": 0.2}, trials=40).assign(
+        track="8/2", reversal=pd.NA, catch=False, arrangement="CS"
+    )
     one, other = courses(block(), frame.sample(frac=1, random_state=3), most=5)
     assert (one.participant, other.participant, one.standard) == ("P001", "P002", 8.0)
     own = frame[frame["participant"] == "P001"]

@@ -90,7 +90,11 @@ def _columns(found: LevelsFound) -> Iterator[tuple[str, str]]:
 def _of_people(found: LevelsFound, standard: float | None) -> str:
     """Return a row per participant, a column per level."""
     shown = [one for one in found.of_group if one.standard == standard]
-    own = {(one.participant, one.level, one.comparison): one for one in found.answers if one.standard == standard}
+    own = {
+        (one.participant, one.level, one.comparison): one
+        for one in found.answers
+        if one.standard == standard and not one.catch
+    }
     names = [_plain(one.comparison if one.level is None else one.level) for one in shown]
     return table(
         ("Participant" if standard is None else f"Standard {with_unit(found, standard)}", *names),

@@ -1,0 +1,101 @@
+"""Catch trials in the analysis: no reversal, no step of a track, and a mark of their own in figures."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.track_courses import courses
+from study_app.analysis.figures.level_figure import level_pictures
+from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.track_figure import track_pictures
+from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.tables.tracks import TRACK, answers_of, tracks
+
+
+@pytest.fixture(scope="module")
+def study(opened_catch: Path) -> Study:
+    return load_study(opened_catch)
+
+
+@pytest.fixture(scope="module")
+def opened(study: Study) -> pd.DataFrame:
+    return tracks(study)
+
+
+@pytest.fixture(scope="module")
+def staircase(study: Study) -> LevelsFound:
+    return next(found for found in levels_found(study) if found.block == "staircase")
+
+
+def test_a_catch_trial_is_never_a_reversal(opened: pd.DataFrame) -> None:
+    own = opened[opened["block"] == "staircase"]
+    caught = own["catch"].astype(bool)
+    assert caught.sum() >= 10
+    assert own.loc[caught, "reversal"].isna().all()
+    assert own.loc[~caught, "reversal"].notna().all()
+    assert own.loc[~caught, "reversal"].sum() >= 10
+
+
+def test_answers_to_catch_trials_enter_no_step_of_a_track(opened: pd.DataFrame) -> None:
+    """Levels of the other trials follow from each other by the rule's steps: 2down1up, a factor of 2 up."""
+    own = opened[opened["block"] == "staircase"]
+    for _, rows in own.groupby(TRACK):
+        answers = answers_of(rows)
+        assert len(answers) == (~rows["catch"].astype(bool)).sum()
+        in_a_row = 0
+        for (level, right), (following, _) in pairwise(answers):
+            in_a_row = in_a_row + 1 if right else 0
+            factor = 2.0 if not right else 2.0**-0.5488 if in_a_row == 2 else 1.0
+            in_a_row %= 2
+            assert following == pytest.approx(float(np.clip(level * factor, 0.02, 0.6)))
+
+
+def test_answers_at_the_standard_alone_enter_no_step_of_a_track() -> None:
+    rows = pd.DataFrame({"trial": [1, 2, 3], "level": [0.0, 0.0, 0.2], "catch": [False, False, False]})
+    rows = rows.assign(arrangement=["C", "S", "C"], success=pd.array([True, True, False], dtype="boolean"))
+    assert answers_of(rows.astype({"arrangement": "string"})) == [(0.0, True), (0.2, False)]
+
+
+def test_answers_to_catch_trials_are_apart_from_those_at_their_level(
+    staircase: LevelsFound, opened: pd.DataFrame
+) -> None:
+    own = opened[(opened["block"] == "staircase") & (opened["participant"] == "P001") & (opened["standard"] == 4)]
+    shown = [one for one in staircase.answers if one.participant == "P001" and one.standard == 4]
+    assert sum(one.n for one in shown if one.catch) == own["catch"].astype(bool).sum()
+    assert sum(one.n for one in shown) == len(own)
+    assert {one.level for one in shown if one.catch} == {0.6}
+    assert not any(one.catch for one in staircase.of_group)
+
+
+def test_courses_know_their_catch_trials(study: Study, opened: pd.DataFrame) -> None:
+    block = next(block for block in study.levels if block.id == "staircase")
+    for course in courses(block, opened, most=4):
+        assert course.catches.any()
+        assert not (course.catches & course.reversals).any()
+        assert set(course.levels[course.catches]) == {0.6}
+
+
+def test_figures_mark_catch_trials_by_crosses(study: Study, staircase: LevelsFound, opened: pd.DataFrame) -> None:
+    own = opened[opened["block"] == "staircase"]
+    caught = own["catch"].astype(bool)
+    (tracks_drawn,) = track_pictures(study, [staircase], ["svg"])
+    assert "× and +: catch trials, answered correctly and not." in tracks_drawn.caption
+    assert _crosses(tracks_drawn) == caught.sum()
+    (levels_drawn,) = level_pictures(study, [staircase], ["svg"])
+    assert "crosses: catch trials" in levels_drawn.caption
+    assert _crosses(levels_drawn) == len({(one.participant, one.standard) for one in staircase.own_thresholds})
+
+
+def _crosses(picture: Picture) -> int:
+    """Return how many marks of two crossing lines a figure has."""
+    svg = picture.files["svg"].decode()
+    two_lines = re.compile(r'<path id="(\w+)" d="M \S+ \S+\s+L \S+ \S+\s+M \S+ \S+\s+L \S+ \S+\s*"')
+    return sum(len(re.findall(f'<use xlink:href="#{name}"', svg)) for name in set(two_lines.findall(svg)))
