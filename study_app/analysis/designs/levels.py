@@ -12,6 +12,7 @@ import pandas as pd
 
 from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.designs.thresholds import thresholds
+from study_app.analysis.designs.weber_exponents import weber_exponents
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound, LevelTimes, PublishedValue, Summary
 from study_app.analysis.results.question_answers import GroupAnswers
 from study_app.analysis.statistics.outcome import Array, clopper_pearson
@@ -56,6 +57,7 @@ def _block(
 ) -> LevelsFound:
     counted = answers[answers["counted"] & answers["response"].notna()]
     stimulus = block.stimulus
+    estimated = () if opened is None else tuple(thresholds(block, opened))
     return LevelsFound(
         block=block.id,
         title=block.title,
@@ -75,7 +77,8 @@ def _block(
         guess_rate=block.design.guess_rate if block.has_correct_answer else None,
         bounds=bounds,
         answers=() if opened is None else tuple(_answers(block, opened, bounds)),
-        thresholds=() if opened is None else tuple(thresholds(block, opened)),
+        thresholds=estimated,
+        exponents=() if stimulus is None else tuple(weber_exponents(estimated, stimulus.level_kind)),
         level_times=() if opened is None else tuple(_level_times(block, opened)),
         sensitivities=() if opened is None else tuple(sensitivities(block, opened)),
         family=None if block.assumed is None else block.assumed.family,

@@ -92,6 +92,8 @@ def _measured(found: LevelsFound, *which: str | float | None) -> dict[str, Any]:
     if threshold is not None:
         held |= {name: getattr(threshold, name) for name in _OF_THRESHOLD}
         held["flat_width_threshold"] = threshold.flat_width
+        exponents = {one.participant: one.exponent for one in found.exponents}
+        held["weber_exponent"] = exponents.get(threshold.participant)
     return held
 
 

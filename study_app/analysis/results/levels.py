@@ -102,6 +102,20 @@ class ThresholdFound:
 
 
 @dataclass(frozen=True, slots=True)
+class ExponentFound:
+    """A participant's Weber exponent from ``n`` standards: the slope of ln JND on ln standard.
+
+    Where ``participant`` is None, it is the mean over ``n`` participants, with its 95 % interval by Student's t.
+    """
+
+    participant: str | None
+    n: int
+    exponent: float
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class SensitivityFound:
     """A participant's sensitivity and bias or, where ``participant`` is None, their means over ``n`` participants.
 
@@ -164,6 +178,7 @@ class LevelsFound:
     bounds: tuple[float, float] | None = None
     answers: tuple[LevelAnswers, ...] = ()
     thresholds: tuple[ThresholdFound, ...] = ()
+    exponents: tuple[ExponentFound, ...] = ()
     sensitivities: tuple[SensitivityFound, ...] = ()
     level_times: tuple[LevelTimes, ...] = ()
     family: str | None = None

@@ -99,6 +99,13 @@ THRESHOLDS: Final[tuple[Column, ...]] = (
         may_miss=True,
     ),
     Column("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1, may_miss=True),
+    Column(
+        "weber_exponent",
+        "number",
+        "Slope of ln JND on ln standard over the participant's standards: the same in each of these rows; n/a with "
+        "fewer than two standards.",
+        may_miss=True,
+    ),
     Column("flat_width_threshold", "number", "The threshold under a flat prior on the width.", may_miss=True),
     Column(
         "reversal_mean",

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis.designs.thresholds import thresholds
+from study_app.analysis.designs.weber_exponents import jnd_slope
 from study_app.analysis.results.levels import ThresholdFound
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.orders.schedule import build_schedule, draw_key
@@ -88,13 +89,9 @@ def simulate(one: Planted, number: int, seed: int, people: int = PEOPLE) -> Stud
 
 def slopes(one: Planted, found: StudyFound) -> list[float]:
     """Return each participant's slope of ln JND over ln standard."""
-    logarithms = np.log(one.standards)
-    weber = stimulus_of(one.protocol, one.block).level_kind == "weber"
-    jnds = [
-        [math.log(row[0] * (standard if weber else 1.0)) for row, standard in zip(person, one.standards, strict=True)]
-        for person in found.own
-    ]
-    return [float(np.polyfit(logarithms, values, 1)[0]) for values in jnds]
+    standards = np.array(one.standards)
+    unit = standards if stimulus_of(one.protocol, one.block).level_kind == "weber" else 1.0
+    return [jnd_slope(standards, np.array([row[0] for row in person]) * unit) for person in found.own]
 
 
 def _ends(row: ThresholdFound) -> tuple[float, float, float]:

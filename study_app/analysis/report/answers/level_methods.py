@@ -30,6 +30,11 @@ def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsFound]) -
             "(Wichmann & Hill 2001). Group means are random-effects means with the between-person variance of Paule "
             f"and Mandel (1982) and, from {FEWEST} participants on, the interval of Hartung and Knapp (2001)."
         )
+    if any(found.exponents for found in opened):
+        yield (
+            "The Weber exponent is the slope of ln JND on ln standard, by least squares for each participant; the "
+            "group’s is the mean with Student’s 95 % interval."
+        )
     if any(one.d_prime is not None for found in opened for one in found.sensitivities):
         yield (
             "Sensitivity is d′ from rates with the log-linear correction (Hautus 1995), by the model of each design "

@@ -12,7 +12,8 @@ from study_app.analysis.tables.study import Study
 from study_app.protocol.trials.methods.updown import UpDown
 
 START: Final = """
-# Blocks with a design: d' and criterion, means of reversals, and random-effects means with Hartung-Knapp intervals.
+# Blocks with a design: d' and criterion, means of reversals, random-effects means with Hartung-Knapp intervals, and
+# Weber exponents.
 
 tracks <- read.csv("{table}", colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
 for (name in c("standard", "trial", "level_asked")) tracks[[name]] <- as.numeric(tracks[[name]])
@@ -82,6 +83,19 @@ hartung_knapp <- function(what, thresholds, v, log, mean, ends) {{
     same(paste(what, "interval, high"), ends[2], level(m + half))
   }}
 }}
+exponent <- function(what, standards, jnds, reported) {{
+  slope <- unname(coef(lm(log(jnds) ~ log(standards)))[2])
+  same(paste(what, "Weber exponent"), reported, slope)
+  slope
+}}
+exponents <- function(what, slopes, mean, ends) {{
+  same(paste(what, "Weber exponent"), mean, base::mean(slopes))
+  if (length(ends)) {{
+    interval <- t.test(slopes)$conf.int
+    same(paste(what, "Weber exponent, low"), ends[1], interval[1])
+    same(paste(what, "Weber exponent, high"), ends[2], interval[2])
+  }}
+}}
 
 """
 
@@ -114,6 +128,7 @@ def _calls(block: LevelBlock, found: LevelsFound) -> Iterator[tuple[str, int]]:
                     1,
                 )
         yield _hartung_knapp(found, mean, own, log)
+    yield from _exponents(found)
 
 
 def _sensitivity(found: LevelsFound, one: SensitivityFound, d_prime: float) -> tuple[str, int]:
@@ -138,6 +153,30 @@ def _hartung_knapp(
         f"hartung_knapp({r_text(_what(found, mean))}, c({thresholds}), c({variances}), {log}, "
         f"{r_number(mean.threshold)}, {ends})",
         1 if mean.low is None else 3,
+    )
+
+
+def _exponents(found: LevelsFound) -> Iterator[tuple[str, int]]:
+    """Yield the group's call, in which those of the participants are arguments."""
+    group = next((one for one in found.exponents if one.participant is None), None)
+    if group is None:
+        return
+    slopes = []
+    for one in found.exponents:
+        if one.participant is None:
+            continue
+        own = [each for each in found.own_thresholds if each.participant == one.participant]
+        own = [each for each in own if (each.standard or 0.0) > 0 and each.threshold > 0]
+        standards = ", ".join(_number(each.standard) for each in own)
+        levels = ", ".join(r_number(each.threshold) for each in own)
+        jnds = f"c({levels})" + (f" * c({standards})" if found.level_kind == "weber" else "")
+        what = r_text(f"{found.block}, {one.participant}")
+        slopes.append(f"  exponent({what}, c({standards}), {jnds}, {r_number(one.exponent)})")
+    ends = "c()" if group.low is None or group.high is None else f"c({r_number(group.low)}, {r_number(group.high)})"
+    lines = ",\n".join(slopes)
+    yield (
+        f"exponents({r_text(f'{found.block}, group')}, c(\n{lines}), {r_number(group.exponent)}, {ends})",
+        len(slopes) + (1 if group.low is None else 3),
     )
 
 

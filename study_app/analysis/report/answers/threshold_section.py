@@ -18,6 +18,13 @@ MODELS: Final = {
     "independent": " d′ is that of independent observations; the differencing model is in the table of thresholds.",
 }
 
+EXPONENT: Final = (
+    "The exponent is the least-squares slope of ln JND on ln standard over the standards of a participant; the "
+    "just-noticeable difference (JND) is the threshold in the unit of the standard. 1 is Weber’s law (the JND is "
+    "proportional to the standard), 0 a constant JND. That of the group is the mean over participants with Student’s "
+    "interval."
+)
+
 
 def section(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str]:
     """Yield thresholds, sensitivity and bias, and times to answer of a block whose key is open."""
@@ -25,10 +32,14 @@ def section(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str
         yield heading(3, "Thresholds")
         yield _thresholds(found)
         yield paragraph(_threshold_words(found), "soft")
-        if found.published:
-            yield paragraph(f"Published: {'; '.join(one.in_words() for one in found.published)}.")
+        yield from _published(found, exponents=False)
         yield from drawn(pictures, f"tracks-{found.block}")
         yield from drawn(pictures, f"weber-{found.block}")
+    if found.exponents:
+        yield heading(3, "Weber exponent")
+        yield _exponents(found)
+        yield paragraph(EXPONENT, "soft")
+        yield from _published(found, exponents=True)
     if found.sensitivities:
         yield heading(3, "Sensitivity and bias")
         yield _sensitivities(found)
@@ -71,6 +82,28 @@ def _thresholds(found: LevelsFound) -> str:
             for one in found.thresholds
         ],
         words=int(not standards),
+    )
+
+
+def _published(found: LevelsFound, *, exponents: bool) -> Iterator[str]:
+    """Yield the published values that are exponents, or those that are not."""
+    shown = [one.in_words() for one in found.published if (one.measure == "exponent") is exponents]
+    if shown:
+        yield paragraph(f"Published: {'; '.join(shown)}.")
+
+
+def _exponents(found: LevelsFound) -> str:
+    return table(
+        ("Participant", "standards", "exponent", "95 % interval"),
+        [
+            [
+                one.participant or f"group of {one.n}",
+                "–" if one.participant is None else str(one.n),
+                _decimal(one.exponent),
+                "–" if one.low is None or one.high is None else f"{_decimal(one.low)} – {_decimal(one.high)}",
+            ]
+            for one in found.exponents
+        ],
     )
 
 
