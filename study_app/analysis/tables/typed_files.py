@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Callable, Mapping, Sequence
-from itertools import chain
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
@@ -14,11 +11,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from study_app.analysis.tables.table_cells import again, cells
 from study_app.errors import AnalysisError
 from study_app.store.atomic import read_regular
 from study_app.store.journals.parsing import parse_json
-from study_app.store.tables.column import MISSING, Column, Kind, header
-from study_app.store.tables.columns import LATER, columns_held
+from study_app.store.tables.column import MISSING, Column, Kind
 from study_app.store.tables.formulas import unguarded
 
 _ARRAYS: Final[dict[str, tuple[Any, Callable[[Any, Any], Any]]]] = {
@@ -27,7 +24,7 @@ _ARRAYS: Final[dict[str, tuple[Any, Callable[[Any, Any], Any]]]] = {
     "flag": (np.bool_, pd.arrays.BooleanArray),
 }
 AT_ONCE: Final = 250
-"""Files whose cells are held as text at the same time."""
+"""Files whose cells are held at the same time."""
 
 Whole: TypeAlias = NDArray[np.int64]
 
@@ -49,49 +46,11 @@ def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataF
     lengths: list[int] = []
     frames: list[pd.DataFrame] = []
     for first in range(0, max(len(paths), 1), AT_ONCE):
-        files = {path: rows(path, columns) for path in paths[first : first + AT_ONCE]}
-        lengths += map(len, files.values())
-        frames.append(_typed(files, columns))
+        files = paths[first : first + AT_ONCE]
+        read, rows = cells(files, columns)
+        lengths += rows
+        frames.append(_typed(read, columns, files, rows))
     return pd.concat(frames, ignore_index=True), np.array(lengths, dtype=np.int64)
-
-
-def rows(path: Path, columns: tuple[Column, ...]) -> list[list[str]]:
-    """Read the cells of a table, whose header and row lengths must be those of the dictionary.
-
-    Columns that the version which wrote it did not have yet, or that are sealed, hold n/a.
-
-    Raises
-    ------
-    AnalysisError
-        They are not, or the file cannot be read.
-    """
-    try:
-        text = read_regular(path).decode("utf-8")
-        found = list(csv.reader(io.StringIO(text, newline=""), strict=True))
-    except OSError as error:
-        why = error.strerror or type(error).__name__
-        raise AnalysisError(f"{path} cannot be read ({why}): {_again(path)}, or mend the permissions") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise AnalysisError(f"{path} is damaged ({error}): {_again(path)}") from error
-    may_lack = LATER | {column.name for column in columns if column.sealed}
-    held = columns_held(found[0] if found else (), columns, may_lack)
-    names = header(held)
-    if not found or tuple(found[0]) != names:
-        raise AnalysisError(
-            f"{path} does not begin with the columns of this table: it was changed, or written by another version of "
-            f"the program (expected {', '.join(names[:4])} …, {len(names)} columns); {_again(path)}"
-        )
-    del found[0]
-    for number, row in enumerate(found, start=1):
-        if len(row) != len(names):
-            raise AnalysisError(
-                f"{path}, row {number}: {len(row)} cells instead of {len(names)}: the file was cut off or changed; "
-                f"{_again(path)}"
-            )
-    if held != columns:
-        at = {name: index for index, name in enumerate(names)}
-        found = [[row[at[it.name]] if it.name in at else MISSING for it in columns] for row in found]
-    return found
 
 
 def document(path: Path) -> dict[str, Any]:
@@ -119,47 +78,41 @@ def unreadable(path: Path, error: OSError) -> AnalysisError:
     return AnalysisError(f"{path} cannot be read ({why}): restore it from a copy, or mend the permissions")
 
 
-def _again(path: Path) -> str:
-    """Say how a session's table comes to be what it was."""
-    return f"make it again from the journal: liquid-study rebuild {path.parent}"
-
-
-def _typed(files: Mapping[Path, list[list[str]]], columns: tuple[Column, ...]) -> pd.DataFrame:
+def _typed(cells: Any, columns: tuple[Column, ...], paths: Sequence[Path], lengths: Sequence[int]) -> pd.DataFrame:
     """Turn the cells of files into typed columns; every text that occurs is understood once."""
-    columnwise = zip(*chain.from_iterable(files.values()), strict=True)
-    held = {column.name: cells for column, cells in zip(columns, columnwise, strict=False)}
     typed = {}
     for column in columns:
-        cells = held.get(column.name, ())
-        values: dict[str, Any] = {}
-        for cell in dict.fromkeys(cells):
+        texts = cells[column.name].combine_chunks()
+        which = texts.indices.to_numpy()
+        values: list[Any] = []
+        for number, cell in enumerate(texts.dictionary.to_pylist()):
             try:
-                values[cell] = _cell(column, cell, _PARSERS[column.kind])
+                values.append(_cell(column, cell, _PARSERS[column.kind]))
             except ValueError as error:
-                path, number = _place(files, cells.index(cell))
+                path, row = _place(paths, lengths, int(np.flatnonzero(which == number)[0]))
                 raise AnalysisError(
-                    f"{path}, row {number}, column {column.name}: {cell!r} is not {_permitted(column)}; {_again(path)}"
+                    f"{path}, row {row}, column {column.name}: {cell!r} is not {_permitted(column)}; {again(path)}"
                 ) from error
-        typed[column.name] = _array(column.kind, [values[cell] for cell in cells])
+        typed[column.name] = _array(column.kind, values, which)
     return pd.DataFrame(typed)
 
 
-def _array(kind: Kind, values: list[Any]) -> Any:
-    """Return values, None where one is missing, as an array of pandas."""
+def _array(kind: Kind, values: list[Any], which: Whole) -> Any:
+    """Return ``values[which]``, None where one is missing, as an array of pandas."""
     if kind in {"text", "time"}:
-        return pd.array(values, dtype="string")
+        return pd.array(np.array(values, dtype=object)[which], dtype="string")
     plain, make = _ARRAYS[kind]
-    missing = np.fromiter((value is None for value in values), dtype=bool, count=len(values))
-    known = np.fromiter((0 if value is None else value for value in values), dtype=plain, count=len(values))
-    return make(known, missing)
+    missing = np.array([value is None for value in values], dtype=bool)
+    known = np.array([0 if value is None else value for value in values], dtype=plain)
+    return make(known[which], missing[which])
 
 
-def _place(files: Mapping[Path, list[list[str]]], index: int) -> tuple[Path, int]:
+def _place(paths: Sequence[Path], lengths: Sequence[int], index: int) -> tuple[Path, int]:
     """Return the file of the row at ``index`` over all files, and its number there."""
-    for path, found in files.items():
-        if index < len(found):
+    for path, length in zip(paths, lengths, strict=True):
+        if index < length:
             return path, index + 1
-        index -= len(found)
+        index -= length
     raise AssertionError("the row is in none of the files")
 
 
