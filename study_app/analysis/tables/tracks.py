@@ -86,11 +86,11 @@ def _reversals(found: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Seri
     for _, rows in found.groupby(TRACK, sort=False):
         block = blocks[rows["block"].iloc[0]]
         setting = setting_of(block, rows["track"].iloc[0])
-        at = None if setting is None or block.method is None else block.method.reversals(setting, answers_of(rows))
-        if at is not None:
-            places = _heard(rows).index
-            reversal[places] = False
-            reversal[places[list(at)]] = True
+        if setting is None or block.method is None or block.method.target_percent is None:
+            continue
+        at, places = block.method.reversals(setting, answers_of(rows)), _heard(rows).index
+        reversal[places] = False
+        reversal[places[list(at)]] = True
     return reversal
 
 
@@ -136,9 +136,11 @@ def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
     """Return a row per presentation: standard, level, arrangement, and of each interval force and speed."""
     ordered = intervals.sort_values([*PRESENTATION, "interval"])
     letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")
-    groups = ordered.assign(letter=letters).groupby(PRESENTATION, sort=False)
-    found = groups[["standard", "level", "catch"]].first()
-    found["arrangement"] = groups["letter"].agg("".join).astype("string")
+    found = ordered.groupby(PRESENTATION, sort=False)[["standard", "level", "catch"]].first()
+    presented: dict[Any, str] = {}
+    for which, letter in zip(zip(*(ordered[name] for name in PRESENTATION), strict=True), letters, strict=True):
+        presented[which] = presented.get(which, "") + letter
+    found["arrangement"] = pd.Series(presented, dtype="string").reindex(found.index)
     for name, what in (("value_delivered", "value"), ("delay_error_mean_ms", "delay_error_ms")):
         means = ordered.assign(letter=letters).groupby([*PRESENTATION, "letter"])[name].mean().unstack("letter")
         for letter in "CS":

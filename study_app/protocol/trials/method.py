@@ -163,9 +163,9 @@ class Method(Table):
         """The percentage of successes at the mean of its reversals; None where it has no steps."""
         return None
 
-    def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...] | None:
-        """Return the places, from 0, of a track's answers at which its direction changed; None: it has no steps."""
-        return None
+    def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...]:
+        """Return the places, from 0, of a track's answers at which its direction changed; none if it has no steps."""
+        return ()
 
     def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
         """Return the classical estimate of a track, a level; None where it has none."""
