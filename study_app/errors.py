@@ -18,10 +18,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 
 class StudyError(Exception):
-    """A failure that the user can understand and mend."""
+    """A failure that the user can understand and mend.
+
+    It can be pickled whatever its ``__init__`` takes, so that a worker process can raise it here.
+    """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how it is made again: without ``__init__``, whose parameters are not kept."""
+        return _restored, (type(self), self.args, self.__dict__)
+
+
+def _restored(kind: type[StudyError], args: tuple[Any, ...], fields: dict[str, Any]) -> StudyError:
+    """Return an error as it was pickled."""
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(fields)
+    return error
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import signal
 import sys
 from pathlib import Path
 
-from study_app.errors import StudyError
+from study_app.errors import Problem, ProtocolError, StudyError
 
 
 def draw(seed: int) -> float:
@@ -32,6 +32,11 @@ def killed_once(folder: Path, seed: int) -> float:
     if seed % 10 == 5:
         os.kill(os.getpid(), signal.SIGKILL)
     return draw(seed)
+
+
+def refuse_file(line: int) -> None:
+    """Raise the error of a protocol file with a problem in this line."""
+    raise ProtocolError("a.toml", (Problem("blocks.b", "is unknown", line, "did you mean c?"),))
 
 
 def die(_case: int) -> None:

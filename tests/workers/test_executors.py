@@ -14,9 +14,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from study_app.errors import StudyError, WorkerError
+from study_app.errors import Problem, ProtocolError, StudyError, WorkerError
 from study_app.workers.executors import Workers, open_executor
-from tests.workers.cases import die, draw, killed_once, loaded, refuse
+from tests.workers.cases import die, draw, killed_once, loaded, refuse, refuse_file
 
 pytestmark = pytest.mark.slow
 
@@ -61,6 +61,15 @@ def test_an_error_of_a_case_is_raised_where_its_result_is_asked_for() -> None:
         with pytest.raises(StudyError, match="case 3"):
             futures[3].result()
         assert [future.result() for future in futures[:3]] == [0, 1, 2]
+
+
+def test_a_protocol_error_of_a_case_keeps_its_problems() -> None:
+    with open_executor(Workers(1)) as executor:
+        found = executor.submit(refuse_file, 7)
+        with pytest.raises(ProtocolError, match=r"a\.toml: 1 problem\n  line 7: blocks\.b: is unknown") as refused:
+            found.result()
+        assert refused.value.problems == (Problem("blocks.b", "is unknown", 7, "did you mean c?"),)
+        assert executor.submit(draw, 1).result() == draw(1)
 
 
 def test_an_exception_cancels_the_cases_that_have_not_finished() -> None:
