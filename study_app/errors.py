@@ -24,7 +24,7 @@ from typing import Any
 class StudyError(Exception):
     """A failure that the user can understand and mend.
 
-    It can be pickled whatever its ``__init__`` takes, so that a worker process can raise it here.
+    It can be pickled, whichever parameters its ``__init__`` has, so that a worker process can raise it here.
     """
 
     def __reduce__(self) -> tuple[Any, ...]:

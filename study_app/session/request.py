@@ -131,7 +131,7 @@ def check_row(row_of: str | None, study: Protocol) -> None:
     Raises
     ------
     SessionError
-        The study deals no rows, or the id has no number that would deal one.
+        No block has a Williams or Latin order, or the id has no number that determines a row.
     """
     if row_of is None:
         return

@@ -13,10 +13,14 @@ from study_app.protocol.orders.block_orders import orders_of
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """Parts, settings, answers and expected duration [s] of each kind of session of a study."""
+    """Parts, settings, answers and expected duration [s] of each kind of session of a study.
+
+    ``setting`` is the word for what a trial presents: a "setting", or a "trial" where blocks have designs.
+    """
 
     parts: tuple[int, ...]
     settings: tuple[int, ...]
+    setting: str
     answers: tuple[int, ...]
     expected_s: tuple[float, ...]
 
@@ -33,6 +37,7 @@ def extent_of(protocol: Protocol) -> Extent:
     return Extent(
         parts=tuple(one.parts for one in sessions),
         settings=tuple(sum(block.trials for block in one.blocks if block.phase == "main") for one in orders),
+        setting="setting" if all(block.design is None for block in protocol.blocks.values()) else "trial",
         answers=tuple(one.answers for one in orders),
         expected_s=tuple(expected_duration_s(one) for one in sessions),
     )

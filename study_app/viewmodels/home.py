@@ -88,7 +88,7 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
         extent=", ".join(
             (
                 counted_each(extent.parts, "part"),
-                counted_each(extent.settings, "setting"),
+                counted_each(extent.settings, extent.setting),
                 counted_each(extent.answers, "answer"),
             )
         ),

@@ -135,7 +135,7 @@ def _rows(
     error = WAITING if error_n is None else "< 0.01 N" if error_n < 0.01 else f"{error_n:.2f} N"
     return (
         ("Parts", spread(extent.parts)),
-        ("Settings", spread(extent.settings)),
+        (f"{extent.setting.capitalize()}s", spread(extent.settings)),
         ("Answers", spread(extent.answers)),
         ("Expected time", extent.minutes),
         ("Force limit", f"{protocol.device.force_limit_n:g} N"),

@@ -136,12 +136,18 @@ def test_the_shipped_protocols_are_at_hand_the_demo_last():
     assert "rek2024" in sources()
 
 
-def test_a_protocol_is_told_by_what_one_chooses_by():
+def test_the_card_of_a_protocol_states_extent_languages_and_needs():
     facts = study_facts("rek2024")
     assert isinstance(facts, StudyFacts)
     assert facts.extent == "2 parts, 10 settings, 62 answers"
     assert facts.languages == "Dutch, English"
     assert "8 N" in facts.needs
+
+
+def test_a_study_of_levels_counts_trials() -> None:
+    facts = study_facts("viscosityjnd")
+    assert isinstance(facts, StudyFacts)
+    assert facts.extent.startswith("1 part, 220 trials, ")
     assert facts.duration.startswith("about ")
 
 

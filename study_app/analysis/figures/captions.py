@@ -7,7 +7,7 @@ from typing import Final
 
 import pandas as pd
 
-from study_app.analysis.figures.small_multiples import told_lines
+from study_app.analysis.figures.small_multiples import line_words
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.measures import QUARTILES
 from study_app.analysis.tables.study import Study
@@ -110,7 +110,7 @@ def _plots(study: Study, block: Block) -> list[str]:
     scale = f"Answers from 1 ({block.labels[0]}) to 7 ({block.labels[-1]})."
     if block.revealed:
         return [
-            f"Thin lines: {told_lines(len(set(study.answers(block)['participant'])))}, slightly apart in height where "
+            f"Thin lines: {line_words(len(set(study.answers(block)['participant'])))}, slightly apart in height where "
             f"they coincide; thick line: median; band: {quartiles}",
             scale,
         ]

@@ -145,7 +145,7 @@ def lines_of(participants: int) -> list[int]:
     return [int(place) for place in np.linspace(0, participants - 1, MOST_LINES).round()]
 
 
-def told_lines(participants: int) -> str:
+def line_words(participants: int) -> str:
     """Return whom the thin lines are, for a caption."""
     if participants <= MOST_LINES:
         return "participants"

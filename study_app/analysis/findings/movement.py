@@ -33,7 +33,7 @@ def _figure(drawing: Drawing) -> Picture | None:
     n = f"n = {len(people)} participant" + ("" if len(people) == 1 else "s")
     caption = (
         f"How participants reached, over the delay that was asked for ({drawing.simulated}{n} with recordings). "
-        f"Thin lines: {small_multiples.told_lines(len(people))}; thick line: median; band: the middle half. "
+        f"Thin lines: {small_multiples.line_words(len(people))}; thick line: median; band: the middle half. "
         "Movement time: from the lighting of a target to the entry that was held. Scales do not begin at zero. "
         f"{_kept(block, drawing.results)}"
     )

@@ -52,11 +52,11 @@ def _sample(study: Study) -> str:
     gone = f"; {counted(out, 'further session')} {'was' if out == 1 else 'were'} left out" if out else ""
     return (
         f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, "
-        f"{told_versions(study)}){gone}{_under(study)}."
+        f"{version_words(study)}){gone}{_under(study)}."
     )
 
 
-def told_versions(study: Study) -> str:
+def version_words(study: Study) -> str:
     """Return the versions of the protocol whose sessions are pooled."""
     versions = study.versions
     return f"version {versions[0]}" if len(versions) == 1 else f"versions {listed(versions)}, pooled"

@@ -22,7 +22,7 @@ from study_app.analysis.report import block_section, conduct_section, number_fil
 from study_app.analysis.report.answers import question_section
 from study_app.analysis.report.first_page.page import first_page
 from study_app.analysis.report.html_page import box, bullets, heading, not_there, page, paragraph, render, table
-from study_app.analysis.report.methods_paragraph import methods, told_versions
+from study_app.analysis.report.methods_paragraph import methods, version_words
 from study_app.analysis.report.r_script import r_script
 from study_app.analysis.report.typeface import font_faces
 from study_app.analysis.results.block_results import Results
@@ -190,7 +190,7 @@ def _made(make: Callable[[], Iterable[str]]) -> list[str]:
 
 def _facts(study: Study) -> str:
     people = counted(study.n, "participant")
-    return f"Study {study.name}, {told_versions(study)}. {people[:1].upper()}{people[1:]}. {_days(study)}"
+    return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}. {_days(study)}"
 
 
 def _marks(study: Study) -> list[tuple[str, str]]:

@@ -26,7 +26,7 @@ class SimulatedParticipant(ABC):
     schedule : Schedule
         In what order.
     observer : Observer
-        What is told apart in trials of intervals.
+        Discriminates the intervals of a trial.
     """
 
     def __init__(self, study: Protocol, schedule: Schedule, observer: Observer) -> None:

@@ -70,7 +70,7 @@ def rehearse(
     progress : callable, optional
         Called with a line after each session.
     observer : Observer, optional
-        What participants tell apart in trials of intervals.
+        Discriminates the intervals of a trial.
 
     Raises
     ------

@@ -72,7 +72,7 @@ class RehearsedSession(SimulatedParticipant):
     known : mapping of int to tuple of Felt, optional
         What is answered by instead, by trial number.
     observer : Observer, optional
-        What is told apart in trials of intervals.
+        Discriminates the intervals of a trial.
     """
 
     def __init__(

@@ -128,5 +128,5 @@ def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
     assert len(drawn) == small_multiples.MOST_LINES
     assert {"measure1-participant1", "measure1-participant500"} <= set(drawn)
     assert np.asarray(gids["measure1-median"].get_ydata()).tolist() == [1.5, 2.5, 3.5]
-    assert small_multiples.told_lines(500) == "60 of the 500 participants, evenly chosen in the order of their ids"
-    assert small_multiples.told_lines(60) == "participants"
+    assert small_multiples.line_words(500) == "60 of the 500 participants, evenly chosen in the order of their ids"
+    assert small_multiples.line_words(60) == "participants"
