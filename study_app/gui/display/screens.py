@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.errors import DisplayError
 
-FRAMED_AFTER_MS = 300  # by then a window manager has put its frame around a new window
+FRAME_LOOKS_MS = (300, 1000, 3000)  # when to look for the frame that a window manager puts around a new window
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +89,14 @@ def describe_screen(screen: QScreen) -> dict[str, Any]:
 def place(window: QWidget, screen: QScreen, *, corner: bool) -> None:
     """Give ``window`` its size, or as much of it as ``screen`` has, in the middle or in the lower right corner.
 
-    The system's frame is not known before the window is shown: once it is, the window makes room for it.
+    The system's frame is not known before the window is shown, and on a busy machine some time later: once it is, the
+    window makes room for it.
     """
     room = screen.availableGeometry()
     window.setScreen(screen)
     window.setGeometry(_inside(window, room, corner=corner))
-    QTimer.singleShot(FRAMED_AFTER_MS, window, partial(make_room_for_frame, window, corner=corner))
+    for after_ms in FRAME_LOOKS_MS:
+        QTimer.singleShot(after_ms, window, partial(make_room_for_frame, window, corner=corner))
 
 
 def make_room_for_frame(window: QWidget, *, corner: bool = False) -> None:

@@ -31,6 +31,19 @@ def test_window_as_large_as_the_screen_makes_room_for_its_frame(qtbot) -> None:
     assert window.frameGeometry().size() == room.size()
 
 
+def test_window_makes_room_for_a_frame_that_a_busy_machine_adds_late(qtbot) -> None:
+    room = QGuiApplication.primaryScreen().availableGeometry()
+    window = QWidget()
+    qtbot.addWidget(window)
+    window.resize(room.size())
+    place(window, window.screen(), corner=False)
+    qtbot.wait(600)  # until then it has no frame
+    window.show()
+    qtbot.waitExposed(window)
+    qtbot.waitUntil(lambda: room.contains(window.frameGeometry()))
+    assert window.frameGeometry().size() == room.size()
+
+
 def test_window_that_fits_keeps_size_and_least_size(qtbot) -> None:
     window = shown_in(qtbot, QSize(500, 400), QSize(300, 200))
     qtbot.wait(400)
