@@ -132,7 +132,7 @@ class CostCard(ReadingCard):
         self.content.addLayout(whole)
         self.content.addLayout(self._absent)
         self.content.addStretch()
-        self.stack.widget(0).setMinimumHeight(COST_HEIGHT)
+        self.stack.widget(1).setMinimumHeight(COST_HEIGHT)  # of the hidden page: the lines may need more
 
     def show_view(self, view: LabView) -> None:
         """Show the felt setting's costs."""

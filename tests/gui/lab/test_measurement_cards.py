@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from PySide6.QtCore import QRectF
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.lab.plots import POINTS, A, B, CurvePlot, thinned
+from study_app.haptics.model.effects import EFFECTS
 from study_app.viewmodels.lab import CostRow, LabView
 
 pytestmark = pytest.mark.slow
@@ -100,6 +102,22 @@ def test_both_forces_are_drawn_and_named(place: Any, moved: LabView) -> None:
     assert place.force.legend.accessibleName() == "A, felt now, B, same motion, limit 8 N"
     place.show_view(dataclasses.replace(moved, workbench=moved.workbench.switch()))
     assert place.force.legend.accessibleName() == "A, same motion, B, felt now, limit 8 N"
+
+
+def test_every_effect_has_a_whole_line_in_a_small_window(place: Any, still: LabView) -> None:
+    rows = tuple(
+        CostRow(effect.name, None if number > 3 else 10.0, "not used") for number, effect in enumerate(EFFECTS)
+    )
+    place.resize(1366, 700)
+    place.show_view(dataclasses.replace(still, cost=rows))
+    QApplication.processEvents()
+    card = place.cost
+    lines = [*card.lines, *card.absent]
+    assert len(lines) == len(EFFECTS)
+    for above, below in pairwise(lines):
+        assert above.geometry().bottom() < below.geometry().top()
+    shown = card.stack.widget(0).rect()
+    assert all(shown.contains(line.geometry()) for line in lines)
 
 
 def test_costs_are_bars_of_the_dearest_and_absent_ones_say_why(place: Any, still: LabView) -> None:
