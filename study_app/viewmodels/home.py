@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
@@ -23,6 +24,7 @@ from study_app.store.workstation import recent_protocols
 from study_app.viewmodels.extent import counted_each, extent_of
 from study_app.viewmodels.session.stages import operator_language, step_title
 from study_app.viewmodels.sessions import SessionFacts, counted, started_words
+from study_app.workspace import workspace
 
 LANGUAGES = {"en": "English", "nl": "Dutch", "de": "German", "fr": "French", "es": "Spanish", "it": "Italian"}
 
@@ -45,6 +47,11 @@ class StudyFacts:
         """The study's name, which its sessions carry."""
         return self.protocol.study.name
 
+    @property
+    def file_name(self) -> str:
+        """The name of its file, without ending, which commands take."""
+        return Path(self.source).stem
+
 
 @dataclass(frozen=True, slots=True)
 class BrokenFacts:
@@ -59,6 +66,24 @@ def sources() -> tuple[str, ...]:
     names = sorted(at_hand(), key=lambda name: (name != "rek2024", name == "demo", name))
     found = dict.fromkeys((*recent_protocols(), *names))
     return tuple(source for source in found if not holds_liquids_alone(source))
+
+
+def file_states(opened: Iterable[str]) -> frozenset[tuple[Path, int, int]]:
+    """Return path, time of change [ns] and size [bytes] of the files that studies come from, liquid files among them.
+
+    These are the workspace's files, recent ones and ``opened`` ones.
+    """
+    states = []
+    for path in (*workspace().own_protocols(), *map(Path, (*recent_protocols(), *opened))):
+        with suppress(OSError):
+            state = path.stat()
+            states.append((path, state.st_mtime_ns, state.st_size))
+    return frozenset(states)
+
+
+def read_studies(opened: Iterable[str]) -> tuple[StudyFacts | BrokenFacts, ...]:
+    """Return what is said of each study at hand, ``opened`` ones first."""
+    return tuple(study_facts(source) for source in dict.fromkeys((*opened, *sources())))
 
 
 def holds_liquids_alone(source: str) -> bool:

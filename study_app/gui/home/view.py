@@ -8,7 +8,7 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
@@ -37,11 +37,11 @@ from study_app.viewmodels.home import (
     BrokenFacts,
     Interrupted,
     StudyFacts,
+    file_states,
     held,
     holds_liquids_alone,
     interrupted,
-    sources,
-    study_facts,
+    read_studies,
 )
 from study_app.viewmodels.sessions import SessionFacts, sessions
 from study_app.workspace import workspace
@@ -72,7 +72,10 @@ class HomePlace(Place):
         self.machine = DEFAULTS
         self.dialog: NewSessionDialog | RehearsalDialog | SessionPage | None = None
         self._opened: list[str] = []
-        self._facts: list[StudyFacts | BrokenFacts] = []
+        self._facts: tuple[StudyFacts | BrokenFacts, ...] = ()
+        self._files = file_states(())
+        self._studies = Background(self)
+        self._studies.done.connect(self._show_changed)
         self._reader = Background(self)
         self._reader.done.connect(self._show_read)
         self.banner = ResumeBanner()
@@ -100,9 +103,30 @@ class HomePlace(Place):
         self.device.show_screens(_screens(settings))
 
     def enter(self) -> None:
-        """Read the results folder again, once the window stands; screens may have come and gone."""
+        """Read the results folder again, once the window stands; screens and protocols may have come and gone."""
         self.device.show_screens(_screens(self.machine))
         QTimer.singleShot(0, self, self.show_sessions)
+        QTimer.singleShot(0, self, self.read_changes)
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Look for changed protocols when one comes back to the window, as from a text editor."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.ActivationChange and self.isActiveWindow() and self.isVisible():
+            self.read_changes()
+
+    def read_changes(self) -> None:
+        """Read the protocols again, outside the window's thread, where a file has changed."""
+        files = file_states(self._opened)
+        if files != self._files:
+            self._files = files
+            opened = tuple(self._opened)
+            self._studies.run(lambda: (opened, read_studies(opened)))
+
+    def _show_changed(self, read: tuple[tuple[str, ...], tuple[StudyFacts | BrokenFacts, ...]]) -> None:
+        opened, facts = read
+        if opened == tuple(self._opened) and facts != self._facts:
+            self._show_facts(facts)
+            self.show_sessions()
 
     def _lay_out(self) -> None:
         titles = QVBoxLayout()
@@ -154,7 +178,11 @@ class HomePlace(Place):
     def show_studies(self) -> None:
         """Show a card for each protocol at hand."""
         self.folder.show_text(f"Workspace: {workspace().folder}")
-        self._facts = [study_facts(source) for source in dict.fromkeys((*self._opened, *sources()))]
+        self._files = file_states(self._opened)
+        self._show_facts(read_studies(self._opened))
+
+    def _show_facts(self, shown: tuple[StudyFacts | BrokenFacts, ...]) -> None:
+        self._facts = shown
         cards: list[QWidget] = []
         for facts in self._facts:
             if isinstance(facts, BrokenFacts):
@@ -164,8 +192,8 @@ class HomePlace(Place):
             card.new_session.connect(self.ask_for_session)
             card.rehearsal.connect(self.ask_for_rehearsal)
             cards.append(card)
-        for shown in cards:
-            dress(shown, self.theme)
+        for made in cards:
+            dress(made, self.theme)
         self.grid.show_cards(cards)
         self._order_focus()
         self._arrange()
@@ -184,7 +212,7 @@ class HomePlace(Place):
 
     def show_sessions(self) -> None:
         """Read the results folder again, outside the window's thread."""
-        self._reader.run(partial(_read, self.results, tuple(self._facts)))
+        self._reader.run(partial(_read, self.results, self._facts))
 
     def _show_read(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
         results, found, stopped = read

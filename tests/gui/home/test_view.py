@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QEvent, QSize, Qt
 from PySide6.QtGui import QAccessible, QFontMetrics
-from PySide6.QtWidgets import QApplication, QPushButton
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton
 
 from study_app.devices.descriptor import NONE, Backend
 from study_app.gui.home.main_window import LEAST, MainWindow
@@ -195,6 +195,63 @@ def test_a_protocol_opened_from_elsewhere_gets_a_card(home, tmp_path, monkeypatc
     assert isinstance(home.grid.cards[0], BrokenCard)
 
 
+def own_study(folder, title="Own"):
+    """Write a study into a workspace, and return its file."""
+    file = folder / "protocols" / "own.toml"
+    file.parent.mkdir(exist_ok=True)
+    text = (
+        source_bytes("demo").decode().replace('name = "demo"', 'name = "own"').replace('"A first look"', f'"{title}"')
+    )
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def titles(home):
+    return [card.facts.title if isinstance(card, StudyCard) else "broken" for card in home.grid.cards]
+
+
+@pytest.mark.parametrize("way", ["enter", "activation"])
+def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_path, monkeypatch, way):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    home = open_home(qtbot, tmp_path / "results")
+    before = titles(home)
+
+    def come_back():
+        home.enter() if way == "enter" else QApplication.sendEvent(home, QEvent(QEvent.Type.ActivationChange))
+
+    home.main.activateWindow()
+    qtbot.waitUntil(home.isActiveWindow)
+    file = own_study(tmp_path)
+    come_back()
+    qtbot.waitUntil(lambda: sorted(titles(home)) == sorted([*before, "Own"]))
+    own_study(tmp_path, "Own, edited")
+    come_back()
+    qtbot.waitUntil(lambda: "Own, edited" in titles(home))
+    file.write_text("format = 1\n")
+    come_back()
+    qtbot.waitUntil(lambda: "broken" in titles(home))
+    file.unlink()
+    come_back()
+    qtbot.waitUntil(lambda: titles(home) == before)
+
+
+def test_cards_stay_where_no_file_has_changed(home, qtbot):
+    cards = home.grid.cards
+    home.enter()
+    qtbot.waitUntil(lambda: not home.reading)
+    assert home.grid.cards is cards
+
+
+def test_cards_of_studies_with_one_title_show_their_files(qtbot, tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    own_study(tmp_path, "A first look")
+    home = open_home(qtbot, tmp_path / "results")
+    cards = [card for card in study_cards(home) if card.facts.title == "A first look"]
+    shown = [{it.text() for it in card.findChildren(QLabel)} & {"demo", "own"} for card in cards]
+    assert sorted(map(sorted, shown)) == [["demo"], ["own"]]
+    assert len({card.new.accessibleName() for card in cards}) == 2
+
+
 def test_the_theme_changes(home, qtbot):
     rail = home.main.rail
     qtbot.mouseClick(rail.switch, Qt.MouseButton.LeftButton)
@@ -203,7 +260,7 @@ def test_the_theme_changes(home, qtbot):
 
 
 def test_three_studies_and_the_sessions_fit_in_a_small_screen(qtbot, results, monkeypatch):
-    monkeypatch.setattr("study_app.gui.home.view.sources", lambda: ("rek2024", "physical_liquids", "demo"))
+    monkeypatch.setattr("study_app.viewmodels.home.sources", lambda: ("rek2024", "physical_liquids", "demo"))
     home = open_home(qtbot, results, QSize(1366, 768))
     (mouse,) = devices_shown([Backend("mouse", "", NONE, "seen: the ball moves as it would in the liquid", "")])
     home.show_machine(MachineSettings(device="mouse"), mouse)
