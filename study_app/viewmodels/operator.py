@@ -21,7 +21,7 @@ from study_app.viewmodels.force_traces import ForceFigures, force_rows
 from study_app.viewmodels.number_words import grouped, minutes
 from study_app.viewmodels.servo_health import Tile, Vitals, health_tiles
 from study_app.viewmodels.session.stages import Stage, operator_language
-from study_app.viewmodels.session.track_health import track_words
+from study_app.viewmodels.session.track_health import track_words, unanswered_words
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
 StepState = Literal["done", "now", "open"]
@@ -298,8 +298,8 @@ def _heading(session: Session, progress: Progress) -> str:
 
 def _setting_line(session: Session, progress: Progress, *, answering: bool) -> str:
     if progress.ended:
-        shown = f"  ·  Fingerprint {progress.fingerprint}" if progress.fingerprint else ""
-        return f"All answers are on disk{shown}"
+        shown = f"Fingerprint {progress.fingerprint}" if progress.fingerprint else ""
+        return "  ·  ".join(filter(None, ("All answers are on disk", unanswered_words(progress), shown)))
     trial = session.trial(progress)
     if trial is None:
         if progress.here < 0:
@@ -331,6 +331,8 @@ def _trial_time(session: Session, progress: Progress, now_s: float) -> TrialTime
     elapsed = progress.trial_lasted_s
     if elapsed is None:
         elapsed = now_s - (progress.trial_since_s if progress.trial_since_s is not None else now_s)
+    if progress.of_intervals == trial.number:  # the task's limits are those of each interval
+        return TrialTime(elapsed, None, None)
     return TrialTime(elapsed, task.min_s if isinstance(task, Explore) else None, task.limit_s)
 
 

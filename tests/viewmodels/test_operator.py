@@ -7,11 +7,14 @@ import dataclasses
 import pytest
 
 from study_app.protocol.model import Limits
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.limits import beyond_limits
 from study_app.store.tables.column import header
 from study_app.store.tables.columns import TRIALS
 from study_app.viewmodels.number_words import duration_words, grouped, minutes
 from study_app.viewmodels.operator import MEASURES
+from study_app.viewmodels.session.stages import stages
+from tests.protocol.trials.studies import study
 
 SECRETS = ("thin", "thick", "prompt", "200")
 
@@ -78,6 +81,23 @@ def test_exploring_shows_least_and_most_time(told):
     time = told.view().trial_time
     assert (time.least_s, time.most_s) == (5.0, 30.0)
     assert time.words == "0:12 of 0:30"
+
+
+def test_time_in_a_trial_of_intervals_has_no_limit_of_a_single_interval(told):
+    protocol = study()
+    schedule = build_schedule(protocol, "P001", 1)
+    session = dataclasses.replace(told.session, protocol=protocol, schedule=schedule, stages=stages(protocol, schedule))
+    paired = dataclasses.replace(told, protocol=protocol, schedule=schedule, session=session)
+    paired.tell("trial_started", 10.0, trial=1, attempt=1, sealed="00")
+    paired.now_s += 12.0
+    assert paired.view().trial_time.words == "0:12"
+
+
+def test_an_ended_session_says_how_many_trials_were_not_delivered(told):
+    told.tell("interval_ended", 5.0, trial=2, attempt=1, interval=1, outcome="complete", invalid=["delay_error_ms"])
+    told.tell("session_ended", 5.0, status="completed", fingerprint="abcd")
+    line = "All answers are on disk  ·  1 trial unanswered: no attempt was delivered  ·  Fingerprint abcd"
+    assert told.view().setting_line == line
 
 
 def test_reaching_shows_targets_reached_while_they_are_and_after(told):

@@ -15,6 +15,7 @@ from typing import Final
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.store.progress import Progress, TrialAnswer
 from study_app.viewmodels.number_words import grouped
+from study_app.viewmodels.sessions import counted
 
 LONG_RUN: Final = 8
 """So many equal answers in a row are marked."""
@@ -53,6 +54,12 @@ def track_words(progress: Progress, schedule: Schedule, trial: Trial, choices: M
         *(f"not delivered {count}: {UNDELIVERED.get(limit, limit)}" for limit, count in limits.items()),
         *([f"{len(given_up)} unanswered: no attempt was delivered"] if given_up else []),
     )
+
+
+def unanswered_words(progress: Progress) -> str:
+    """Return how many trials an ended session left unanswered since no attempt was delivered; "" for none."""
+    count = sum(number not in progress.trial_answers for number in progress.undelivered)
+    return f"{counted(count, 'trial')} unanswered: no attempt was delivered" if count else ""
 
 
 def _of_answers(answers: Sequence[TrialAnswer], choices: Mapping[str, str]) -> list[str]:

@@ -10,7 +10,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.limits import Limits
 from study_app.store.progress import Progress
-from study_app.viewmodels.session.track_health import UNDELIVERED, track_words
+from study_app.viewmodels.session.track_health import UNDELIVERED, track_words, unanswered_words
 from tests.protocol.trials.studies import study
 
 CHOICES = {"first": "First", "second": "Second"}
@@ -133,3 +133,13 @@ def test_a_trial_that_was_never_delivered_is_counted_as_unanswered(told: Told) -
 
 def test_every_limit_that_makes_an_interval_invalid_has_words() -> None:
     assert set(UNDELIVERED) == {*Limits.model_fields, "force_limit_n"} - {"attempts"}
+
+
+def test_an_ended_session_counts_trials_of_which_no_attempt_was_delivered(told: Told) -> None:
+    assert unanswered_words(told.progress) == ""
+    undelivered(told, 1, 1, "delay_error_ms")
+    assert unanswered_words(told.progress) == "1 trial unanswered: no attempt was delivered"
+    undelivered(told, 2, 1, "delay_error_ms")
+    assert unanswered_words(told.progress) == "2 trials unanswered: no attempt was delivered"
+    told.trial(2, "first", attempt=2)
+    assert unanswered_words(told.progress) == "1 trial unanswered: no attempt was delivered"
