@@ -24,12 +24,16 @@ class SteadyCurves:
     """Steady flow of a setting.
 
     ``stress_pa`` (n,) is the shear stress [Pa] at `RATES_PER_S`, None for a liquid without viscosity; ``force_n`` (m,)
-    the force sent [N] at the speeds `SPEEDS_MPS` of the hand. ``is_newtonian`` is whether it has no flow curve.
+    the force sent [N] at the speeds `SPEEDS_MPS` of the hand.
     """
 
     stress_pa: Floats | None
     force_n: Floats
-    is_newtonian: bool
+
+
+def has_flow_curve(scene: Scene) -> bool:
+    """Return whether the liquid of a scene with one liquid is non-Newtonian."""
+    return "non_newtonian" in resolve(scene).liquids[0].effects
 
 
 def steady_curves(scene: Scene) -> SteadyCurves:
@@ -37,8 +41,6 @@ def steady_curves(scene: Scene) -> SteadyCurves:
     scene = resolve(scene)
     (liquid,) = scene.liquids
     force_n = np.array([steady(scene, speed).force_n for speed in SPEEDS_MPS.tolist()])
-    if "non_newtonian" in liquid.effects:
-        stresses_pa = np.array([stress_pa(liquid.non_newtonian, rate) for rate in RATES_PER_S.tolist()])
-        return SteadyCurves(stresses_pa, force_n, is_newtonian=False)
-    newtonian_pa = None if liquid.viscosity_pa_s is None else liquid.viscosity_pa_s * RATES_PER_S
-    return SteadyCurves(newtonian_pa, force_n, is_newtonian=True)
+    if has_flow_curve(scene):
+        return SteadyCurves(np.array([stress_pa(liquid.non_newtonian, it) for it in RATES_PER_S.tolist()]), force_n)
+    return SteadyCurves(None if liquid.viscosity_pa_s is None else liquid.viscosity_pa_s * RATES_PER_S, force_n)

@@ -15,7 +15,7 @@ from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.widgets.labels import Elided
 from study_app.gui.widgets.plots import Plot, draw_quickly, number
 from study_app.haptics.model.scene import Scene
-from study_app.lab.steady_curves import RATES_PER_S, SPEEDS_MPS, SteadyCurves, steady_curves
+from study_app.lab.steady_curves import RATES_PER_S, SPEEDS_MPS, SteadyCurves, has_flow_curve, steady_curves
 from study_app.viewmodels.lab import Floats, LabView
 
 NOT_MODELLED: Final = "Steady shear. Not modelled: thixotropy, impact, fracture."
@@ -109,7 +109,7 @@ class FlowCurveRow(QWidget):
     def __init__(self, gap: int) -> None:
         super().__init__()
         self.stress, self.force = FlowCurveCard(), SteadyForceCard()
-        self._drawn: tuple[Scene, Scene] | None = None
+        self._shown: tuple[Scene, Scene, float] | None = None
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(gap)
@@ -118,18 +118,20 @@ class FlowCurveRow(QWidget):
         self.hide()
 
     def show_view(self, view: LabView) -> None:
-        """Draw the curves of both settings if one of them has changed."""
+        """Draw the curves of both settings and the limit of the one in hand, if one of them has changed."""
         bench = view.workbench
         for card in (self.stress, self.force):
             card.show_blind(bench.blind)
-        scenes = bench.a.scene, bench.b.scene
-        if self._drawn is not None and all(new is old for new, old in zip(scenes, self._drawn, strict=True)):
+        scenes, limit_n = (bench.a.scene, bench.b.scene), bench.in_hand.scene.force_limit_n
+        shown = (*scenes, limit_n)
+        if shown == self._shown:
             return
-        self._drawn = scenes
-        a, b = map(steady_curves, scenes)
-        self.setVisible(not (a.is_newtonian and b.is_newtonian))
-        self.stress.show_curves(a, b)
-        self.force.show_curves(a, b, bench.in_hand.scene.force_limit_n)
+        self._shown = shown
+        self.setVisible(any(map(has_flow_curve, scenes)))
+        if not self.isHidden():
+            a, b = map(steady_curves, scenes)
+            self.stress.show_curves(a, b)
+            self.force.show_curves(a, b, limit_n)
 
 
 def _name(side: str, curves: SteadyCurves) -> str:

@@ -28,6 +28,7 @@ from study_app.viewmodels.lab import LabView
 from study_app.workspace import workspace
 
 FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 380, 300
+PLOTS_STRETCH = 39
 LEAST = QSize(928, 560)
 WIDE, ONE_ROW = 1240, 1460
 GAP = 14
@@ -102,6 +103,8 @@ class LabPlace(Place):
         self._middle.addWidget(self.speed, 1, 1)
         self._middle.addWidget(self.curves, 2, 0, 1, 2)
         self._middle.addLayout(self._side, 3, 0, 1, 2)
+        self._middle.setRowStretch(0, 61)
+        self._middle.setRowStretch(1, PLOTS_STRETCH)
         self._area = _scrolled(self._middle)
         self._side_area = _scrolled(QGridLayout())
         self._body = QGridLayout()
@@ -136,8 +139,6 @@ class LabPlace(Place):
                 self._side.addWidget(card, row, at, 1, 2 if card is self.limiters else 1)
         self._side_area.setVisible(wide)
         self._side_area.setFixedWidth(SIDE_WIDTH)
-        self._middle.setRowStretch(0, 61)
-        self._middle.setRowStretch(1, 39)
 
     def _connect(self) -> None:
         header, form = self.header, self.form
@@ -188,7 +189,9 @@ class LabPlace(Place):
             self.limiters,
         ):  # fmt: skip
             part.show_view(view)
-        self._middle.setRowStretch(1, 0 if self.curves.isVisibleTo(self) else 39)  # the tank makes room for a third row
+        stretch = 0 if self.curves.isVisibleTo(self) else PLOTS_STRETCH  # the tank makes room for a third row
+        if stretch != self._middle.rowStretch(1):  # setting it lays the page out again
+            self._middle.setRowStretch(1, stretch)
 
     def ask_where_to_save(self) -> None:
         """Ask for the preset's file; nothing waits meanwhile, and the force can be stopped while the dialog is open."""

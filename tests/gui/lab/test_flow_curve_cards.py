@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QEvent, QObject
 
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.presets import spoken
@@ -50,6 +51,34 @@ def test_an_edit_moves_the_curve(place: Any) -> None:
     place.show_view(still_view(before.change("non_newtonian.yield_stress_pa", 60.0)))
     _, a = place.curves.stress.stresses.curves
     assert np.allclose(a.getData()[1], np.log10(60 + 10 * RATES_PER_S**0.25))
+
+
+def test_the_limit_is_that_of_the_setting_in_hand(place: Any) -> None:
+    other = bench("ketchup", "honey").switch().change("scene.force_limit_n", 4.0)
+    limit = place.curves.force.forces.limit
+    for shown, limit_n in ((other, 4.0), (other.switch(), 8.0)):
+        place.show_view(still_view(shown))
+        assert limit.value() == limit_n
+
+
+def test_a_view_like_the_last_lays_nothing_out(place: Any) -> None:
+    requests: list[QEvent] = []
+
+    class Spy(QObject):
+        def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+            if event.type() == QEvent.Type.LayoutRequest and watched is place._area.widget():
+                requests.append(event)
+            return False
+
+    view, spy = still_view(bench("ketchup", "honey")), Spy()
+    for _ in range(2):
+        place.show_view(view)
+        settle()
+    place._area.widget().installEventFilter(spy)
+    for _ in range(3):
+        place.show_view(view)
+        settle()
+    assert requests == []
 
 
 def test_while_blind_the_curves_are_hidden_and_nothing_moves(place: Any) -> None:
