@@ -318,6 +318,7 @@ def _delay_force(model: Any, safety: Any, sample: Any, loop: Any, fresh: bool) -
         for i in range(model.parameters[0].liquids):  # the limits have acted
             local = model.liquid_states[i]
             clear(local.damping_n)
+            clear(local.excess_n)
             local.late_mps = 0.0
             local.inertial = 0
     late = loop.prompt_n[(loop.row - loop.late_ticks) % (LONGEST_TICKS + 1)]

@@ -34,11 +34,13 @@ def imposed(case):
 @compiled
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", [1, 7, 20])
-@pytest.mark.parametrize("liquid", ["water", "physical2_honey", "physical_tar"])
+@pytest.mark.parametrize(
+    ("liquid", "scale"), [("water", 1.0), ("physical2_honey", 1.0), ("physical_tar", 1.0), ("slime_cornstarch", 3.0)]
+)
 @pytest.mark.parametrize("more", [{}, {"lost": 0.1}, {"estimator": "kalman"}])
-def test_the_force_of_the_effects_comes_so_late(delay, liquid, more):
-    """Tar is beyond the limit of the slope, with "kalman" the inertia of honey is, too: both act before the delay."""
-    case = Case(liquid=liquid, scale=1.0, quantum_um=1.0, delay=0, **more)
+def test_the_force_of_the_effects_comes_so_late(delay, liquid, scale, more):
+    """Tar and cornstarch are beyond the limit of the slope, with "kalman" honey's inertia is: both act before."""
+    case = Case(liquid=liquid, scale=scale, quantum_um=1.0, delay=0, **more)
     prompt, late = imposed(case), imposed(parse(f"{case} force_delay_ms={delay}"))
     assert late.withheld_n.max() < 1e-3  # the controller has nothing to do: another force would not be the prompt one
     shifted_n = np.zeros_like(prompt.sent_n)
