@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws.drag import Law
 from study_app.haptics.model.scene import Effect, Everywhere, Scene
 
@@ -19,6 +20,12 @@ def with_effects(scene: Scene, *effects: Effect, law: Law | None = None) -> Scen
     """Return the scene with other effects, and perhaps another law of drag."""
     changes: dict[str, Any] = {"effects": effects} | ({} if law is None else {"drag": Drag(law=law)})
     return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update=changes),)})
+
+
+def without_buoyancy(scene: Scene) -> Scene:
+    """Return the scene with its liquid's other effects, named."""
+    scene = resolve(scene)
+    return with_effects(scene, *(name for name in scene.liquids[0].effects if name != "buoyancy"))
 
 
 def _only(scene: Scene, liquid: Any) -> Scene:

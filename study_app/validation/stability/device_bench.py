@@ -12,6 +12,7 @@ from study_app.haptics.kernels.tick_schedule import new_schedule
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.limits import DampingLimits
+from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.pack import Model, pack
 from study_app.validation.stability.arm_plant import ARMS, new_arm
 from study_app.validation.stability.closed_loop import LOOP, TRACE, begin, run
@@ -67,8 +68,8 @@ def trace_of(case: Case) -> Any:
     return trace[: bench.run(trace, 0, lasts_s(case))]
 
 
-def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Bench:
-    """Return the records of a case; ``limits`` are tried in place of the table's."""
+def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None, scene: Scene | None = None) -> Bench:
+    """Return the records of a case; ``limits`` are tried in place of the table's, ``scene`` in place of the case's."""
     safety = new_safety(FORCE_LIMIT_N, case.believed_delay)
     safety[0].fade = 1.0
     loop = records(LOOP, 1)[0]
@@ -95,7 +96,7 @@ def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None) ->
         quantum_m=case.quantum_um * 1e-6,
         **_device(case),
     )
-    model = pack(scene_of(case), limits=limits, dynamics=_dynamics(case))
+    model = pack(scene or scene_of(case), limits=limits, dynamics=_dynamics(case))
     pace = new_schedule(1.0 / case.rate_hz, jitter_s=case.jitter / case.rate_hz, missed=case.missed)
     return Bench(model, safety, records(SAMPLE, 1), handle, pace, loop)
 

@@ -17,11 +17,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.gate import resolve
+from study_app.evaluation.scene_variants import without_buoyancy
 from study_app.haptics.model.layout import records
-from study_app.haptics.model.scene import Scene
-from study_app.haptics.runtime.pack import pack
 from study_app.protocol.checks.delayed_force import Entry
 from study_app.store.atomic import write_file
 from study_app.store.tables.csv_files import csv_text_of
@@ -96,9 +93,7 @@ def report(entries: Iterable[Entry]) -> str:
 
 def delayed_trace(case: Case) -> Any:
     """Return the trace of a hand that stirs the case's liquid, buoyancy aside, with the case's delay of the force."""
-    bench = new_bench(case, safe=True)
-    dynamics = Dynamics(case.believed_delay / case.rate_hz, case.quantum_um * 1e-6, case.mass_kg)
-    bench.model = pack(_without_buoyancy(scene_of(case)), dynamics=dynamics)
+    bench = new_bench(case, safe=True, scene=without_buoyancy(scene_of(case)))
     trace = records(TRACE, round(LASTS_S * case.rate_hz))
     t_s = np.arange(len(trace)) / case.rate_hz
     path_m = np.outer(AMPLITUDE_M * np.sin(SPEED_MPS / AMPLITUDE_M * t_s), DIRECTION)
@@ -115,12 +110,3 @@ def _entry(liquid: str, estimator: str, hand: str, delay_ms: float) -> Entry:
     left = math.sqrt(float(np.mean(sent_n**2) / np.mean(counted.permitted_n**2)))
     withheld = float(np.sum(counted.withheld_n) / np.sum(counted.permitted_n))
     return Entry(liquid, estimator, hand, delay_ms, round(100 * left, 1), round(100 * withheld, 1))
-
-
-def _without_buoyancy(scene: Scene) -> Scene:
-    scene = resolve(scene)
-    liquids = tuple(
-        liquid.model_copy(update={"effects": tuple(name for name in liquid.effects if name != "buoyancy")})
-        for liquid in scene.liquids
-    )
-    return scene.model_copy(update={"liquids": liquids})

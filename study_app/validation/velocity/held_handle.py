@@ -13,21 +13,20 @@ from typing import Any, Final
 
 import numpy as np
 
+from study_app.evaluation.scene_variants import without_buoyancy
 from study_app.haptics.kernels.plant import new_handle
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick_schedule import new_schedule
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Knee, Liquid, Scene, Velocity
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
-from study_app.protocol.load import load
 from study_app.validation.stability.closed_loop import LOOP, TRACE, follow
 from study_app.validation.stability.device_bench import FORCE_LIMIT_N
-from study_app.validation.stability.stability_cases import GRIPS, Grip
+from study_app.validation.stability.stability_cases import GRIPS, Grip, scenes
 from study_app.validation.velocity.imposed_motions import COUNT_M, RATE_HZ, Stroke
 
 HANDS: Final = ("light", "middle", "firm")
@@ -55,14 +54,10 @@ def plain_forces() -> tuple[Scene, ...]:
 
 def whole_forces() -> tuple[Scene, ...]:
     """Return the liquids of physical2, effects chosen, without buoyancy."""
-    study = load("physical2")
-    found = []
-    for name in WHOLE_LIQUIDS:
-        scene = resolve(study.scene_of(name).model_copy(update={"scale": WHOLE_SCALE}))
-        (liquid,) = scene.liquids
-        effects = tuple(effect for effect in liquid.effects if effect != "buoyancy")
-        found.append(scene.model_copy(update={"liquids": (liquid.model_copy(update={"effects": effects}),)}))
-    return tuple(found)
+    return tuple(
+        without_buoyancy(scenes()[f"physical2_{name}"].model_copy(update={"scale": WHOLE_SCALE}))
+        for name in WHOLE_LIQUIDS
+    )
 
 
 def plain_errors(velocity: Velocity, strokes: Iterable[Stroke] = STROKES) -> tuple[float, ...]:
