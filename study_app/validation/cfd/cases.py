@@ -9,6 +9,7 @@ from typing import Final
 
 from study_app.errors import StudyError
 from study_app.protocol.load import load_scene
+from study_app.protocol.source.files import shipped_file
 from study_app.validation.cfd.profiles import (
     MULTI_SINE,
     OSCILLATION_KC4,
@@ -97,7 +98,7 @@ def cases() -> tuple[Case, ...]:
     """Return each liquid at the greatest speed its protocol reckons with, in the scene and, as at scale 1, the hand."""
     found = []
     for liquid_id in LIQUIDS:
-        scene = load_scene(PROTOCOL, liquid_id)
+        scene = load_scene(shipped_file(PROTOCOL), liquid_id)
         fastest_mps = scene.motion_in(scene.liquids[0]).speed_mps or math.nan
         found += [_case(liquid_id, speed_mps) for speed_mps in (fastest_mps / scene.scale, fastest_mps)]
     return tuple(found)
@@ -122,7 +123,7 @@ def _by_reynolds(motions: Sequence[tuple[VelocityProfile, str, float]]) -> tuple
 
 
 def _case(liquid_id: str, speed_mps: float, profile: VelocityProfile = STOPPING) -> Case:
-    scene = load_scene(PROTOCOL, liquid_id)
+    scene = load_scene(shipped_file(PROTOCOL), liquid_id)
     (liquid,) = scene.liquids
     return Case(
         liquid_id,

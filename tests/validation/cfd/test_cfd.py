@@ -16,6 +16,7 @@ from study_app.cli.evidence.cfd import cfd
 from study_app.errors import StudyError
 from study_app.figure_style import PLOT_SETTINGS, file_bytes
 from study_app.protocol.load import load_scene
+from study_app.protocol.source.files import shipped_file
 from study_app.validation.cfd import cases, flow, flow_figure, model_comparison, solver, stored_flows
 from study_app.validation.cfd import fits as fitted
 from study_app.validation.cfd.cases import Case
@@ -104,6 +105,14 @@ def test_moments_cover_the_motion_in_steps_that_start_and_stop_short():
     assert steps.max() == pytest.approx(0.02)
     np.testing.assert_allclose(steps[(times[1:] < 0.45) | ((times[1:] > STOP) & (times[1:] < STOP + 0.45))], 0.005)
     assert STOPPING.near_steps(times).sum() == 2 * (0.4 / 0.005) + 2
+
+
+def test_a_study_of_the_workspace_does_not_change_what_is_solved(tmp_path, monkeypatch):
+    shipped = shipped_file(cases.PROTOCOL).read_text("utf-8")
+    (tmp_path / "protocols").mkdir()
+    (tmp_path / "protocols" / f"{cases.PROTOCOL}.toml").write_text(shipped.replace("density_kg_m3", "density_kg_m33"))
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    assert (*cases.cases(), *cases.training_cases(), *cases.held_out_cases()) == CASES
 
 
 def test_what_is_not_axisymmetric_is_refused():
