@@ -77,9 +77,8 @@ def next_level(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, h
     earlier = [one for one in heard if one.trial < trial.number]
     if criterion_met(block, schedule, earlier):
         return None
-    slot = sum(
-        one.block == trial.block and one.code == trial.code for one in schedule.trials if one.number < trial.number
-    )
+    numbers = {one.number for one in schedule.trials if (one.block, one.code) == (trial.block, trial.code)}
+    slot = sum(number < trial.number for number in numbers)
     draws = _Draws(key.secret, f"{schedule.participant}/{schedule.seed}/{block.id}/{trial.code}")
     design = design_of(protocol, block)
     if design.first is not None:
@@ -90,7 +89,7 @@ def next_level(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, h
         return due_of(protocol, block, track, draws.arrangement(design, slot), None)
     method, stimulus = method_of(protocol, block), stimulus_of(protocol, block)
     setting = TrackSetting(stimulus, design, track.number)
-    answered = sorted((one for one in earlier if one.code == trial.code and not one.catch), key=lambda one: one.trial)
+    answered = sorted((one for one in earlier if one.trial in numbers and not one.catch), key=lambda one: one.trial)
     if method.ended(setting, answered):
         return None
     catch = draws.catch(track.catch)

@@ -21,6 +21,16 @@ from study_app.protocol.trials.tracks import design_of, tracks_of
 from tests.protocol.trials.studies import answered, key_of, study
 
 CONSTANT = 'kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 8'
+PRACTICE = """
+[blocks.{name}]
+phase = "practice"
+title = "Practice"
+setting_label = "Pair"
+task = "stir"
+stimulus = "viscosity"
+design = "2ifc"
+method = "few"
+"""
 ONE_STANDARD = ("standards = [1, 2]\n", "standards = [2]\n")
 
 
@@ -94,6 +104,20 @@ def test_the_next_level_depends_on_the_levels_presented_and_not_on_how_answers_a
     moved = next_level(protocol, key, schedule, schedule.trials[10], other)
     assert moved is not None
     assert moved.level != heard[10].level
+
+
+def test_practice_blocks_share_codes_and_no_answers() -> None:
+    protocol = study(
+        (CONSTANT, 'kind = "updown"\ntrials = 20\nbegin = 0.8'),
+        ONE_STANDARD,
+        ('sequence = ["viscosity"]', 'sequence = ["first", "second", "viscosity"]'),
+        more=PRACTICE.format(name="first") + PRACTICE.format(name="second"),
+    )
+    key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
+    assert key.codes["first"].keys() == key.codes["second"].keys()
+    first, second, main = np.reshape([due.level for due, _ in answered(protocol, key, schedule)], (3, 20)).tolist()
+    assert first[-1] != first[0] == 0.8
+    assert first == second == main
 
 
 @pytest.mark.slow
