@@ -42,9 +42,11 @@ def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
     for session in study.sessions():
         if (session.participant, session.number) in decided:
             continue
+        reason = ""
         with contextlib.suppress(StoreError, KeyError, TypeError, ValueError, AttributeError):  # `verify` names damage
-            if reasons := list(_missed(session, key)):
-                added.append(exclude(folder, session.participant, session.number, by=RULE, reason="; ".join(reasons)))
+            reason = "; ".join(_missed(session, key))
+        if reason:
+            added.append(exclude(folder, session.participant, session.number, by=RULE, reason=reason))
     return tuple(added)
 
 
@@ -54,9 +56,11 @@ def _missed(session: SessionFolder, key: Key) -> Iterator[str]:
     if not any("catch" in block for block in published["blocks"].values()):
         return
     protocol = whole_protocol(published, key)
-    heard = heard_in(protocol, opened(journal.read(session.journal), key))
+    lines = opened(journal.read(session.journal), key)
+    blocks = {line["trial"]: line["block"] for line in lines if line["event"] == "trial_started"}
+    heard = [one for one in heard_in(protocol, lines) if one.catch]
     for block in protocol.blocks.values():
-        answered = [one for one in heard if one.catch and one.code in key.codes.get(block.id, {})]
+        answered = [one for one in heard if blocks[one.trial] == block.id]
         wrong = sum(not one.correct for one in answered)
         if block.catch is not None and answered and wrong / len(answered) > block.catch.wrong_most:
             yield (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclusions, include
 from study_app.store.folders import StudyFolder
+from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.protocol.trials.studies import SHORT, text_of
@@ -23,16 +25,42 @@ pytestmark = pytest.mark.slow
 ADAPTIVE = ('kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 2', 'kind = "updown"\ntrials = 20')
 CATCH = ("method =", "catch = { share = 0.5, wrong_most = 0.2 }\nmethod =")
 UNNOTICED = ("levels = [0.1, 0.8]", "levels = [0.0001, 0.0002]")
+PRACTISED = ('sequence = ["viscosity"]', 'sequence = ["easy", "hard", "viscosity"]')
+PRACTICE = """
+[stimuli.{name}]
+condition = "oil"
+vary = "viscosity_pa_s"
+levels = {levels}
+
+[blocks.{name}]
+phase = "practice"
+title = "Practice"
+setting_label = "Pair"
+task = "stir"
+stimulus = "{name}"
+design = "2ifc"
+method = "brief"
+"""
+REASON = re.compile(
+    r'block "(\w+)": (\d+) of (\d+) catch trials answered incorrectly, at most 20 % are permitted', re.ASCII
+)
+BRIEF = """
+[methods.brief]
+kind = "constant"
+levels = 2
+repetitions = 10
+"""
 
 
-def rehearsed(folder: Path, *edits: tuple[str, str]) -> Path:
-    (folder / "levels.toml").write_text(text_of(*SHORT, ADAPTIVE, CATCH, *edits))
+def rehearsed(folder: Path, *edits: tuple[str, str], more: str = "") -> Path:
+    (folder / "levels.toml").write_text(text_of(*SHORT, ADAPTIVE, CATCH, *edits, more=more))
     return rehearse(folder / "levels.toml", participants=2, seed=2, results=folder / "study", recordings=False)
 
 
 @pytest.fixture(scope="module")
 def inattentive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return rehearsed(tmp_path_factory.mktemp("inattentive"), UNNOTICED)
+    easy, hard = PRACTICE.format(name="easy", levels=[1, 3]), PRACTICE.format(name="hard", levels=[0.0001, 0.0002])
+    return rehearsed(tmp_path_factory.mktemp("inattentive"), UNNOTICED, PRACTISED, more=BRIEF + easy + hard)
 
 
 @pytest.fixture
@@ -48,10 +76,9 @@ def test_nothing_is_excluded_before_unblinding_and_both_are_after(study: Path) -
     rows = exclusions(study)
     assert {(row.participant, row.session, row.trial) for row in rows} == {("P001", 1, None), ("P002", 1, None)}
     assert {row.rule_or_person for row in rows} == {"catch"}
-    wrong, of = (int(rows[0].reason.split()[at]) for at in (2, 4))
-    assert of == 20
-    assert 4 < wrong <= 20
-    assert rows[0].reason.endswith("catch trials answered incorrectly, at most 20 % are permitted")
+    counts = sorted(REASON.findall(rows[0].reason))
+    assert [(block, of) for block, _, of in counts] == [("hard", "10"), ("viscosity", "20")]
+    assert all(0.2 < int(wrong) / int(of) <= 1 for _, wrong, of in counts)
     assert f"excluded  participant P001, session 1: {rows[0].reason}" in ran.output
     found = verify(study)
     assert [str(one) for one in found.errors] == []
@@ -65,17 +92,27 @@ def test_unblinding_again_repeats_nothing_and_keeps_what_a_person_decided(study:
     assert [row.participant for row in exclusions(study)] == ["P002"]
 
 
+def test_sessions_that_cannot_be_excluded_are_named(study: Path) -> None:
+    opening = open_alone(study)
+    try:
+        (warning,) = unblind(study, "AB", "to analyse").left
+    finally:
+        opening.release()
+    assert warning.startswith("the rule catch was not applied: ")
+    assert exclusions(study) == ()
+    assert len(unblind(study, "AB", "once more").excluded) == 2
+
+
 def test_levels_of_a_study_with_catch_trials_follow_and_the_tables_name_them(study: Path) -> None:
     for session in StudyFolder(study).sessions():
-        assert reproduced(session.path).followed == ["viscosity: 60 of 60 levels follow from the answers"]
+        assert reproduced(session.path).followed[-1:] == ["viscosity: 60 of 60 levels follow from the answers"]
         with next(session.path.rglob("*intervals*.csv")).open(encoding="utf-8") as file:
             assert "catch" not in next(csv.reader(file))
     unblind(study, "AB", "to analyse")
     session = StudyFolder(study).sessions()[0]
     with next(session.path.rglob("*intervals*.csv")).open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert sum(row["catch"] == "true" for row in rows) == 2 * 20
-    assert {row["level"] for row in rows if row["catch"] == "true"} == {"0.0002"}
+        levels = [row["level"] for row in csv.DictReader(file) if (row["block"], row["catch"]) == ("viscosity", "true")]
+    assert levels == ["0.0002"] * 2 * 20
 
 
 def test_a_share_that_is_permitted_excludes_nobody(tmp_path: Path) -> None:
