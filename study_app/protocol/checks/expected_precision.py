@@ -12,7 +12,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.method import Method, TrackSetting
-from study_app.protocol.trials.psychometric import analysis_grid, family_of, guesses_of, rises, width_prior_of
+from study_app.protocol.trials.psychometric import analysis_grid, guesses_of, rises
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of, tracks_of
 
@@ -93,10 +93,10 @@ class ThresholdPlan:
         from study_app.psychophysics.simulated_tracks import Observers  # noqa: PLC0415
 
         stimulus, design = self.stimulus, self.design
-        family, prior, guess = family_of(stimulus, design), width_prior_of(stimulus), design.guess_rate
+        assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
         if guess is None:
             guess = LAPSES if guesses_of(stimulus, design) is None else FALSE_ALARMS
-        observers = Observers(family, thresholds, prior[0], guess, LAPSES)
+        observers = Observers(assumed.family, thresholds, assumed.width_prior[0], guess, LAPSES)
         noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
         tracks, yes = [], np.zeros(len(thresholds))
         for number in range(1, self.method.tracks + 1):
@@ -118,7 +118,7 @@ class ThresholdPlan:
             no = noise_trials * len(tracks) - yes
             counts = np.concatenate((np.array([yes, no])[:, :, None], counts), axis=2)
             places = np.append(stimulus.coordinate(0.0), places)
-        return estimated(analysis_grid(stimulus, design, family, prior), places, counts[0], counts[1])
+        return estimated(analysis_grid(stimulus, design, assumed), places, counts[0], counts[1])
 
 
 def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:

@@ -45,9 +45,7 @@ def test_the_observers_exponent_follows_from_the_resistance_at_the_pace(one: Pla
     assert list(one.resistances) == sorted(one.resistances)
 
 
-def test_without_noise_the_planted_exponent_is_found(
-    one: PlantedExponent, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_noise_the_planted_exponent_is_found(one: PlantedExponent, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(estimated_exponents, "ESTIMATE_NOISE", 1e-6)
     found = simulate_estimates(one, 0, seed=1, people=3)
     assert found.own == pytest.approx((EXPONENT,) * 3, abs=1e-5)
