@@ -45,7 +45,7 @@ def _scene(scene: Scene) -> Mapping[str, Any]:
     """Return what a scene file says of all liquids alike; it cannot say that velocities are given."""
     given = {"velocity"} if isinstance(scene.velocity, Given) else set()
     usual = {"fade_s"} if scene.fade_s == FADE_S else set()
-    return scene.model_dump(exclude_none=True, exclude={"format", "liquids", *given, *usual})
+    return scene.model_dump(exclude_none=True, exclude={"format", "liquids", "link", *given, *usual})
 
 
 def _liquid(liquid: Liquid) -> Mapping[str, Any]:

@@ -1,8 +1,9 @@
 """What is sent to the hand: always the last step of a tick, in the hand frame [N].
 
-Order: slope limits on drag and inertia, finite, norm, fade, gain of the passivity controller, slew, its settling, norm;
-a force stop or a fault goes past all of them to zero. The slew limit counts from the force of the tick before as it was
-without the settling: a brake that it remembered would go on acting after its time, and drive what it should damp.
+Order: slope limits on drag and inertia, force link, finite, norm, fade, gain of the passivity controller, slew, its
+settling, norm; a force stop or a fault goes past all of them to zero. The slew limit counts from the force of the tick
+before as it was without the settling: a brake that it remembered would go on acting after its time, and drive what it
+should damp.
 ``lift_n``, what of the force is buoyancy and weight, is shortened along with it: the passivity controller needs it.
 """
 
@@ -12,6 +13,7 @@ import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import kernel, part
+from study_app.haptics.kernels.force_link import delay_force
 from study_app.haptics.kernels.passivity import (
     apply_controller,
     log_command,
@@ -82,6 +84,9 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
     copy(state.lift_n, lift_n)
     limit_slope(model, safety, sample)
     limit_inertia(model, safety, sample)
+    if parameters.link.acts != 0 and not delay_force(parameters.link, state.link, model.forces_n, force_n):
+        clear(lift_n)
+        safety.fade = 0.0  # the first force that arrives fades in
     if not (is_finite(force_n) and is_finite(lift_n)):
         sample.limiters |= LIMITER_NON_FINITE
         sample.status = STATUS_NON_FINITE

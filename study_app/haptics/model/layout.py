@@ -115,6 +115,27 @@ KNEE_NONE = 0
 KNEE_SQRT = 1
 KNEE_SQUARE = 2
 
+# The force link (haptics.kernels.force_link).
+LINK = np.dtype(
+    [
+        ("acts", np.int64),  # 0: the force of a tick is sent in that tick
+        ("delay_ticks", np.int64),
+        ("jitter_ticks", np.int64),  # a force is later by 0 to so many ticks
+        ("loss", np.float64),  # share of ticks whose force is lost
+        ("seed", np.int64),  # of jitter and loss
+    ],
+    align=True,
+)
+
+LINK_STATE = np.dtype(
+    [
+        ("ticks", np.int64),  # since the scene began
+        ("arrived", np.int64),  # the force sent last is of this tick, counted from 1; 0: none has arrived yet
+        ("force_n", np.float64, (3,)),  # that force
+    ],
+    align=True,
+)
+
 PARAMETERS = np.dtype(
     [
         ("scale", np.float64),  # scene metres a hand metre
@@ -141,6 +162,7 @@ PARAMETERS = np.dtype(
         ("fallback_lag_s", np.float64),  # the same of EWMA, which stands in for a Kalman filter in trouble
         ("count_m", np.float64),  # one encoder count of the device, hand frame
         ("mass_kg", np.float64),  # the least mass that the device presents
+        ("link", LINK),
     ],
     align=True,
 )
@@ -186,6 +208,7 @@ STATE = np.dtype(
         ("lift_n", np.float64, (3,)),  # what of it is buoyancy and weight
         ("returnable_j", np.float64),  # the most that effects can give back, times the scale
         ("growth", np.int64),  # GROWS_*: of the force that grows least with the speed
+        ("link", LINK_STATE),
     ],
     align=True,
 )

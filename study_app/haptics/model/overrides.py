@@ -20,7 +20,7 @@ SHOWN = 200  # characters of a bad value that a message repeats
 # Where a parameter may sit; the places that a plain name means first come first.
 _OF_A_LIQUID = ("region", *(it.name for it in EFFECTS if it.model is not None and not it.with_liquid))
 _OF_THE_SCENE = ("body", "velocity", "knee", "accuracy", "motion")
-_FIXED = {"id", "liquids"}
+_FIXED = {"id", "liquids", "link"}
 
 
 def override(scene: Scene, name: str, value: object) -> Scene:

@@ -19,6 +19,7 @@ from study_app.haptics.model.estimators.kalman import Kalman
 from study_app.haptics.model.estimators.lead import Lead
 from study_app.haptics.model.estimators.line import MAX_WINDOW, Line
 from study_app.haptics.model.estimators.raw import Raw
+from study_app.haptics.model.force_link import PROMPT, ForceLink, too_long
 from study_app.haptics.model.liquid import MAX_LIQUIDS, Box, Cylinder, Effect, Everywhere, Liquid, Region
 from study_app.haptics.model.ranges import (
     Coordinate,
@@ -122,8 +123,9 @@ class Scene(Frozen):
     """Everything the force model needs. Without liquids a scene is rest: zero force.
 
     ``scale`` and ``origin_m`` map the hand into the scene; ``rate_hz`` is the nominal rate of ticks; ``force_limit_n``
-    the greatest force that may be sent; ``fade_s`` how long it takes to fade in. ``accuracy`` and ``motion`` are for
-    liquids with ``effects = "auto"``, which means one of the effects that the ``format`` of its file has.
+    the greatest force that may be sent; ``fade_s`` how long it takes to fade in; ``link`` how late it is sent, which no
+    scene file can say. ``accuracy`` and ``motion`` are for liquids with ``effects = "auto"``, which means one of the
+    effects that the ``format`` of its file has.
     """
 
     scale: SceneScale = 10.0
@@ -138,12 +140,19 @@ class Scene(Frozen):
     accuracy: Accuracy = Accuracy()
     motion: MotionBox = MotionBox()
     format: Literal[1, 2] = 1
+    link: ForceLink = PROMPT
 
     @model_validator(mode="after")
     def _liquids_are_told_apart(self) -> Scene:
         names = [liquid.id for liquid in self.liquids]
         if len(set(names)) < len(names):
             raise ValueError(f"two liquids share an id in {names}")
+        return self
+
+    @model_validator(mode="after")
+    def _link_reaches_back(self) -> Scene:
+        if not self.link.fits(self.rate_hz):
+            raise ValueError(too_long(self.rate_hz))
         return self
 
     def motion_in(self, liquid: Liquid) -> MotionBox:

@@ -85,7 +85,7 @@ def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None
     else:
         model = pack(scene, dynamics=dynamics)
         safety = new_safety(delay_ticks=min(dynamics.delay_ticks(scene.rate_hz), MOST_DELAY))
-    safety[0].fade = 1.0
+    safety[0].fade, safety[0].fade_s = 1.0, 0.0
     samples = records(SAMPLE, len(motion.t_s))
     samples.position_m = motion.position_m
     samples.velocity_mps = 0.0 if motion.velocity_mps is None else motion.velocity_mps

@@ -13,6 +13,7 @@ from study_app.haptics.model.device_dynamics import MOST_DELAY, UNKNOWN, Dynamic
 from study_app.haptics.model.effect import GRAVITY_MPS2
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.estimators import NAMED as ESTIMATORS
+from study_app.haptics.model.force_link import FORCES
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.limits import (
     CUT_INERTIA_SHARE,
@@ -45,6 +46,7 @@ class Model(NamedTuple):
     state: Any  # (1,) STATE
     liquid_states: Any  # (n,) LIQUID_STATE
     window: Any  # (rows,) WINDOW, the newest samples of the estimators that look back
+    forces_n: Any  # (FORCES, 3) the newest forces [N], where the scene's link delays them; else (0, 3)
     rows: Any  # `EffectRows`: what effects own, each liquid's rows in a stretch of its own
 
     @property
@@ -84,6 +86,7 @@ def pack(
         state=layout.records(layout.STATE, 1),
         liquid_states=layout.records(layout.LIQUID_STATE, liquids),
         window=layout.records(layout.WINDOW, window_needed(scene) if capacity is None else MAX_WINDOW),
+        forces_n=np.zeros((FORCES if capacity is not None or scene.link.acts else 0, 3)),
         rows=EffectRows(
             **{
                 name: layout.records(layout.record_type(fields), rows[name])
@@ -116,6 +119,10 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
         raise StudyError(
             f'velocity "{scene.velocity.kind}" looks at {window_needed(scene)} samples; the model was packed with room '
             f"for {len(model.window)}: pack it with a capacity"
+        )
+    if scene.link.acts and len(model.forces_n) == 0:
+        raise StudyError(
+            "the scene delays its force; the model was packed without room for that: pack it with a capacity"
         )
     rows = rows_needed(scene)
     for kind in KINDS:
@@ -209,6 +216,9 @@ def _fill_constants(model: Model, scene: Scene, limits: Sequence[DampingLimits],
     parameters.slew_n = slew_limit_n(1 / scene.rate_hz, dynamics, scene.velocity)
     parameters.count_m = dynamics.count_m
     parameters.mass_kg = dynamics.mass_kg
+    parameters.link.acts = scene.link.acts
+    parameters.link.delay_ticks, parameters.link.jitter_ticks = scene.link.ticks(scene.rate_hz)
+    parameters.link.loss, parameters.link.seed = scene.link.loss, scene.link.seed
     first = no_rows()
     for record, liquid in zip(model.liquids, scene.liquids, strict=False):
         fill(record, liquid, scene, first)

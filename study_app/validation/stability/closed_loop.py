@@ -3,8 +3,7 @@
 The handle is that of ``haptics.kernels.plant``, or of the second plant, `arm`. The same motion can be played to the
 tick again without the force acting on anything. All sizes are at the hand.
 
-A study may delay the force: the force of the effects, within the slope limits, then comes so late to the rest of the
-safety layer, as if liquid and device were on two computers. What belongs to a device's own delay acts after that.
+What belongs to a device's own delay acts after the force link of the scene.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ from study_app.haptics.kernels.estimators.kalman import take_force
 from study_app.haptics.kernels.loop import follow_delay
 from study_app.haptics.kernels.passivity import log_acted, log_command, update_observer
 from study_app.haptics.kernels.plant import measure, move, push
-from study_app.haptics.kernels.safety import guard, limit_inertia, limit_slope
 from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
 from study_app.haptics.kernels.tick import step_model, tick, write_sample
 from study_app.haptics.kernels.tick_schedule import next_tick, random
@@ -35,9 +33,6 @@ MEASURED_S: Final = 0.03
 
 MASS_S: Final = 0.15
 """After so long the mass of the handle changes, in cases where it does: within each stroke of a hand."""
-
-LONGEST_TICKS: Final = 1000
-"""The most that a study may delay the force [ticks]."""
 
 # Hand, servo and encoder, in addition to the handle and the model.
 LOOP = np.dtype(
@@ -65,9 +60,6 @@ LOOP = np.dtype(
         ("measured", np.int64),  # 1 where it is of this tick
         ("seen_m", np.float64, (3,)),  # the last sample
         ("arm", ARM),  # the second plant, where it is used
-        ("late_ticks", np.int64),  # how late the force of the effects comes to the safety layer
-        ("row", np.int64),  # of this tick in `prompt_n`
-        ("prompt_n", np.float64, (LONGEST_TICKS + 1, 2, 3)),  # forces of the effects, and what of them is lift
     ],
     align=True,
 )
@@ -285,7 +277,7 @@ def _read(sample: Any, handle: Any, pace: Any, loop: Any) -> None:
 @kernel
 def _answer(model: Any, safety: Any, sample: Any, loop: Any) -> None:
     """Take a tick; without safety the force of the effects is sent as it is."""
-    if loop.safe and loop.late_ticks == 0:
+    if loop.safe:
         tick(model, safety, sample)
         return
     sample.limiters = 0
@@ -295,36 +287,7 @@ def _answer(model: Any, safety: Any, sample: Any, loop: Any) -> None:
         take_force(model.state[0], safety)
         step_model(model, interval_s, safety.delay_ticks)
     write_sample(model.state[0], sample)
-    if loop.safe:
-        _delay_force(model, safety, sample, loop, interval_s > 0.0)
-        guard(model, safety, sample, interval_s)
-        return
     update_observer(model, safety, interval_s)
     copy(sample.force_n, sample.device_force_n)
     copy(model.state[0].lift_n, safety.passivity.lift_n)
     log_command(safety.passivity, sample.device_force_n)
-
-
-@kernel
-def _delay_force(model: Any, safety: Any, sample: Any, loop: Any, fresh: bool) -> None:
-    """Put the force of ``late_ticks`` before in the place of the model's, both within the slope limits."""
-    state, newest = model.state[0], loop.prompt_n[loop.row]
-    if fresh:
-        copy(state.force_n, sample.device_force_n)
-        limit_slope(model, safety, sample)
-        limit_inertia(model, safety, sample)
-        copy(sample.device_force_n, newest[0])
-        copy(state.lift_n, newest[1])
-        for i in range(model.parameters[0].liquids):  # the limits have acted
-            local = model.liquid_states[i]
-            clear(local.damping_n)
-            clear(local.excess_n)
-            local.late_mps = 0.0
-            local.inertial = 0
-    late = loop.prompt_n[(loop.row - loop.late_ticks) % (LONGEST_TICKS + 1)]
-    copy(late[0], state.force_n)
-    copy(late[1], state.lift_n)
-    following = (loop.row + 1) % (LONGEST_TICKS + 1)
-    for kind in range(2):
-        copy(newest[kind], loop.prompt_n[following, kind])  # until a tick brings another
-    loop.row = following

@@ -71,7 +71,7 @@ def trace_of(case: Case) -> Any:
 def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None, scene: Scene | None = None) -> Bench:
     """Return the records of a case; ``limits`` are tried in place of the table's, ``scene`` in place of the case's."""
     safety = new_safety(FORCE_LIMIT_N, case.believed_delay)
-    safety[0].fade = 1.0
+    safety[0].fade, safety[0].fade_s = 1.0, 0.0
     loop = records(LOOP, 1)[0]
     loop.safe = safe
     loop.motion = MOTIONS.index(case.motion)
@@ -83,7 +83,6 @@ def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None, sc
     loop.noise_m = case.noise_um * 1e-6
     loop.lost, loop.duplicated, loop.burst_s = case.lost, case.duplicated, case.burst_ms * 1e-3
     loop.slows_to = case.slows_to
-    loop.late_ticks = round(case.force_delay_ms * 1e-3 * case.rate_hz)
     loop.mass_kg, loop.other_kg = case.mass_kg, case.other_kg
     if case.plant == SECOND:
         loop.arm = new_arm(ARMS[case.hand], handle_kg=case.mass_kg, **_device(case))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cache
@@ -11,6 +12,7 @@ from typing import Any, Final
 from study_app.errors import StudyError
 from study_app.haptics.model.effects.drag import DAMPING_NSPM, Drag
 from study_app.haptics.model.estimators import ESTIMATORS as KINDS
+from study_app.haptics.model.force_link import MOST_DELAY_MS, MOST_JITTER_MS, MOST_LOSS, ForceLink, too_long
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped_file
@@ -71,7 +73,9 @@ RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "burst_ms": (0.0, 40.0),
     "believed_kg": (0.0, 5.0),
     "other_kg": (0.0, 5.0),
-    "force_delay_ms": (0.0, 200.0),
+    "force_delay_ms": (0.0, float(MOST_DELAY_MS)),
+    "force_jitter_ms": (0.0, float(MOST_JITTER_MS)),
+    "force_loss": (0.0, MOST_LOSS),
 }
 """What a case may be made of; the sweep's own choices lie within."""
 
@@ -92,7 +96,7 @@ class Case:
     share of ticks without a new sample, ``duplicated`` one of samples that repeat the position before; for the last
     ``burst_ms`` of every 300 ms there is no new sample. ``believed_kg`` is the least mass that the device states
     (0: the true one), ``other_kg`` the mass of the handle in every second stretch of 150 ms (0: the same).
-    ``force_delay_ms`` is how late the force of the effects comes to the passivity controller, by the study's own wish.
+    ``force_delay_ms``, ``force_jitter_ms`` and ``force_loss`` are the study's own force link.
     """
 
     liquid: str = "water"
@@ -121,6 +125,8 @@ class Case:
     believed_kg: float = 0.0
     other_kg: float = 0.0
     force_delay_ms: float = 0.0
+    force_jitter_ms: float = 0.0
+    force_loss: float = 0.0
 
     @property
     def believed_delay(self) -> int:
@@ -174,6 +180,8 @@ def parse(line: str) -> Case:
     ):
         if getattr(case, name) not in permitted:
             raise StudyError(f"{name}={getattr(case, name)} is none of {', '.join(permitted)}")
+    if not _link_of(case).fits(case.rate_hz):
+        raise StudyError(too_long(case.rate_hz))
     return case
 
 
@@ -212,8 +220,19 @@ def materials() -> tuple[str, ...]:
 
 def scene_of(case: Case) -> Scene:
     """Return what the case presents."""
-    changed = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": ESTIMATORS[case.estimator]}
+    velocity, link = ESTIMATORS[case.estimator], _link_of(case)
+    changed = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": velocity, "link": link}
     return Scene.model_validate(scenes()[case.liquid].model_copy(update=changed).model_dump())
+
+
+def _link_of(case: Case) -> ForceLink:
+    """Return the force link of a case; its seed follows from the case."""
+    return ForceLink(
+        delay_s=case.force_delay_ms / 1000,
+        jitter_s=case.force_jitter_ms / 1000,
+        loss=case.force_loss,
+        seed=zlib.crc32(str(case).encode()),
+    )
 
 
 def _word(value: object) -> str:

@@ -15,8 +15,10 @@ RIVER = Uniform(velocity_mps=(1, 0, 0))
 
 
 def leaves(value: BaseModel, place: str) -> Iterator[tuple[str, str, Any]]:
-    """Yield (table, field, value) of every number and word of a scene; liquids are one table, however many."""
+    """Yield (table, field, value) of every number and word of a scene but its link; liquids are one table."""
     for field, found in value:
+        if field == "link":
+            continue
         if isinstance(found, BaseModel):
             yield from leaves(found, field)
         elif field == "liquids":

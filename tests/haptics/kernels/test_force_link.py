@@ -1,0 +1,186 @@
+"""The force link: how late, how unevenly and how seldom a force is sent, and that safety acts on what is sent."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from study_app.errors import StudyError
+from study_app.haptics.kernels.force_link import delay_force, uniform
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.force_link import FORCES, PROMPT, ForceLink
+from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_STOP, STATUS_NON_FINITE
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.overrides import number_names, override
+from study_app.haptics.model.scene import Box, Liquid, Scene
+from study_app.haptics.runtime.offline import samples_along
+from study_app.haptics.runtime.pack import built_alike, pack, pack_into
+from study_app.protocol.scene_file import scene_text
+from tests.haptics.scenes import EVERYTHING, Hand, liquid, scene, stroke
+
+TICKS = 3000
+
+
+def damper(damping_nspm=0.2, **link):
+    """Return a scene of a linear damper with a force link."""
+    felt = Liquid(id="damper", density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=damping_nspm))
+    return Scene(liquids=(felt,), link=ForceLink(**link))
+
+
+def arrivals(ticks=TICKS, **link):
+    """Return of each tick which tick's force is sent, from 0; -1 where there is none."""
+    model = pack(damper(**link))
+    force_n, found = np.zeros(3), []
+    for tick in range(ticks):
+        force_n[:] = tick, -tick, 0.5
+        arrived = delay_force(model.parameters[0].link, model.state[0].link, model.forces_n, force_n)
+        assert arrived == bool(force_n[2])
+        found.append(int(force_n[0]) if arrived else -1)
+    return np.array(found)
+
+
+def sine(lasts_s=3.0, amplitude_m=0.02, hz=1.0):
+    """Return a hand's motion along x, in the scene."""
+    t_s = np.arange(round(1000 * lasts_s)) / 1000
+    x = 10 * amplitude_m * np.sin(2 * np.pi * hz * t_s)
+    return Motion(t_s, np.column_stack([x, 0 * x, 0 * x]))
+
+
+@pytest.mark.parametrize("delay", [1, 15, 100, 200])
+def test_the_force_of_a_tick_is_sent_so_many_ticks_later(delay):
+    prompt, late = (samples_along(damper(delay_s=one / 1000), sine()) for one in (0, delay))
+    np.testing.assert_array_equal(late.force_n, prompt.force_n)  # the force of the effects is recorded as it is
+    begun = delay + 60  # the fade-in begins with the first force that arrives
+    np.testing.assert_array_equal(late.device_force_n[begun:], prompt.device_force_n[begun - delay : -delay])
+    assert not late.device_force_n[:delay].any()
+    assert np.abs(prompt.device_force_n).max() > 0.02
+
+
+def test_a_link_that_does_nothing_leaves_every_bit_and_needs_no_memory():
+    for felt in EVERYTHING.values():
+        idle = felt.model_copy(update={"link": ForceLink(seed=5)})
+        one, other = Hand(felt), Hand(idle)
+        for place in stroke(400):
+            assert one.tick(place).tobytes() == other.tick(place).tobytes()
+    assert len(pack(damper()).forces_n) == 0
+
+
+def test_jitter_is_uniform_and_no_older_force_follows_a_newer_one():
+    seen = arrivals(20_000, delay_s=0.02, jitter_s=0.05, seed=3)
+    ages = np.arange(len(seen)) - seen
+    assert (seen[:20] == -1).all()
+    assert (np.diff(seen) >= 0).all()
+    assert ages[100:].min() == 20
+    assert ages[100:].max() <= 20 + 50
+    drawn = np.array([int(51 * uniform(3, 2 * tick + 1)) for tick in range(20_000)])
+    due = np.arange(20_000) - 20 - drawn
+    np.testing.assert_array_equal(seen, np.maximum(np.maximum.accumulate(due), -1))
+    counts = np.bincount(drawn, minlength=51)
+    assert ((counts - 20_000 / 51) ** 2 / (20_000 / 51)).sum() < 90  # chi-squared of 50 degrees of freedom, p 0.0005
+
+
+@pytest.mark.parametrize("loss", [0.1, 0.5])
+def test_a_lost_force_is_replaced_by_the_last_one(loss):
+    seen = arrivals(20_000, loss=loss, seed=9)
+    held = np.diff(seen) == 0
+    assert held.mean() == pytest.approx(loss, abs=4 * np.sqrt(loss * (1 - loss) / 20_000))
+    assert (seen[1:][~held] == np.arange(1, 20_000)[~held]).all()
+    after = held[1:][held[:-1]].mean()  # losses do not come in bursts
+    assert after == pytest.approx(loss, abs=5 * np.sqrt(loss * (1 - loss) / held.sum()))
+
+
+def test_seeds_differ_and_the_same_seed_repeats():
+    link = {"delay_s": 0.01, "jitter_s": 0.02, "loss": 0.2}
+    np.testing.assert_array_equal(arrivals(seed=7, **link), arrivals(seed=7, **link))
+    assert (arrivals(seed=7, **link) != arrivals(seed=8, **link)).mean() > 0.5
+    drawn = np.array([[uniform(seed, number) for number in range(4000)] for seed in (1, 2)])
+    assert abs(np.corrcoef(drawn)[0, 1]) < 0.06
+    assert abs(np.corrcoef(drawn[0, :-1], drawn[0, 1:])[0, 1]) < 0.06
+    assert drawn.mean() == pytest.approx(0.5, abs=0.02)
+    assert drawn.min() >= 0
+    assert drawn.max() < 1
+
+
+def test_a_stop_is_zero_at_once_and_the_force_returns_with_a_fade():
+    hand = Hand(damper(8.0, delay_s=0.05))
+    places = np.outer(0.02 * np.sin(2 * np.pi * np.arange(900) / 500), (1, 0, 0))
+    for place in places[:130]:
+        sample = hand.tick(place)
+    assert np.linalg.norm(sample.device_force_n) > 0.1
+    hand.safety[0].stop = 1
+    sample = hand.tick(places[130])
+    assert sample.limiters & LIMITER_STOP
+    assert not sample.device_force_n.any()
+    for place in places[131:300]:
+        assert not hand.tick(place).device_force_n.any()
+    hand.safety[0].stop = 0
+    assert hand.tick(places[300]).limiters & LIMITER_FADE
+
+
+def test_the_first_force_that_arrives_fades_in():
+    """A force that stood at its full value after the fade of the scene would be a knock."""
+    felt = scene(liquid(4000, effects=("buoyancy",)), link=ForceLink(delay_s=0.15))
+    prompt, late = Hand(felt.model_copy(update={"link": PROMPT}), faded_in=False), Hand(felt, faded_in=False)
+    forces = np.array([[hand.tick((0.0, 0.0, 0.0)).device_force_n[1] for _ in range(900)] for hand in (prompt, late)])
+    assert forces[0, -1] > 1
+    assert not forces[1, :150].any()
+    assert 0 < forces[1, 150] < 0.02  # two steps of the fade
+    np.testing.assert_array_equal(forces[1, 150:], forces[0, 2:-148])
+
+
+def test_no_force_is_not_a_number_and_a_fault_stops_at_once():
+    hand = Hand(damper(8.0, delay_s=0.05))
+    hand.model.liquids[0].drag.damping_nspm = np.nan
+    sent = [hand.tick((1e-4 * k, 0, 0)) for k in range(60)]
+    assert all(np.isfinite(one.device_force_n).all() for one in sent)
+    assert sent[-1].status == STATUS_NON_FINITE
+
+
+def test_a_body_that_bobs_through_a_surface_gets_no_energy_from_late_buoyancy():
+    """Buoyancy near the surface is a spring; a late spring drives the hand, and the observer must see that."""
+    pool = Liquid(
+        id="pool",
+        density_kg_m3=2000,
+        region=Box(centre_m=(0, -0.5, 0), size_m=(2, 1, 2)),
+        effects=("buoyancy", "surface"),
+        drag=Drag(law="constant"),
+    )
+    t_s = np.arange(8000) / 1000
+    place_m = np.column_stack([0 * t_s, 0.003 * np.sin(2 * np.pi * 3 * t_s), 0 * t_s])
+
+    def per_cycle_j(link):
+        hand = Hand(Scene(liquids=(pool,), scale=10, link=link))
+        forces = np.array([hand.tick(place).device_force_n for place in place_m])
+        return float(np.einsum("ij,ij->", forces[1000:-1], np.diff(place_m[1000:], axis=0))) / 21
+
+    assert per_cycle_j(PROMPT) < 0.2e-3  # its force is held for a tick
+    assert per_cycle_j(ForceLink(delay_s=0.08)) < 0.5e-3  # 16 mJ where the observer left late buoyancy out
+
+
+def test_a_link_survives_a_change_of_numbers_and_is_no_number_of_the_scene():
+    felt = damper(delay_s=0.02, seed=4)
+    assert override(felt, "damping_nspm", 3.0).link == felt.link
+    assert not {"delay_s", "jitter_s", "loss", "seed"} & set(number_names(felt))
+    with pytest.raises(StudyError, match="no parameter 'link'"):
+        override(felt, "link", "{delay_s=0.1}")
+    assert "link" not in scene_text(felt)
+    assert built_alike(felt, override(felt, "damping_nspm", 3.0))
+    assert not built_alike(felt, damper(delay_s=0.03, seed=4))
+
+
+def test_delay_and_jitter_beyond_the_kept_forces_are_refused():
+    assert ForceLink(delay_s=0.2, jitter_s=0.05).fits(4000)
+    assert not ForceLink(delay_s=0.2, jitter_s=0.05).fits(5000)
+    with pytest.raises(ValidationError, match=r"below 204\.8 ms"):
+        Scene.model_validate(damper(delay_s=0.2, jitter_s=0.05).model_copy(update={"rate_hz": 5000.0}).model_dump())
+    with pytest.raises(StudyError, match="pack it with a capacity"):
+        pack_into(pack(damper()), damper(delay_s=0.001))
+    assert len(pack(damper(loss=0.1)).forces_n) == FORCES
+
+
+def test_another_scene_begins_without_the_forces_of_the_one_before():
+    model = pack(damper(8.0, delay_s=0.05), capacity=0)
+    model.forces_n[:] = 3.0
+    model.state[0].link.arrived = 40
+    pack_into(model, damper(8.0, delay_s=0.05))
+    assert model.state[0].link.arrived == 0
+    assert model.state[0].link.ticks == 0
