@@ -27,9 +27,9 @@ def commands(context: click.Context) -> None:
     """Run, record and analyse studies of how liquids feel.
 
     Without a command the home window opens. FILE is a protocol or scene file, or the name of one in the workspace or
-    shipped (rek2024, physical_liquids, physical2, slime, viscosityjnd, delaydetect, delayjnd, thickness, demo); RESULTS
-    is a study folder, or its name in the workspace; SESSION is a ses-NN folder, or a name that the command sessions
-    lists.
+    shipped (rek2024, physical_liquids, physical2, slime, viscosityjnd, delaydetect, delayjnd, forcedelay, thickness,
+    demo); RESULTS is a study folder, or its name in the workspace; SESSION is a ses-NN folder, or a name that the
+    command sessions lists.
     """
     if context.invoked_subcommand is None:
         from study_app import app

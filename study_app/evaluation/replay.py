@@ -31,7 +31,8 @@ from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.recompute import take_sample, was_lost_at_read
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.answered import presented_by
-from study_app.protocol.trials.presentation import scene_of
+from study_app.protocol.trials.presentation import link_seed, scene_of
+from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store import receipt, recording_files
 from study_app.store.atomic import is_there
 from study_app.store.blinded import blinding
@@ -118,7 +119,7 @@ def replay(session_folder: Path) -> Replayed:
         if not is_there(path):
             found.missing.append(f"{name}: {line['recording']} is missing, but the journal mentions it")
             continue
-        scene = _scene(protocol, key, started)
+        scene = _scene(protocol, key, started, kept)
         samples, checks = recording_files.read_samples(path), recording_files.read_checks(path)
         start = time.perf_counter()
         before = _again(samples, scene, *devices[resumed], before)
@@ -309,12 +310,13 @@ def _listed(seconds: list[int]) -> str:
     return f"second {shown}{more}"
 
 
-def _scene(protocol: Protocol, key: blinding.Key, started: Line) -> Scene:
+def _scene(protocol: Protocol, key: blinding.Key, started: Line, kept: Mapping[str, Any]) -> Scene:
     """Return what was presented: a condition, or an interval of a trial whose sealed line is opened."""
+    seed = link_seed(kept["seed"], kept["participant"], *_which(started))
     if "interval" not in started:
-        return protocol.scene_for(key.condition(started["block"], started["code"]))
+        return scene_of(protocol, Stimulated(key.condition(started["block"], started["code"])), seed)
     due = presented_by(protocol, key.codes, started)
-    return scene_of(protocol, due.intervals[started["interval"] - 1])
+    return scene_of(protocol, due.intervals[started["interval"] - 1], seed)
 
 
 def _which(line: Line) -> tuple[int, int, int | None]:

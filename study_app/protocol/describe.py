@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.scene import Scene
 from study_app.protocol import liquid_summary
+from study_app.protocol.checks.delay_warnings import delay_warnings
 from study_app.protocol.checks.level_warnings import level_warnings
 from study_app.protocol.groups.own_protocol import Variant, variants
 from study_app.protocol.groups.steps import sessions_differ
@@ -273,11 +274,17 @@ def _conditions(protocol: Protocol) -> list[tuple[str, str, str]]:
 
 
 def _drawn(condition: Condition) -> Iterator[str]:
-    """Yield what is unusual of how a condition is drawn."""
+    """Yield what is unusual of how a condition is drawn, and its force sent."""
     if condition.delay_ms:
         yield f"seen {condition.delay_ms:g} ms late"
     if condition.ball == "hidden":
         yield "ball hidden"
+    if condition.force_delay_ms:
+        yield f"force {condition.force_delay_ms:g} ms late"
+    if condition.force_jitter_ms:
+        yield f"force jitter {condition.force_jitter_ms:g} ms"
+    if condition.force_loss:
+        yield f"{100 * condition.force_loss:g} % of forces lost"
 
 
 def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
@@ -325,6 +332,7 @@ def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:
     if warnings := (
         *liquid_summary.warnings(protocol),
         *level_warnings(protocol),
+        *delay_warnings(protocol),
         *_incomplete(protocol),
         *from_memory(protocol),
     ):

@@ -15,6 +15,7 @@ from study_app.protocol.blocks import LATER
 from study_app.protocol.forms.scale import POINTS
 from study_app.protocol.source.document import entries, names
 from study_app.protocol.source.problems import Fault
+from study_app.protocol.trials.stimuli import OF_LINK
 from study_app.protocol.wording.languages import LANGUAGES, words
 
 LATEST: Final = 2
@@ -30,6 +31,7 @@ NEW_KEYS: Final = (
     "liquids.*.non_newtonian",
     "scene.fade_s",
     "conditions.*.ball",
+    *(f"conditions.*.{key}" for key in OF_LINK),
     *TABLES,
     *(f"limits.{key}" for key in LEVEL_LIMITS),
     *(f"blocks.*.{key}" for key in sorted(LATER)),

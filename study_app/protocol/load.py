@@ -19,6 +19,7 @@ from study_app.protocol.checks.consistency import check
 from study_app.protocol.checks.designs import designs
 from study_app.protocol.checks.not_supported import not_supported
 from study_app.protocol.checks.pace import paced
+from study_app.protocol.checks.returned_energy import returned
 from study_app.protocol.instruments.instrument import with_instruments
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults
 from study_app.protocol.source.document import Path, entries
@@ -116,7 +117,7 @@ def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Pro
         faults += _outside(unfilled, check(document, [fault.path for fault in faults]))
     _raise(name, faults, places)
     protocol = Protocol.model_validate(document, strict=True)
-    _raise(name, list(designs(protocol)) or list(paced(protocol, delay_ticks)), places)
+    _raise(name, list(designs(protocol)) or [*paced(protocol, delay_ticks), *returned(protocol)], places)
     return protocol
 
 

@@ -16,6 +16,9 @@ _OF_THE_SCENE: Final = {
     it.name: it
     for it in (
         _P("condition.delay_ms", "Visual delay", "ms"),
+        _P("condition.force_delay_ms", "Force delay", "ms"),
+        _P("condition.force_jitter_ms", "Force jitter", "ms"),
+        _P("condition.force_loss", "Force loss", ""),
         _P("liquid.density_kg_m3", "Density", "kg/m³", 1.0, logarithmic=True, decimals=1),
         _P("liquid.viscosity_pa_s", "Viscosity", "Pa·s", 1e-5, 1000.0, 1e-3, True, factor=1e3, shown_unit="mPa·s"),
         _P("region.centre_m", "Centre", "m", -1.0, 1.0, factor=1e3, shown_unit="mm", decimals=0),

@@ -7,6 +7,7 @@ interpolated to even times, so that late ticks do not bend the curve.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -15,10 +16,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+Times = NDArray[np.float64]
 Vectors = NDArray[np.float64]
 
 HALF_S: Final = 0.02
 """The filter looks so far back and ahead [s]."""
+EARLIER: Final = 5
+"""So many rows earlier than the force model's may the force sent seem to be."""
 LEAST_SPEED_MPS: Final = 1e-4
 """A hand that moves less is at rest: no damping can be computed. [choice]"""
 
@@ -45,9 +49,9 @@ class Motion:
         rows = max(len(self.times_s), 1)
         return float(np.sqrt(np.einsum("ij,ij->", self.velocity_mps, self.velocity_mps) / rows))
 
-    def after(self, from_s: float) -> Motion:
-        """Return the motion from a time on [s]."""
-        later = self.times_s >= from_s
+    def after(self, from_s: float, to_s: float = math.inf) -> Motion:
+        """Return the motion from a time on, to another one [s]."""
+        later = (self.times_s >= from_s) & (self.times_s <= to_s)
         return Motion(self.times_s[later], self.velocity_mps[later], self.acceleration_mps2[later])
 
 
@@ -116,6 +120,37 @@ def share(sent_n: Vectors, model_n: Vectors) -> float | None:
     """
     asked = float(np.einsum("ij,ij->", model_n, model_n))
     return float(np.einsum("ij,ij->", sent_n, model_n)) / asked if asked > 0 else None
+
+
+def lag(sent_n: Vectors, model_n: Vectors, most: int) -> float | None:
+    """Return by how many rows the force sent lags behind the force model's, by least squares; None without force.
+
+    Each lag of whole rows has the residual of F_sent = g F_model with the best share g; a parabola through the least
+    residual and its neighbours gives the fraction.
+
+    Parameters
+    ----------
+    sent_n, model_n : array (n, 3)
+        The force sent to the hand, and the sum of the effects before any limit [N], at even times.
+    most : int
+        The longest lag that is looked for; the force sent is compared from this row on.
+    """
+    compared = sent_n[most : len(sent_n) - EARLIER]
+    if len(compared) == 0:
+        return None
+    products = sum(np.correlate(model_n[:, axis], compared[:, axis], "valid") for axis in range(3))
+    squares = np.concatenate([[0.0], np.cumsum(np.einsum("ij,ij->i", model_n, model_n))])
+    of_model = squares[len(compared) :] - squares[: len(squares) - len(compared)]
+    explained = np.where((of_model > 0) & (products > 0), products**2 / np.where(of_model > 0, of_model, 1.0), 0.0)
+    at_best = int(np.argmax(explained))
+    if explained[at_best] == 0.0:
+        return None
+    fraction = 0.0
+    if 0 < at_best < len(explained) - 1:
+        before, here, after = explained[at_best - 1 : at_best + 2]
+        bend = before - 2 * here + after
+        fraction = 0.0 if bend >= 0 else 0.5 * float(before - after) / float(bend)
+    return most - (at_best + fraction)
 
 
 def difference(errors: Sequence[float | None], comparisons: Sequence[bool]) -> float | None:

@@ -25,7 +25,7 @@ from study_app.errors import SessionError, StoreError, StudyError
 from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.protocol.model import Protocol as Study
 from study_app.protocol.orders.schedule import Schedule
-from study_app.protocol.trials.presentation import scene_of
+from study_app.protocol.trials.presentation import link_seed, scene_of
 from study_app.session.ports import Ports
 from study_app.session.resume import FIRST, Start
 from study_app.session.tasks import Outcome, TaskView
@@ -309,9 +309,11 @@ class Runner:
                 journal.finish(status, reason)
 
     def _prepared(self, command: StartTrial) -> RunningTrial:
+        schedule = self._state.plan.schedule
+        seed = link_seed(schedule.seed, schedule.participant, command.trial, command.attempt, command.interval)
         return RunningTrial(
             command,
-            scene_of(self._protocol, command.presented),
+            scene_of(self._protocol, command.presented, seed),
             late_s=self._protocol.limits.delay_error_ms / 1000,
             servo=self._ports.servo,
             reader=self._reader,

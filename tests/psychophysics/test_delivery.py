@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.force_link import ForceLink
 from study_app.haptics.model.motion import Motion as Path
-from study_app.haptics.model.scene import Ewma, Liquid, Scene, Velocity
+from study_app.haptics.model.scene import Ewma, Kalman, Liquid, Scene, Velocity
 from study_app.haptics.runtime.offline import samples_along
-from study_app.psychophysics.delivery import at, damping, difference, motion, share
+from study_app.psychophysics.delivery import EARLIER, at, damping, difference, lag, motion, share
 from tests.compiled import needs_servo
 
 RATE_HZ = 1000.0
@@ -154,3 +155,42 @@ def test_nothing_but_numpy_and_itself_is_loaded() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "['study_app.psychophysics', 'study_app.psychophysics.delivery']"
+
+
+def shifted(rows: float, lasts_s: float = 3.0) -> tuple[Any, Any]:
+    """Return a force of the model (n, 3) and the same ``rows`` later."""
+    t_s = np.arange(round(lasts_s * RATE_HZ)) / RATE_HZ
+    prompt, late = (
+        np.column_stack((np.cos(2 * np.pi * t), 0.3 * np.sin(2 * np.pi * 1.7 * t), 0 * t))
+        for t in (t_s, t_s - rows / RATE_HZ)
+    )
+    return late, prompt
+
+
+@pytest.mark.parametrize("rows", [-2, 0, 1, 7, 80.5, 200.25, 259])
+def test_the_lag_of_a_force_is_found_within_a_tenth_of_a_row(rows: float) -> None:
+    sent, model = shifted(rows)
+    assert lag(sent, model, 260) == pytest.approx(rows, abs=0.1)
+    assert lag(0.4 * sent, model, 260) == pytest.approx(rows, abs=0.1)  # a share of it is as late
+    noisy = sent + np.random.default_rng(3).normal(0, 0.05, sent.shape)
+    assert lag(noisy, model, 260) == pytest.approx(rows, abs=1.0)
+
+
+def test_a_force_in_the_other_direction_or_none_has_no_lag() -> None:
+    sent, model = shifted(0, lasts_s=1.0)
+    assert lag(0 * sent, model, 100) is None
+    assert lag(sent, 0 * model, 100) is None
+    assert lag(sent[: EARLIER + 100], model[: EARLIER + 100], 100) is None
+    straight = np.ones((500, 3))
+    assert lag(-straight, straight, 100) is None
+
+
+@needs_servo
+@pytest.mark.parametrize("delay_ms", [0, 15, 100, 200])
+@pytest.mark.parametrize("velocity", [Ewma(), Kalman()])
+def test_the_lag_of_a_link_is_found_through_the_compiled_tick(delay_ms: int, velocity: Velocity) -> None:
+    t_s, position_m = swing(lasts_s=4.0)
+    linked = damper(0.3, 1.0, velocity).model_copy(update={"link": ForceLink(delay_s=delay_ms / 1000)})
+    samples = samples_along(linked, Path(t_s, position_m))
+    found = lag(samples.device_force_n[500:], samples.force_n[500:], 260)
+    assert found == pytest.approx(delay_ms, abs=0.05)

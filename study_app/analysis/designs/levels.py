@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
@@ -13,7 +14,14 @@ import pandas as pd
 from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.designs.thresholds import thresholds
 from study_app.analysis.designs.weber_exponents import weber_exponents
-from study_app.analysis.results.levels import LevelAnswers, LevelsFound, LevelTimes, PublishedValue, Summary
+from study_app.analysis.results.levels import (
+    LevelAnswers,
+    LevelsFound,
+    LevelTimes,
+    PublishedValue,
+    Summary,
+    WithheldForce,
+)
 from study_app.analysis.results.question_answers import GroupAnswers
 from study_app.analysis.statistics.outcome import Array, clopper_pearson
 from study_app.analysis.statistics.student_interval import student_interval
@@ -24,6 +32,7 @@ from study_app.analysis.tables.study import Study
 from study_app.analysis.tables.tracks import answers_timed, tracks
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.trials.design import Reply
+from study_app.protocol.trials.stimuli import OF_LINK
 
 SUMMARIES: Final[dict[Reply, Summary]] = {"choice": "share", "rating": "mean", "number": "geometric mean"}
 """How the answers at a level are summarised, by the reply that the design asks for."""
@@ -49,7 +58,9 @@ def levels_found(study: Study, rows: pd.DataFrame | None = None) -> tuple[Levels
     opened = rows if rows is not None else tracks(study) if study.revealed else None
     opened = None if opened is None else opened[list(READ)]  # groups of few columns are made in less time
     bounds = {one.where.id: one.bounds for one in study.others.questions}
-    return tuple(_block(one, timed[timed["block"] == one.id], opened, bounds.get(one.id)) for one in main)
+    found = (_block(one, timed[timed["block"] == one.id], opened, bounds.get(one.id)) for one in main)
+    withheld = (tuple(_withheld(one, study.intervals)) if opened is not None else () for one in main)
+    return tuple(replace(one, withheld=shares) for one, shares in zip(found, withheld, strict=True))
 
 
 def _block(
@@ -99,11 +110,30 @@ def _level_times(block: LevelBlock, opened: pd.DataFrame) -> Iterator[LevelTimes
     rows = rows[rows["level"].notna() & rows["response_s"].notna()]
     for standard, at_standard in rows.groupby("standard", dropna=False, sort=True):
         levels = np.unique(at_standard["level"].to_numpy(dtype=float))
-        for some in np.array_split(levels, min(len(levels), MOST_LEVELS)):
+        for some in _ranges(levels):
             here = at_standard[at_standard["level"].astype(float).between(some[0], some[-1])]
             seconds, right = here["response_s"].to_numpy(dtype=float), here["right"].to_numpy(dtype=bool)
             (right_n, right_s), (wrong_n, wrong_s) = _median(seconds[right]), _median(seconds[~right])
             yield LevelTimes(_number(standard), float(some[0]), float(some[-1]), right_n, right_s, wrong_n, wrong_s)
+
+
+def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[WithheldForce]:
+    """Yield what safety withheld of the force in comparisons whose link is varied, by level as `_level_times`."""
+    if block.stimulus is None or block.stimulus.vary not in OF_LINK:
+        return
+    rows = intervals[(intervals["block"] == block.id) & (intervals["presented"] == "comparison")]
+    rows = rows[rows["level"].notna() & rows["withheld_share"].notna()]
+    for standard, at_standard in rows.groupby("standard", dropna=False, sort=True):
+        for some in _ranges(np.unique(at_standard["level"].to_numpy(dtype=float))):
+            here = at_standard[at_standard["level"].astype(float).between(some[0], some[-1])]
+            percent = 100 * here["withheld_share"].to_numpy(dtype=float)
+            mean, most = float(percent.mean()), float(percent.max())
+            yield WithheldForce(_number(standard), float(some[0]), float(some[-1]), len(percent), mean, most)
+
+
+def _ranges(levels: Array) -> list[Array]:
+    """Return ascending levels in at most `MOST_LEVELS` ranges of neighbours."""
+    return np.array_split(levels, min(len(levels), MOST_LEVELS)) if len(levels) else []
 
 
 def _median(seconds: Array) -> tuple[int, float | None]:

@@ -152,6 +152,18 @@ class LevelTimes:
 
 
 @dataclass(frozen=True, slots=True)
+class WithheldForce:
+    """Share of the requested force that safety withheld [%] in the comparisons at levels from ``low`` to ``high``."""
+
+    standard: float | None
+    low: float
+    high: float
+    n: int
+    mean_percent: float
+    most_percent: float
+
+
+@dataclass(frozen=True, slots=True)
 class LevelsFound:
     """A block of levels.
 
@@ -159,7 +171,8 @@ class LevelsFound:
     the varied number, ``quantity`` its name in words, ``unit`` its unit, ``level_kind`` what a level is (weber,
     difference, value), all None where conditions are compared; ``family`` is the psychometric function of the
     thresholds; ``adaptive``: answers chose the levels; ``guess_rate`` is the share at chance, ``bounds`` are the ends
-    of a scale. Without the key only ``times`` are known.
+    of a scale; ``withheld`` is known where the force is delayed, with jitter or loss. Without the key only ``times``
+    are known.
     """
 
     block: str
@@ -181,6 +194,7 @@ class LevelsFound:
     exponents: tuple[ExponentFound, ...] = ()
     sensitivities: tuple[SensitivityFound, ...] = ()
     level_times: tuple[LevelTimes, ...] = ()
+    withheld: tuple[WithheldForce, ...] = ()
     family: str | None = None
     adaptive: bool = False
     published: tuple[PublishedValue, ...] = ()

@@ -11,7 +11,7 @@ from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study import Study
 from study_app.protocol.trials.method import Answer, TrackSetting
 from study_app.protocol.trials.presentation import arrangement_of
-from study_app.protocol.trials.stimuli import DELAY, Stimulus
+from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus
 
 TRACK: Final = ["participant", "session", "block", "code"]
 """What one track is in the rows of `tracks`."""
@@ -129,6 +129,8 @@ def _level_delivered(stimulus: Stimulus, standard: float | None, comparison: flo
         return stimulus.level_between(standard, comparison + late_ms)
     if pd.isna(value):
         return pd.NA
+    if stimulus.vary == FORCE_DELAY and standard is not None and not pd.isna(of_standard):
+        return stimulus.level_between(standard, standard + float(value) - float(of_standard))
     return stimulus.level_between(standard if pd.isna(of_standard) else float(of_standard), float(value))
 
 

@@ -30,10 +30,10 @@ from study_app.workers.executors import Workers
 def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, to: Path | None) -> None:
     """Recover planted thresholds: by the methods and the analysis alone, and through the whole program.
 
-    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness) many studies of ten equal observers
-    choose levels and are analysed; in magnitude estimation an exponent is planted. Then three participants are
-    rehearsed with servo, store, unblinding and analysis. Every value is printed with its limit. Ends with exit code 3
-    if one exceeds it.
+    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) many studies of ten equal
+    observers choose levels and are analysed; in magnitude estimation an exponent is planted. Then three participants
+    are rehearsed with servo, store, unblinding and analysis. Every value is printed with its limit. Ends with exit
+    code 3 if one exceeds it.
     """
     from study_app.protocol.load import load
     from study_app.store.output_files import write_files

@@ -180,11 +180,11 @@ def equal_conditions(parts: Draft) -> Iterator[Fault]:
     for name, block in parts.blocks.items():
         presented = {one: parts.conditions[one] for one in block.conditions if one in parts.conditions}
         delays = compared(list(presented.values())) == "delays"  # which the analysis pools
-        first: dict[tuple[tuple[str, ...], float, str], str] = {}
+        first: dict[tuple[Any, ...], str] = {}
         for index, condition in enumerate(() if delays and block.replicates else block.conditions):
             if (one := presented.get(condition)) is None:
                 continue
-            earlier = first.setdefault((one.liquid_ids, one.delay_ms, one.ball), condition)
+            earlier = first.setdefault((one.liquid_ids, one.delay_ms, one.ball, one.link()), condition)
             if earlier != condition:
                 message = f'"{condition}" presents the same as "{earlier}"'
                 hint = "change it, or use repetitions" + (", or write replicates = true" if delays else "")

@@ -20,7 +20,7 @@ from study_app.protocol.source.problems import Fault, did_you_mean
 from study_app.protocol.table import Table
 from study_app.protocol.trials.kinds import DESIGN_KINDS, METHOD_KINDS
 from study_app.protocol.trials.psychometric import rises
-from study_app.protocol.trials.stimuli import DELAY, MOST_DELAY_MS, Stimulus
+from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus
 from study_app.protocol.trials.tracks import (
     condition_of,
     design_of,
@@ -138,7 +138,7 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
         return
     condition = condition_of(protocol, stimulus)
     liquids = protocol.conditions[condition].liquid_ids
-    if stimulus.vary == DELAY:
+    if stimulus.vary in OF_CONDITION:
         return
     if len(liquids) > 1:
         yield Fault(
@@ -158,9 +158,9 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
             quantity(stimulus.vary)
         except KeyError:
             message = f"{stimulus.vary} does not belong to a liquid: it holds for the whole session"
-            yield Fault((*place, "vary"), message, "a number of the liquid, or delay_ms")
+            yield Fault((*place, "vary"), message, f"a number of the liquid, or {', '.join(OF_CONDITION)}")
         except StudyError:
-            known = {DELAY, *number_names(protocol.scene_for(condition))}
+            known = {*OF_CONDITION, *number_names(protocol.scene_for(condition))}
             message = f'there is no number "{stimulus.vary}" in condition "{condition}"'
             yield Fault((*place, "vary"), message, did_you_mean(stimulus.vary, known))
 
@@ -187,8 +187,8 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
     for standard in standards_of(protocol, block):
         for level in (levels[-1], levels[0]):
             value = stimulus.comparison(standard, level)
-            if stimulus.vary == DELAY and not 0 <= value <= MOST_DELAY_MS:
-                yield _delayed(block, stimulus, standard, level)
+            if stimulus.vary in OF_CONDITION and not 0 <= value <= OF_CONDITION[stimulus.vary]:
+                yield _beyond(block, stimulus, standard, level)
                 return
             if (fault := _presented(protocol, stimulus, value)) is not None:
                 what = f"standard {standard:g} at level {level:g} gives" if standard is not None else "the level"
@@ -196,21 +196,23 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
                 return
 
 
-def _delayed(block: Block, stimulus: Stimulus, standard: float | None, level: float) -> Fault:
-    """Return that a visual delay is beyond what can be presented."""
+def _beyond(block: Block, stimulus: Stimulus, standard: float | None, level: float) -> Fault:
+    """Return that a number of the condition, such as a visual delay, is beyond what can be presented."""
     place, value = ("stimuli", str(block.stimulus), "levels"), stimulus.comparison(standard, level)
-    permitted = f"at most {MOST_DELAY_MS:g}" if value > 0 else "no less than 0"
+    name, limit = stimulus.vary, OF_CONDITION[stimulus.vary]
+    unit = " ms" if name.endswith("_ms") else ""
+    permitted = f"at most {limit:g}" if value > 0 else "no less than 0"
     if standard is None or stimulus.level_kind != "difference":
-        return Fault(place, f"level {level:g} gives {value:g} ms; delay_ms may be {permitted}", f"{permitted} ms")
+        return Fault(place, f"level {level:g} gives {value:g}{unit}; {name} may be {permitted}", f"{permitted}{unit}")
     above = "above" if stimulus.direction == "up" else "below"
-    most = MOST_DELAY_MS - standard if stimulus.direction == "up" else standard
-    message = f"{level:g} ms {above} a standard of {standard:g} is {value:g}; delay_ms may be {permitted}"
+    most = limit - standard if stimulus.direction == "up" else standard
+    message = f"{level:g}{unit} {above} a standard of {standard:g} is {value:g}; {name} may be {permitted}"
     return Fault(place, message, f"at most {most:g}")
 
 
 def _presented(protocol: Protocol, stimulus: Stimulus, value: float) -> str | None:
     """Return why a value of the varied number cannot be presented; None if it can."""
-    if stimulus.vary == DELAY:
+    if stimulus.vary in OF_CONDITION:
         return None
     try:
         override(protocol.scene_for(condition_of(protocol, stimulus)), stimulus.vary, value)

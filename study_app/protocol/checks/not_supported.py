@@ -1,4 +1,4 @@
-"""What format 2 describes and this version does not support yet: each key or value is a fault of its own."""
+"""What format 2 describes and this version does not support yet: each value is a fault of its own."""
 
 from __future__ import annotations
 
@@ -8,17 +8,13 @@ from typing import Any, Final
 from study_app.protocol.source.document import entries
 from study_app.protocol.source.problems import Fault
 
-KEYS: Final = (*(f"conditions.*.force_{name}" for name in ("delay_ms", "jitter_ms", "loss")),)
 METHODS: Final = ("adjustment",)
 DESIGNS: Final = ("adjustment",)
 METHOD: Final = 'method = "questplus"'
 
 
 def not_supported(document: Mapping[str, Any]) -> Iterator[Fault]:
-    """Yield a fault for every key and kind of a later version."""
-    for pattern in KEYS:
-        for path, _ in entries(document, pattern):
-            yield Fault(path, "is not supported yet", "omit it")
+    """Yield a fault for every kind of a later version."""
     for section, key, kinds in (("methods", "method", METHODS), ("designs", "design", DESIGNS)):
         hint = METHOD if section == "methods" else "another design"
         tables = document.get(section, {})

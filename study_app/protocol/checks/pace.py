@@ -20,7 +20,7 @@ from study_app.protocol.checks.estimator_response import fastest_hz, passed_shar
 from study_app.protocol.model import Follow, Protocol, Reach
 from study_app.protocol.quantities import quantity
 from study_app.protocol.source.problems import Fault
-from study_app.protocol.trials.stimuli import DELAY, Stimulus
+from study_app.protocol.trials.stimuli import DELAY, OF_LINK, Stimulus
 from study_app.protocol.trials.tracks import condition_of, method_of, standards_of, stimulus_of
 
 FASTER: Final = 1.2
@@ -93,7 +93,10 @@ def ends(protocol: Protocol, block: Block) -> Iterator[tuple[float | None, float
     asked = method_of(protocol, block).asked(stimulus)
     scene = protocol.scene_for(condition_of(protocol, stimulus))
     for standard, level in product(standards_of(protocol, block), (max(asked), min(asked))):
-        yield standard, level, override(scene, stimulus.vary, stimulus.comparison(standard, level))
+        varied = scene
+        if stimulus.vary not in OF_LINK:
+            varied = override(scene, stimulus.vary, stimulus.comparison(standard, level))
+        yield standard, level, varied
 
 
 def highest_damping(protocol: Protocol, block: Block) -> float:
@@ -124,7 +127,10 @@ def _clipped_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
         return
     unit = f" {quantity(stimulus.vary).unit}".rstrip()
     for standard, level, scene in ends(protocol, block):
-        for message, hint in _clipped(scene, task, f"{stimulus.comparison(standard, level):g}{unit}"):
+        what = f"{stimulus.comparison(standard, level):g}{unit}"
+        if stimulus.vary in OF_LINK:
+            what = f'"{condition_of(protocol, stimulus)}"'
+        for message, hint in _clipped(scene, task, what):
             yield Fault(("stimuli", str(block.stimulus), "levels"), message, hint)
             return
 

@@ -38,6 +38,8 @@ class Felt:
         Root mean square of the change of the force from one tick to the next [N].
     delay_s
         Mean age of what was drawn, when it was drawn [s].
+    force_delay_s
+        How late the force was sent [s]; 0 in studies that do not delay it.
     """
 
     force_mean_n: float
@@ -46,6 +48,7 @@ class Felt:
     push_share: float
     roughness_n: float
     delay_s: float
+    force_delay_s: float = 0.0
 
 
 NOTHING_FELT = Felt(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

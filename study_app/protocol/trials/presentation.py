@@ -5,18 +5,41 @@ from __future__ import annotations
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import Protocol
+from study_app.protocol.model import Condition, Protocol
+from study_app.protocol.streams import stream
 from study_app.protocol.trials.design import Design
-from study_app.protocol.trials.stimuli import DELAY, Stimulated
+from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated
 from study_app.protocol.trials.tracks import standards_of, stimulus_of
 
 
-def scene_of(protocol: Protocol, presented: Stimulated) -> Scene:
-    """Return what is felt."""
+def scene_of(protocol: Protocol, presented: Stimulated, link_seed: int = 0) -> Scene:
+    """Return what is felt; ``link_seed`` is that of jitter and loss of the force."""
     scene = protocol.scene_for(presented.condition)
-    if presented.vary in {None, DELAY}:
+    link = presented_condition(protocol, presented).link(link_seed)
+    if link.acts:
+        scene = Scene.model_validate(scene.model_copy(update={"link": link}))
+    if presented.vary is None or presented.vary in OF_CONDITION:
         return scene
-    return override(scene, str(presented.vary), presented.value)
+    return override(scene, presented.vary, presented.value)
+
+
+def presented_condition(protocol: Protocol, presented: Stimulated) -> Condition:
+    """Return the presented condition, with its varied number if that is one of its force link."""
+    condition = protocol.conditions[presented.condition]
+    varied = {presented.vary: presented.value} if presented.vary in OF_LINK else {}
+    return condition.model_copy(update=varied)
+
+
+def delays_force(protocol: Protocol) -> bool:
+    """Return whether a study sends any force late, with jitter or with loss."""
+    varied = any(stimulus.vary in OF_LINK for stimulus in protocol.stimuli.values())
+    return varied or any(condition.link().acts for condition in protocol.conditions.values())
+
+
+def link_seed(schedule_seed: int, participant: str, trial: int, attempt: int, interval: int | None) -> int:
+    """Return the seed of jitter and loss of the force in one attempt at a trial, or in one of its intervals."""
+    draw = stream(schedule_seed, f"force link/{participant}/{trial}/{attempt}/{interval or 1}")
+    return int(draw.random() * 2**32)
 
 
 def delay_s_of(protocol: Protocol, presented: Stimulated) -> float:

@@ -9,14 +9,23 @@ from typing import Annotated, Final, Literal, Self, TypeAlias
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from study_app.haptics.model import force_link
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id
 
 LevelKind: TypeAlias = Literal["weber", "difference", "value"]
 
 DELAY: Final = "delay_ms"
-"""The one varied number that belongs to the condition, not to its liquid."""
+FORCE_DELAY: Final = "force_delay_ms"
+DELAYS: Final = (DELAY, FORCE_DELAY)
 MOST_DELAY_MS: Final = 1000
+OF_LINK: Final = {
+    FORCE_DELAY: force_link.MOST_DELAY_MS,
+    "force_jitter_ms": force_link.MOST_JITTER_MS,
+    "force_loss": force_link.MOST_LOSS,
+}
+OF_CONDITION: Final = {DELAY: MOST_DELAY_MS, **OF_LINK}
+"""The varied numbers that belong to the condition, not to its liquid, and the most that each may be."""
 CONSTANT_LEVELS: Final = 7
 LEVELS_MOST: Final = 201
 
@@ -29,7 +38,9 @@ class Stimulus(Table):
     """
 
     condition: Id | None = Field(default=None, description="The condition whose number is varied; default: the only.")
-    vary: str = Field(max_length=60, description="The number that is varied, as in simulate --set, or delay_ms.")
+    vary: str = Field(
+        max_length=60, description=f"The number that is varied, as in simulate --set, or {', '.join(OF_CONDITION)}."
+    )
     level: LevelKind | None = Field(
         default=None, description="What a level is; default: a difference for a time (…_ms), else a Weber fraction."
     )

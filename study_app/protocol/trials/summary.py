@@ -11,7 +11,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import precision_rows
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
-from study_app.protocol.trials.stimuli import DELAY
+from study_app.protocol.trials.stimuli import DELAY, OF_LINK
 from study_app.protocol.trials.tasks.follow import Follow
 from study_app.protocol.trials.tracks import (
     condition_of,
@@ -60,6 +60,8 @@ def design_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
     if isinstance(task, Follow) and stimulus.vary != DELAY:
         pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
         scene = protocol.scene_for(condition_of(protocol, stimulus))
-        felt_n = [steady(override(scene, stimulus.vary, one), pace_mps).drag_n for one in (*standards, *compared)]
+        values = (*standards, *compared)
+        scenes = [scene] if stimulus.vary in OF_LINK else [override(scene, stimulus.vary, one) for one in values]
+        felt_n = [steady(one, pace_mps).drag_n for one in scenes]
         yield "Force at the pace", f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s"
     yield from precision_rows(protocol, block)

@@ -10,7 +10,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.kinds import default_design, default_method
 from study_app.protocol.trials.method import Method
-from study_app.protocol.trials.stimuli import DELAY, Stimulus
+from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +81,8 @@ def present_value(protocol: Protocol, stimulus: Stimulus) -> float:
     """
     name = condition_of(protocol, stimulus)
     condition = protocol.conditions[name]
-    if stimulus.vary == DELAY:
-        return condition.delay_ms
+    if stimulus.vary in OF_CONDITION:
+        return float(getattr(condition, stimulus.vary))
     return value_of(protocol.scene_for(name), stimulus.vary)
 
 

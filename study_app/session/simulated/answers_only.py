@@ -19,7 +19,7 @@ from study_app.protocol.forms.simulated_observer import NOTHING_FELT, Felt
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Explore, Follow, Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.trials.stimuli import DELAY, Stimulated
+from study_app.protocol.trials.stimuli import DELAYS, Stimulated
 from study_app.protocol.trials.task import AnyTask
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
@@ -137,7 +137,7 @@ class _Answering(SimulatedParticipant):
         """Take what a trial presents: a varied number exactly as it was requested, a condition as it was felt."""
         block = self._state.trial.block
         if presented.vary is not None:
-            sensed = presented.value / 1000 if presented.vary == DELAY else presented.value
+            sensed = presented.value / 1000 if presented.vary in DELAYS else presented.value
             self._sensed_in.setdefault(trial, []).append(sensed)
             return
         felt = self._feelings[block, presented.condition]

@@ -22,7 +22,7 @@ from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.question import ItemView, plain_number
 from study_app.protocol.questions.rating import RatingView
 from study_app.protocol.trials.design import Design
-from study_app.protocol.trials.stimuli import DELAY
+from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK
 from study_app.protocol.trials.tracks import design_of, stimulus_of
 
 Draw = Callable[[], float]
@@ -71,23 +71,31 @@ OBSERVER: Final = Observer()
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What an observer attends to in a block: delays or resistances, and whether the smaller one is asked for."""
+    """What an observer attends to in a block, and whether the smaller one is asked for.
+
+    These are delays, or resistances; of a force that is sent with jitter or loss how rough it is.
+    """
 
     delays: bool
     smallest: bool
     observer: Observer
+    vary: str | None = None
 
     @classmethod
     def of(cls, protocol: Protocol, block: Block, observer: Observer) -> Comparison:
         """Return what the question of a block is about."""
         if block.stimulus is not None:
             stimulus = stimulus_of(protocol, block)
-            return cls(stimulus.vary == DELAY, stimulus.direction == "down", observer)
+            return cls(stimulus.vary in DELAYS, stimulus.direction == "down", observer, stimulus.vary)
         delays = {protocol.conditions[name].delay_ms for name in block.conditions}
         return cls(len(delays) > 1, smallest=False, observer=observer)
 
     def sensed(self, felt: Felt) -> float:
-        """Return what is attended to: a delay [s], or a resistance [N·s/m]."""
+        """Return what is attended to: a delay [s], a roughness [N], or a resistance [N·s/m]."""
+        if self.vary == FORCE_DELAY:
+            return felt.force_delay_s
+        if self.vary in OF_LINK:
+            return felt.roughness_n
         return felt.delay_s if self.delays else felt.force_mean_n / max(felt.speed_rms_mps, LEAST_SPEED_MPS)
 
     def noisy(self, sensed: float, draw: Draw) -> float:

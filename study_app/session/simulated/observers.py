@@ -18,9 +18,11 @@ from study_app.protocol.forms.show_if import Value, shown
 from study_app.protocol.forms.simulated_observer import Felt, Rater, judgements
 from study_app.protocol.model import Explore, Follow, Reach
 from study_app.protocol.trials.task import AnyTask
+from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, ItemView, QuestionnairePage, TextPage
 from study_app.session.simulated.exploration import exploration
 from study_app.session.trial import TankView
+from study_app.store.tables.delivered import LONGEST_S
 
 Draw = Callable[[], float]
 
@@ -40,11 +42,16 @@ def reading_s(page: TextPage) -> float:
 
 @dataclass(slots=True)
 class Senses:
-    """What reached hand and eyes in one trial; ``scale`` is scene metres per hand metre."""
+    """What reached hand and eyes in one trial; ``scale`` is scene metres per hand metre.
+
+    ``period_s`` is the time between two ticks [s] in studies that delay the force, else None.
+    """
 
     scale: float
+    period_s: float | None = None
     forces_n: list[Any] = field(default_factory=list)
     velocities_mps: list[Any] = field(default_factory=list)
+    model_n: list[Any] = field(default_factory=list)
     ages_s: list[float] = field(default_factory=list)
 
     def feel(self, samples: Any) -> None:
@@ -52,6 +59,8 @@ class Senses:
         wet = samples[samples["scene"] != 0]
         self.forces_n.append(wet["device_force_n"])
         self.velocities_mps.append(wet["velocity_mps"])
+        if self.period_s is not None:
+            self.model_n.append(wet["force_n"])
 
     def see(self, painted_ns: int, view: TankView) -> None:
         """Take a frame that was seen."""
@@ -72,7 +81,15 @@ class Senses:
             push_share=float(power_w[power_w > 0].sum()) / effort_w if effort_w > 0 else 0.0,
             roughness_n=math.sqrt(_mean(changes_n**2)),
             delay_s=_mean(np.asarray(self.ages_s)),
+            force_delay_s=self._force_delay_s(force_n),
         )
+
+    def _force_delay_s(self, force_n: Any) -> float:
+        """Return how late the force was sent [s]."""
+        if self.period_s is None or not self.model_n:
+            return 0.0
+        rows = lag(force_n, np.concatenate(self.model_n), round(LONGEST_S / self.period_s))
+        return 0.0 if rows is None else max(rows * self.period_s, 0.0)
 
 
 class Explorer:

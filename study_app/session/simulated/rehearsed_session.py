@@ -17,6 +17,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.forms.simulated_observer import NOTHING_FELT, Felt
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, stream
+from study_app.protocol.trials.presentation import delays_force
 from study_app.session.pages import (
     DesignPage,
     FeedbackPage,
@@ -97,6 +98,7 @@ class RehearsedSession(SimulatedParticipant):
         self._felt_in: dict[int, tuple[Felt, ...]] = {}
         self._touch = rig.servo.telemetry.reader()
         self._next_frame_ns = 0
+        self._period_s = 1 / study.device.rate_hz if delays_force(study) else None
         self._paint: Draw = self._stream("screen")
         ports = Ports(rig.servo, store, self._present, self._now_s, store.recorder)
         self._runner = Runner(study, schedule, store.key.codes, ports, study.study.languages[0], start, store.key.nonce)
@@ -160,7 +162,7 @@ class RehearsedSession(SimulatedParticipant):
         named = str(page.trial) if interval is None else f"{page.trial}/{interval.number}"
         arm, draw = self._hand, self._stream(f"{named}/behaviour")
         self._paint = self._stream(f"{named}/screen")
-        senses = Senses(self._study.scene.scale)
+        senses = Senses(self._study.scene.scale, self._period_s)
         self._touch.read()
         self._next_frame_ns = self.rig.servo.now_ns()
         hand = hand_for(page.task, arm, draw, self._now_s())

@@ -52,7 +52,7 @@ from study_app.session.transitions.steps import (
     start_trial,
     which,
 )
-from study_app.store.tables.delivered import missed
+from study_app.store.tables.delivered import delay_error_ms, missed
 
 STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK, Phase.PAUSED}
 
@@ -100,9 +100,10 @@ def end_task(state: SessionState, event: TaskDone) -> Result:
     done: Commands = (StopTrial(), Rest())
     measured = {"outcome": event.outcome, **event.summary}
     if (due := state.due) is not None and (design := state.design) is not None:
-        state = replace(state, errors_ms=(*state.errors_ms, event.summary.get("delay_error_mean_ms")))
-        holds = design.arrangements[due.arrangement]
-        reasons = (*event.invalid, *missed(state.plan.protocol.limits, due, holds, state.errors_ms))
+        error_ms = delay_error_ms(due.intervals[state.interval - 1], event.summary)
+        state = replace(state, errors_ms=(*state.errors_ms, error_ms))
+        holds, protocol = design.arrangements[due.arrangement], state.plan.protocol
+        reasons = (*event.invalid, *missed(protocol.limits, due, holds, state.errors_ms, protocol.device.rate_hz))
         invalid = {"invalid": reasons} if reasons else {}
         done = (*done, Write("interval_ended", {**which(state), "interval": state.interval, **measured, **invalid}))
         if reasons:

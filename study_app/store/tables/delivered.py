@@ -6,7 +6,7 @@ recordings have them, so that both compute the same.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
@@ -16,10 +16,11 @@ from study_app.haptics.model.layout import FORCE_STEP_N, LIMITER_GLITCH, LIMITER
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.due import Due
 from study_app.protocol.trials.limits import Limits
-from study_app.protocol.trials.stimuli import DELAY, Stimulated
+from study_app.protocol.trials.presentation import presented_condition
+from study_app.protocol.trials.stimuli import DELAY, DELAYS, FORCE_DELAY, OF_CONDITION, Stimulated
 from study_app.protocol.trials.task import AnyTask
 from study_app.protocol.trials.tasks.follow import Follow
-from study_app.psychophysics.delivery import at, damping, difference, motion, share
+from study_app.psychophysics.delivery import Times, Vectors, at, damping, difference, lag, motion, share
 
 FORCES: Final = ("device_force_n", "force_n")
 """What was sent to the hand, and what the force model asked for."""
@@ -27,6 +28,9 @@ DAMPING: Final = "damping_nspm"
 SETTLED_S: Final = 0.2
 """A task without a lead is judged from so long after its force has faded in [s]."""
 
+
+LONGEST_S: Final = 0.26
+"""The longest lag of a force that is looked for: the longest delay with the longest jitter, and a little more [s]."""
 
 JUDGED: Final = np.dtype(
     [(name, SAMPLE[name]) for name in ("time_ns", "position_m", "force_n", "device_force_n", "limiters")]
@@ -78,14 +82,25 @@ def delivered(protocol: Protocol, presented: Stimulated, task: AnyTask, samples:
     samples = _believed(samples)
     times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9
     fade_s = protocol.scene.fade_s
-    from_s = max(task.lead_s, fade_s) if isinstance(task, Follow) else fade_s + SETTLED_S
-    moved = motion(times_s, samples["position_m"], 1 / protocol.device.rate_hz).after(from_s)
+    period_s, link = 1 / protocol.device.rate_hz, presented_condition(protocol, presented).link()
+    faded_s = fade_s + link.delay_s + link.jitter_s
+    from_s = max(task.lead_s, faded_s) if isinstance(task, Follow) else faded_s + SETTLED_S
+    moved = motion(times_s, samples["position_m"], period_s).after(from_s)
     first = int(np.searchsorted(times_s, from_s))
-    sent_n, model_n = (np.rint(samples[name][first:] / FORCE_STEP_N) * FORCE_STEP_N for name in FORCES)
-    fitted = damping(at(moved.times_s, times_s[first:], sent_n), moved) if len(moved.times_s) else None
+    sent_n, model_n = (np.rint(samples[name] / FORCE_STEP_N) * FORCE_STEP_N for name in FORCES)
+    lag_s = None
+    if link.acts or presented.vary == FORCE_DELAY:
+        lag_s = _lag_s(times_s, sent_n, model_n, from_s, period_s)
+    late = max(round((lag_s or 0.0) / period_s), 0)
+    kept = len(samples) - late
+    sent_n, model_n = sent_n[first + late :], model_n[first:kept]
+    prompt = moved.after(from_s, times_s[kept - 1]) if late and kept > 0 else moved
+    fitted = damping(at(prompt.times_s, times_s[first:kept], sent_n), prompt) if len(prompt.times_s) else None
     value = presented.value if presented.vary not in {None, DELAY} else None
     if varies_damping(presented):
         value = None if fitted is None else fitted[0]
+    if presented.vary == FORCE_DELAY:
+        value = None if lag_s is None else 1000 * lag_s
     return Delivered(
         value_delivered=value,
         force_share=share(sent_n, model_n),
@@ -95,10 +110,29 @@ def delivered(protocol: Protocol, presented: Stimulated, task: AnyTask, samples:
     )
 
 
+def _lag_s(times_s: Times, sent_n: Vectors, model_n: Vectors, from_s: float, period_s: float) -> float | None:
+    """Return how late the force was sent [s], from a time on [s]; None without force."""
+    most = round(min(LONGEST_S, from_s) / period_s)
+    even_s = np.arange(from_s - most * period_s, times_s[-1] if len(times_s) else 0.0, period_s)
+    if len(even_s) == 0:
+        return None
+    rows = lag(at(even_s, times_s, sent_n), at(even_s, times_s, model_n), most)
+    return None if rows is None else rows * period_s
+
+
 def _believed(samples: Any) -> Any:
     """Return samples without the positions that were refused."""
     glitches = samples["limiters"] & LIMITER_GLITCH != 0
     return samples[~glitches] if glitches.any() else samples
+
+
+def delay_error_ms(presented: Stimulated, summary: Mapping[str, Any]) -> float | None:
+    """Return by how much an interval's varied delay was missed [ms], by what was measured of it; None if unknown."""
+    if presented.vary != FORCE_DELAY:
+        found: float | None = summary.get("delay_error_mean_ms")
+        return found
+    value = summary.get("value_delivered")
+    return None if value is None else value - presented.value
 
 
 def varies_damping(presented: Stimulated) -> bool:
@@ -109,20 +143,22 @@ def varies_damping(presented: Stimulated) -> bool:
 def undelivered(limits: Limits, presented: Stimulated, task: AnyTask, found: Delivered) -> Iterator[str]:
     """Yield the keys of the file's limits that an interval breaks: reasons without a number."""
     most = limits.level_error_percent
-    if presented.vary not in {None, DELAY} and most is not None:
+    if presented.vary is not None and presented.vary not in OF_CONDITION and most is not None:
         measured = found.value_delivered if varies_damping(presented) else found.force_share
         asked = presented.value if varies_damping(presented) else 1.0
         if abs((measured or 0.0) - asked) > abs(asked) * most / 100:  # nothing was delivered to a hand at rest
             yield "level_error_percent"
-        if found.clipped:
-            yield "force_limit_n"
+    if presented.vary not in {None, DELAY} and most is not None and found.clipped:
+        yield "force_limit_n"
     if isinstance(task, Follow) and limits.pace_error_percent is not None:
         pace = task.rms_speed_mps
         if abs(found.pace_mps - pace) > pace * limits.pace_error_percent / 100:
             yield "pace_error_percent"
 
 
-def missed(limits: Limits, due: Due, holds: Sequence[bool], errors_ms: Sequence[float | None]) -> Iterator[str]:
+def missed(
+    limits: Limits, due: Due, holds: Sequence[bool], errors_ms: Sequence[float | None], rate_hz: float
+) -> Iterator[str]:
     """Yield the key of the limit that a whole trial breaks: the delays of its intervals do not differ as requested.
 
     Parameters
@@ -134,10 +170,14 @@ def missed(limits: Limits, due: Due, holds: Sequence[bool], errors_ms: Sequence[
     holds : sequence of bool
         Its arrangement: of each interval whether it presented the comparison.
     errors_ms : sequence of float or None
-        Of each interval the mean error of the visual delay [ms].
+        Of each interval the error of the visual delay, or of that of the force [ms].
+    rate_hz : float
+        Ticks per second: the delay of a force may be wrong by one tick more.
     """
-    if limits.level_error_ms is None or due.intervals[0].vary != DELAY or len(errors_ms) < len(holds):
+    vary = due.intervals[0].vary
+    if limits.level_error_ms is None or vary not in DELAYS or len(errors_ms) < len(holds):
         return
     missed_ms = difference(errors_ms, holds)
-    if missed_ms is not None and abs(missed_ms) > limits.level_error_ms:
+    tick_ms = 1000 / rate_hz if vary == FORCE_DELAY else 0.0
+    if missed_ms is not None and abs(missed_ms) > limits.level_error_ms + tick_ms:
         yield "level_error_ms"

@@ -24,7 +24,7 @@ from study_app.protocol.trials.due import Due, next_level
 from study_app.protocol.trials.keyed import Key, draw_secret
 from study_app.protocol.trials.method import Heard
 from study_app.protocol.trials.presentation import arrangement_text
-from study_app.protocol.trials.stimuli import DELAY
+from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import design_of, method_of, stimulus_of
 from study_app.session.simulated.design_observer import Comparison
 from study_app.validation.thresholds.planted import Planted
@@ -146,4 +146,4 @@ def keyed_draw(key: Key, person: str, trial: int) -> Any:
 def _sensed(due: Due) -> Iterator[float]:
     """Yield what is presented in each interval: a delay [s], or a number of the liquid."""
     for interval in due.intervals:
-        yield interval.value / 1000 if interval.vary == DELAY else interval.value
+        yield interval.value / 1000 if interval.vary in DELAYS else interval.value

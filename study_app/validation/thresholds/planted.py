@@ -7,7 +7,7 @@ from typing import Final
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.stimuli import DELAY
+from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import standards_of, stimulus_of
 from study_app.session.simulated.design_observer import OBSERVER, Observer
 
@@ -15,9 +15,11 @@ SHIPPED: Final[dict[str, Observer]] = {
     "viscosityjnd": OBSERVER,
     "delaydetect": Observer(delay_jnd_s=0.045),
     "delayjnd": OBSERVER,
+    "forcedelay": Observer(delay_jnd_s=0.015),
 }
 """The shipped studies with thresholds. Planted are a Weber fraction of 0.24 at 75 % correct, which is 0.19 at 71 %
-(Jones, Hunter & Lafontaine 1997), 45 ms (Vogels 2004), and 25 ms at every standard (below 33 ms: Ellis et al. 1999)."""
+(Jones, Hunter & Lafontaine 1997), 45 ms (Vogels 2004), 25 ms at every standard (below 33 ms: Ellis et al. 1999),
+and 15 ms of a force (Rank et al. 2010)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +46,7 @@ class Planted:
     @property
     def threshold(self) -> float:
         """The threshold, as a level: a Weber fraction or a difference [ms]."""
-        if stimulus_of(self.protocol, self.block).vary == DELAY:
+        if stimulus_of(self.protocol, self.block).vary in DELAYS:
             return 1000 * self.observer.delay_jnd_s
         return self.observer.weber_fraction
 
@@ -58,7 +60,7 @@ class Planted:
         """The slope of ln JND over ln standard: 1 by Weber's law, 0 where the JND is constant; None of one standard."""
         if len(self.standards) < 2:
             return None
-        return 0.0 if stimulus_of(self.protocol, self.block).vary == DELAY else 1.0
+        return 0.0 if stimulus_of(self.protocol, self.block).vary in DELAYS else 1.0
 
 
 def planted(name: str, protocol: Protocol) -> Planted:

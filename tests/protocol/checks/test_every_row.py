@@ -99,7 +99,7 @@ def study(*edits: tuple[str, str]) -> Protocol:
             "stimuli.damping.vary",
             'vary = "rate_hz"',
             "rate_hz does not belong to a liquid: it holds for the whole session",
-            "a number of the liquid, or delay_ms",
+            "a number of the liquid, or delay_ms, force_delay_ms, force_jitter_ms, force_loss",
         ),
         (
             [('condition = "damper"', 'condition = "both"')],

@@ -13,7 +13,6 @@ STIMULUS = 'stimulus = "viscosity"'
 @pytest.mark.parametrize(
     ("old", "new", "place"),
     [
-        ("[conditions.oil]", "[conditions.oil]\nforce_delay_ms = 10", "conditions.oil.force_delay_ms"),
         *(
             (
                 'kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 8',

@@ -13,7 +13,7 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.due import Due
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.store.tables.delivered import JUDGED, delivered, judged, missed, undelivered
+from study_app.store.tables.delivered import JUDGED, delay_error_ms, delivered, judged, missed, undelivered
 
 STUDY = """\
 format = 2
@@ -45,6 +45,7 @@ method = "constant"
 DAMPING = Stimulated("damper", "damping_nspm", 8.0)
 VISCOSITY = Stimulated("damper", "viscosity_pa_s", 4.0)
 DELAY = Stimulated("damper", "delay_ms", 50.0)
+FORCE_DELAY = Stimulated("damper", "force_delay_ms", 50.0)
 
 
 @pytest.fixture(scope="module")
@@ -144,8 +145,8 @@ def test_forces_are_judged_as_recordings_hold_them(protocol: Protocol) -> None:
 def test_delays_are_judged_by_the_difference_of_their_errors(
     protocol: Protocol, errors_ms: list[float | None], holds: tuple[bool, ...], broken: list[str]
 ) -> None:
-    assert [*missed(protocol.limits, Due(10.0, 50.0, 0, (DELAY, DELAY)), holds, errors_ms)] == broken
-    assert [*missed(protocol.limits, Due(0.1, 8.0, 0, (DAMPING, DAMPING)), holds, errors_ms)] == []
+    assert [*missed(protocol.limits, Due(10.0, 50.0, 0, (DELAY, DELAY)), holds, errors_ms, 1000.0)] == broken
+    assert [*missed(protocol.limits, Due(0.1, 8.0, 0, (DAMPING, DAMPING)), holds, errors_ms, 1000.0)] == []
 
 
 def test_without_limits_nothing_is_judged(protocol: Protocol) -> None:
@@ -162,5 +163,75 @@ def test_the_end_of_an_interval_of_10_s_costs_at_most_5_ms(protocol: Protocol) -
     for _ in range(20):
         began = time.thread_time()
         delivered(protocol, DAMPING, task, np.frombuffer(b"".join(parts), JUDGED))
+        took_s.append(time.thread_time() - began)
+    assert min(took_s) < 5e-3
+
+
+def late(delay: int, b_nspm: float = 8.0) -> Any:
+    """Return the interval with a force that is sent so many ticks late."""
+    found = samples(b_nspm)
+    found["device_force_n"][delay:] = found["force_n"][: len(found) - delay]
+    found["device_force_n"][:delay] = 0
+    return found
+
+
+@pytest.mark.parametrize("delay", [0, 1, 15, 100, 200, 250])
+@pytest.mark.parametrize("task", ["follow", "stir"])
+def test_the_delay_of_a_force_is_measured(protocol: Protocol, delay: int, task: str) -> None:
+    presented = Stimulated("damper", "force_delay_ms", float(min(delay, 200)))
+    found = delivered(protocol, presented, protocol.tasks[task], judged(late(delay)))
+    assert found.value_delivered == pytest.approx(delay, abs=0.05)
+    assert found.force_share == pytest.approx(1.0, abs=1e-4)  # of the force that belongs to it
+    assert delay_error_ms(presented, found.columns) == pytest.approx(delay - presented.value, abs=0.05)
+    assert reasons(protocol, late(delay), presented, task) == []
+
+
+def test_a_lost_sample_does_not_shift_the_delay_of_a_force(protocol: Protocol) -> None:
+    found = late(30)
+    found["limiters"][2100] = LIMITER_GLITCH
+    found["position_m"][2100] = 1.0
+    whole = np.delete(found, range(2500, 2510))
+    measured = delivered(protocol, FORCE_DELAY, protocol.tasks["follow"], judged(whole))
+    assert measured.value_delivered == pytest.approx(30, abs=0.2)
+
+
+def test_a_damping_is_measured_by_the_motion_that_its_late_force_belongs_to(protocol: Protocol) -> None:
+    """100 ms late, a damper of 8 N·s/m would measure as 6.5 at 1 Hz."""
+    slow = parse(
+        STUDY.replace("[tasks.follow]", '[conditions.late]\nliquid = "damper"\nforce_delay_ms = 100\n[tasks.follow]')
+        .replace("[stimuli.damping]", '[stimuli.damping]\ncondition = "late"')
+        .replace("= 8 }", "= 2 }")
+        .encode(),
+        "late.toml",
+    )
+    presented = Stimulated("late", "damping_nspm", 2.0)
+    found = delivered(slow, presented, slow.tasks["follow"], judged(late(100, 2.0)))
+    assert found.value_delivered == pytest.approx(2.0, rel=1e-3)
+    assert found.force_share == pytest.approx(1.0, rel=1e-4)
+
+
+def test_jitter_and_loss_are_taken_as_requested_and_clipping_still_counts(protocol: Protocol) -> None:
+    presented = Stimulated("damper", "force_loss", 0.3)
+    found = late(3)
+    assert delivered(protocol, presented, protocol.tasks["follow"], judged(found)).value_delivered == 0.3
+    assert reasons(protocol, found, presented) == []
+    found["limiters"][2000] = LIMITER_NORM
+    assert reasons(protocol, found, presented) == ["force_limit_n"]
+
+
+@pytest.mark.parametrize(("errors_ms", "broken"), [([0.0, 2.9], []), ([0.0, -3.1], ["level_error_ms"])])
+def test_the_delay_of_a_force_may_miss_one_tick_more(
+    protocol: Protocol, errors_ms: list[float | None], broken: list[str]
+) -> None:
+    due = Due(50.0, 0.0, 0, (FORCE_DELAY, FORCE_DELAY))
+    assert [*missed(protocol.limits, due, (False, True), errors_ms, 1000.0)] == broken
+
+
+def test_the_delay_of_a_force_costs_at_most_5_ms_at_the_end_of_4_s(protocol: Protocol) -> None:
+    task, taken = protocol.tasks["follow"], judged(late(50))
+    took_s = []
+    for _ in range(20):
+        began = time.thread_time()
+        delivered(protocol, FORCE_DELAY, task, taken)
         took_s.append(time.thread_time() - began)
     assert min(took_s) < 5e-3

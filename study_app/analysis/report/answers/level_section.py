@@ -8,6 +8,7 @@ from typing import Any
 from study_app.analysis.figures.level_figure import level_words, mean_words, summary_words, with_unit
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.report.answers import threshold_section
+from study_app.analysis.report.answers.withheld_section import withheld
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound
 from study_app.analysis.results.words import number
@@ -45,6 +46,7 @@ def section(found: LevelsFound, pictures: Sequence[Picture]) -> Iterator[str]:
         for standard in sorted({one.standard for one in found.answers}, key=lambda one: one or 0.0):
             yield _of_people(found, standard)
     yield from threshold_section.section(found, {one.name: one for one in pictures})
+    yield from withheld(found)
 
 
 def _unit(found: LevelsFound) -> str:
