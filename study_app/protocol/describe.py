@@ -18,8 +18,9 @@ from study_app.protocol.orders.block_orders import block_codes, order_of, orders
 from study_app.protocol.orders.latin_squares import row_count
 from study_app.protocol.questions.question import Context, Question
 from study_app.protocol.trials.limits import Limits
+from study_app.protocol.trials.methods.adjustment import Adjustment
 from study_app.protocol.trials.summary import design_rows
-from study_app.protocol.trials.tracks import design_of
+from study_app.protocol.trials.tracks import design_of, method_of
 
 READING_WORDS_PER_S = 3.0
 PAGE_S = 5.0
@@ -102,6 +103,8 @@ def _block_s(protocol: Protocol, block: Block, language: str) -> float:
         answer_s = CHOICE_S if design.reply == "choice" else ANSWER_S
         answering = answer_s + design.between_s + design.feedback_s * design.shows_feedback(block.phase == "practice")
         task_s = design.intervals * task_s + (design.intervals - 1) * design.pause_s
+        if isinstance(method := method_of(protocol, block) if block.stimulus else None, Adjustment):
+            task_s, answering = task_s + method.most_s / 2, design.between_s
     return order.trials * (task_s + answering) + resting
 
 

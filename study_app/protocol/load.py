@@ -17,7 +17,6 @@ from study_app.haptics.model.scene import Liquid, RateHz, Scene
 from study_app.protocol import formats
 from study_app.protocol.checks.consistency import check
 from study_app.protocol.checks.designs import designs
-from study_app.protocol.checks.not_supported import not_supported
 from study_app.protocol.checks.pace import paced
 from study_app.protocol.checks.returned_energy import returned
 from study_app.protocol.instruments.instrument import with_instruments
@@ -103,10 +102,6 @@ def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Pro
         document, missing = with_instruments(formats.completed(document))
         faults += missing
     broken = [fault.path[:2] for fault in faults]
-    if formats.is_second(document):
-        unsupported = list(not_supported(document))
-        broken += [_of_table(fault.path) for fault in unsupported]
-        faults += unsupported
     if not formats.is_second(document) and not formats.is_later(document):
         newer = list(formats.newer_keys(document))
         broken += [fault.path for fault in newer]
@@ -119,11 +114,6 @@ def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Pro
     protocol = Protocol.model_validate(document, strict=True)
     _raise(name, list(designs(protocol)) or [*paced(protocol, delay_ticks), *returned(protocol)], places)
     return protocol
-
-
-def _of_table(path: Path) -> Path:
-    """Return the place of a whole table whose kind is not supported: its other keys are unknown, too."""
-    return path[:-1] if path[-1] == "kind" else path
 
 
 def _outside(broken: Iterable[Path], faults: Iterable[Fault]) -> list[Fault]:

@@ -67,7 +67,8 @@ class TaskPage:
     """The tank: move the ball. Nothing of the condition is here: how late the tank is drawn is the runner's to know.
 
     ``workspace_m`` holds the full sizes of the tank along x, y, z, centred on the device's middle; ``interval`` is None
-    in a trial without a design.
+    in a trial without a design. ``question`` is what the participant sets an interval to, "" where nothing is set;
+    ``adjusts`` says that this interval is the one, so that the question stands in place of the instruction.
     """
 
     trial: int
@@ -77,6 +78,13 @@ class TaskPage:
     body_radius_m: float
     progress: Progress | None
     interval: Interval | None = None
+    question: str = ""
+    adjusts: bool = False
+
+    @property
+    def said(self) -> str:
+        """What the participant is to do."""
+        return self.question if self.adjusts else self.instruction
 
 
 @dataclass(frozen=True, slots=True)

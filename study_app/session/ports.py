@@ -23,6 +23,7 @@ class ServoPort(Protocol):
     @property
     def worst_gap_s(self) -> float: ...  # noqa: D102
     def load(self, scene: Scene) -> int: ...  # noqa: D102
+    def adjust(self, scene: Scene) -> int: ...  # noqa: D102
     def rest(self) -> None: ...  # noqa: D102
     def stop_force(self) -> None: ...  # noqa: D102
     def fade_in(self) -> None: ...  # noqa: D102

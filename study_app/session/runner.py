@@ -26,10 +26,13 @@ from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.protocol.model import Protocol as Study
 from study_app.protocol.orders.schedule import Schedule
 from study_app.protocol.trials.presentation import link_seed, scene_of
+from study_app.protocol.trials.stimuli import DELAY
+from study_app.session.device_buttons import ANSWERS, CONTINUE, DeviceButtons
 from study_app.session.ports import Ports
 from study_app.session.resume import FIRST, Start
 from study_app.session.tasks import Outcome, TaskView
 from study_app.session.transitions.commands import (
+    Adjust,
     CheckFlushed,
     Command,
     FadeIn,
@@ -52,6 +55,7 @@ from study_app.session.transitions.events import (
     ForceStopped,
     PauseAsked,
     Reconnected,
+    Stepped,
     Submitted,
     TaskDone,
     TimeUp,
@@ -67,8 +71,6 @@ from study_app.session.trial_recording import Recording
 from study_app.store.limits import broken_limits
 from study_app.store.tables.delivered import delivered, undelivered
 
-BUTTON_CONTINUE = 1 << 0
-BUTTONS_ANSWER = (1 << 1, 1 << 2)
 RETRY_S = 1.0  # a disk that took nothing is tried again so often
 
 
@@ -110,7 +112,7 @@ class Runner:
         self._recording = Recording(ports.recorder, ports.servo.rate_hz)
         self._running: RunningTrial | None = None
         self._measured: dict[str, Any] = {}
-        self._buttons = 0
+        self._buttons = DeviceButtons()
         self._page_since_ns = 0
         self._waiting: deque[Event] = deque()
         self._busy = False
@@ -229,6 +231,8 @@ class Runner:
             self._fail(error)
 
     def _take(self, event: Event) -> None:
+        if isinstance(event, Stepped) and (self._running is None or not self._running.adjustable):
+            return  # before its first frame and after its end an interval cannot be adjusted
         if isinstance(event, WriteRetried | EndAsked) and self._state.stall is not None:
             self._write_again(self._state.stall)
             if isinstance(event, WriteRetried):
@@ -302,6 +306,10 @@ class Runner:
                 journal.write_tables()
             case StartTrial():
                 self._running = self._prepared(command)
+            case Adjust(presented, delay_s, fields):
+                other = None if presented.vary == DELAY else scene_of(self._protocol, presented)
+                scene = None if self._running is None else self._running.adjust(other, delay_s)
+                journal.append("stepped", t_s=at_s, waits=False, **fields, scene=scene)
             case ShowPage(page):
                 self._page_since_ns = servo.now_ns()
                 self._ports.present(page)
@@ -327,10 +335,11 @@ class Runner:
         summary, limits, command = running.summary(), self._protocol.limits, running.command
         reasons: tuple[str, ...] = ()
         if command.interval is not None and limits.attempts is not None:
-            found = delivered(self._protocol, command.presented, command.task, running.samples)
+            what = command.presented, command.task
+            found = delivered(self._protocol, *what, running.samples, adjusted=command.adjusts)
             summary |= found.columns
             reasons = (
-                *undelivered(limits, command.presented, command.task, found),
+                *undelivered(limits, *what, found, adjusted=command.adjusts),
                 *broken_limits(summary, limits.model_dump()),
             )
         return TaskDone(self._ports.clock(), outcome, summary, reasons)
@@ -354,17 +363,24 @@ class Runner:
 
     def _hear_buttons(self, samples: Any) -> None:
         """Post what a button going down means; a press from before the present page is no answer to it."""
-        down = np.concatenate(([self._buttons], samples["buttons"]))
-        self._buttons = int(down[-1])
-        pressed = down[1:] & ~down[:-1]
-        if not pressed.any():
-            return
+        pressed = self._buttons.pressed(samples)
         if (pressed & BUTTON_STOP).any():
             self.post(ForceStopped(self._ports.clock(), "device"))
         pressed_since = pressed[samples["time_ns"] >= self._page_since_ns]
-        if (pressed_since & BUTTON_CONTINUE).any() and self._button_goes_on:
+        if self._running is not None and self._running.adjustable:
+            self._set_by_buttons(pressed_since, int(samples["time_ns"][-1]))
+            return
+        self._buttons.forget()
+        if (pressed_since & CONTINUE).any() and self._button_goes_on:
             self.post(Continue(self._ports.clock()))
         self._answer_by_buttons(pressed_since)
+
+    def _set_by_buttons(self, pressed: Any, now_ns: int) -> None:
+        """Adjust with the device's second and third button, and confirm with its first."""
+        if steps := self._buttons.steps(pressed, now_ns):
+            self.post(Stepped(self._ports.clock(), steps))
+        if (pressed & CONTINUE).any():
+            self.post(Submitted(self._ports.clock()))
 
     def _answer_by_buttons(self, pressed: Any) -> None:
         """Answer where there are two answers: the device's second button is the first of them, its third the second."""
@@ -372,8 +388,8 @@ class Runner:
         if state.phase is not Phase.ANSWERING or state.due is None or state.design is None:
             return
         answers = state.design.answers
-        down = [place for place, bit in enumerate(BUTTONS_ANSWER) if (pressed & bit).any()]
-        if len(answers) == len(BUTTONS_ANSWER) and len(down) == 1:
+        down = [place for place, bit in enumerate(ANSWERS) if (pressed & bit).any()]
+        if len(answers) == len(ANSWERS) and len(down) == 1:
             now_s = self._ports.clock()
             self.post(Chosen(now_s, state.design.name, answers[down[0]]))
             self.post(Submitted(now_s))

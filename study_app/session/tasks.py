@@ -95,6 +95,13 @@ class Tracker:
         """End the task because the participant wants to go on; say whether it may end so already."""
         return False
 
+    def finish(self, least_s: float) -> bool:
+        """End a task that the participant ends, if it has lasted for ``least_s``; say whether it may end so already."""
+        if self.done or self._start_ns is None or self._newest_ns - self._start_ns < _nanoseconds(least_s):
+            return False
+        self._finish("complete", self._newest_ns)
+        return True
+
     def at(self, time_ns: int) -> TaskView:
         """Return what the task looked like at ``time_ns``; before it began as at its beginning."""
         start_ns = self._start_ns
@@ -127,14 +134,11 @@ class ExploreTracker(Tracker):
 
     def __init__(self, task: Explore) -> None:
         super().__init__(task.max_s, "complete")
-        self._least_ns = _nanoseconds(task.min_s)
+        self._least_s = task.min_s
 
     def leave(self) -> bool:
         """End the exploration if it has had its least time."""
-        if self.done or self._start_ns is None or self._newest_ns - self._start_ns < self._least_ns:
-            return False
-        self._finish("complete", self._newest_ns)
-        return True
+        return self.finish(self._least_s)
 
 
 class FollowTracker(Tracker):

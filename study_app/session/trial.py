@@ -29,6 +29,8 @@ from study_app.store.tables.delivered import JUDGED, judged
 # delay, and the error of the delay would tell such trials from all others. Two ticks at 1 kHz.
 SETTLED_S = 0.002
 
+LEAST_SET_S = 1.0
+"""A setting takes at least so long after the task's lead: less could not be judged. [choice]"""
 FROZEN_S = 1.0
 """A tick or a frame that does not come for longer ends the attempt: no limit of a study permits more. [choice]"""
 
@@ -85,6 +87,7 @@ class RunningTrial:
         self._hides_ball = hides_ball
         self._taken: list[bytes] = []
         self.command = command
+        self._delay_s = self._drawn_delay_s = command.delay_s
         self._scene = scene
         self._servo = servo
         self._reader = reader
@@ -92,9 +95,7 @@ class RunningTrial:
         self._serial: int | None = None
         self._dropped_before = 0
         self._tracker = track(command.task)
-        self._statistics = TrialStatistics(
-            rate_hz=servo.rate_hz, delay_s=command.delay_s, late_s=late_s, due_ns=servo.now_ns(), paints=paints
-        )
+        self._statistics = TrialStatistics(rate_hz=servo.rate_hz, late_s=late_s, due_ns=servo.now_ns(), paints=paints)
 
     @property
     def task(self) -> TaskView:
@@ -103,7 +104,8 @@ class RunningTrial:
 
     def view(self, now_ns: int) -> TankView:
         """Return what is to be drawn at ``now_ns`` (servo's clock), as late as asked and ``SETTLED_S`` more."""
-        drawn_ns = now_ns - round((self.command.delay_s + SETTLED_S) * 1e9)
+        self._drawn_delay_s = self._delay_s
+        drawn_ns = now_ns - round((self._delay_s + SETTLED_S) * 1e9)
         position_m, shown_ns = self._servo.telemetry.position_at(drawn_ns)
         task = self._tracker.at(shown_ns)
         hidden = self._hides_ball and task.elapsed_s >= self.command.task.lead_s
@@ -121,14 +123,14 @@ class RunningTrial:
             self._serial = self._servo.load(self._scene)
             self._dropped_before = self._reader.dropped
             self._recording.start(self.trial, self.command.attempt, self.command.interval)
-        self._statistics.frame(painted_ns, sample_ns)
+        self._statistics.frame(painted_ns, sample_ns, self._drawn_delay_s)
         self._recording.frame(painted_ns, sample_ns)
 
     def follow(self, samples: Any) -> list[TargetReached]:
         """Take the newest samples, in order (array of ``layout.SAMPLE``); return which targets were reached."""
         if self._serial is None or self._tracker.done:
             return []
-        mine = samples[samples["scene"] == self._serial]
+        mine = samples[samples["scene"] >= self._serial]  # each adjustment adds one
         reached = self._tracker.feed(mine[mine["limiters"] & LIMITER_GLITCH == 0])
         end_ns = self._tracker.end_ns
         mine = mine if end_ns is None else mine[mine["time_ns"] <= end_ns]
@@ -137,9 +139,30 @@ class RunningTrial:
             self._taken.append(judged(mine).tobytes())
         return reached
 
+    @property
+    def adjustable(self) -> bool:
+        """Whether the participant can set what is presented now: since the first frame, until the task is over."""
+        return self.command.adjusts and self._serial is not None and not self._tracker.done
+
+    def adjust(self, scene: Scene | None, delay_s: float) -> int | None:
+        """Present other numbers of the same scene (None: no force depends on what is set), and a delay [s].
+
+        Returns the number of the scene in telemetry from then on; None where it stays what it is.
+
+        Raises
+        ------
+        StudyError
+            The servo cannot go on with these numbers.
+        """
+        self._delay_s = delay_s
+        return None if scene is None else self._servo.adjust(scene)
+
     def leave(self) -> None:
         """End the task because the participant wants to go on, if it may end so already."""
-        self._tracker.leave()
+        if self.command.adjusts:
+            self._tracker.finish(self.command.task.lead_s + LEAST_SET_S)
+        else:
+            self._tracker.leave()
 
     def outcome(self) -> Outcome | None:
         """Return how the task ended, once that was drawn, as late as it may be in this block; None before."""
@@ -147,7 +170,8 @@ class RunningTrial:
         linger_ns = round((self.command.linger_s + SETTLED_S) * 1e9)
         if end_ns is None or self._servo.now_ns() - end_ns < linger_ns:
             return None
-        return self._tracker.outcome
+        by_limit = self.command.adjusts and self._tracker.now().elapsed_s >= self.command.task.limit_s
+        return "timeout" if by_limit else self._tracker.outcome
 
     @property
     def samples(self) -> Any:

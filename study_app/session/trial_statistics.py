@@ -23,8 +23,6 @@ class TrialStatistics:
     ----------
     rate_hz : float
         The servo's nominal rate.
-    delay_s : float
-        The visual delay asked for [s].
     late_s : float
         A frame counts as late if its delay is more than this over the one asked for [s].
     due_ns : int
@@ -33,13 +31,12 @@ class TrialStatistics:
         Whether frames come as long as the trial runs; else its first frame may be the only one.
     """
 
-    def __init__(self, *, rate_hz: float, delay_s: float, late_s: float, due_ns: int, paints: bool = True) -> None:
+    def __init__(self, *, rate_hz: float, late_s: float, due_ns: int, paints: bool = True) -> None:
         self._rate_hz = rate_hz
-        self._delay_s = delay_s
         self._late_s = late_s
         self._fewest = 1 if paints else 2  # frames before the first of them can have stood
         self._times: list[Any] = []
-        self._ages_ns: list[int] = []
+        self._errors_s: list[float] = []
         self._painted_ns = due_ns
         self._first_gap_ns = 0
         self._frame_gap_ns = 0
@@ -74,19 +71,19 @@ class TrialStatistics:
             bits = np.arange(len(LIMITER_NAMES))
             self._limited += ((limiters[:, None] >> bits) & 1).sum(axis=0)
 
-    def frame(self, painted_ns: int, shown_ns: int) -> None:
-        """Take a frame that was painted at one moment and showed another [ns]."""
+    def frame(self, painted_ns: int, shown_ns: int, delay_s: float) -> None:
+        """Take a frame that was painted at one moment and showed another [ns], at the delay then asked for [s]."""
         gap_ns = painted_ns - self._painted_ns
-        if self._ages_ns:
+        if self._errors_s:
             self._frame_gap_ns = max(self._frame_gap_ns, gap_ns)
         else:
             self._first_gap_ns = gap_ns
         self._painted_ns = painted_ns
-        self._ages_ns.append(painted_ns - shown_ns)
+        self._errors_s.append((painted_ns - shown_ns) * 1e-9 - delay_s)
 
     def frame_gap_ns(self, until_ns: int) -> int:
         """Return the longest time that a frame stood, the newest one until a moment [ns]; 0 before the first frame."""
-        return max(self._frame_gap_ns, until_ns - self._painted_ns) if len(self._ages_ns) >= self._fewest else 0
+        return max(self._frame_gap_ns, until_ns - self._painted_ns) if len(self._errors_s) >= self._fewest else 0
 
     def summary(self, *, samples_dropped: int, worst_gap_s: float, until_ns: int) -> dict[str, Any]:
         """Return the measured columns of the trial row, to six decimals; None where nothing was measured.
@@ -148,7 +145,7 @@ class TrialStatistics:
         self._delay_ticks = int(delay_ticks[-1])
 
     def _frames(self, until_ns: int) -> dict[str, Any]:
-        errors_s = np.asarray(self._ages_ns, np.float64) * 1e-9 - self._delay_s
+        errors_s = np.asarray(self._errors_s, np.float64)
         seen = errors_s.size > 0
         return {
             "frames": int(errors_s.size),

@@ -73,6 +73,12 @@ class FakeServo:
         self.scene = len(self.scenes)
         return self.scene
 
+    def adjust(self, scene: Scene) -> int:
+        self._log.append("adjust")
+        self.scenes.append(scene)
+        self.scene = len(self.scenes)
+        return self.scene
+
     def rest(self) -> None:
         self._log.append("rest")
         self.scene = 0

@@ -12,6 +12,7 @@ from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override
 from study_app.protocol.analysis_plan import Published
 from study_app.protocol.blocks import Block
+from study_app.protocol.checks.adjustment import misfits, settings
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.quantities import quantity
@@ -81,6 +82,9 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     if block.break_every is not None and not (order := order_of(protocol, block)).breaks:
         message = f"is {block.break_every}, and the block has {order.trials} trials: no break would come"
         yield Fault((*place, "break_every"), message)
+    if fault := next(misfits(protocol, block), None):
+        yield fault
+        return
     if block.stimulus is None:
         if not design.has_standard:
             yield Fault((*place, "design"), "has one interval and compares nothing", "vary a stimulus")
@@ -194,6 +198,7 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
                 what = f"standard {standard:g} at level {level:g} gives" if standard is not None else "the level"
                 yield Fault(("stimuli", str(block.stimulus), "levels"), f"{what} {value:g}: {fault}")
                 return
+    yield from settings(protocol, block)
 
 
 def _beyond(block: Block, stimulus: Stimulus, standard: float | None, level: float) -> Fault:

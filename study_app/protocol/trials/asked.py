@@ -1,4 +1,7 @@
-"""What a design asks after its last interval: a questionnaire of one item, so that tables take it as any other."""
+"""What a design asks after its last interval: a questionnaire of one item, so that tables take it as any other.
+
+The answer to an adjustment is the number of steps from where it started.
+"""
 
 from __future__ import annotations
 
@@ -35,5 +38,7 @@ def _item(design: Design, text: Localised, languages: Sequence[str]) -> Question
         return Rating(**about, scale=str(getattr(design, "scale", "")))
     if design.reply == "number":
         return Number(**about, least=LEAST)
+    if design.reply == "setting":
+        return Number(**about, whole=True)
     named = {answer: {one: words(one).design_answers[answer] for one in languages} for answer in design.answers}
     return Choice(**about, options=tuple(Option(id=answer, text=said) for answer, said in named.items()))

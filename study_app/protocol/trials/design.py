@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from study_app.psychophysics.detection import Sensitivity
 
 Feedback: TypeAlias = Literal["never", "practice", "always"]
-Reply: TypeAlias = Literal["choice", "rating", "number"]
+Reply: TypeAlias = Literal["choice", "rating", "number", "setting"]
 Arrangement: TypeAlias = tuple[bool, ...]
 """Per interval whether it presents the comparison, in the order of presentation."""
 
@@ -85,6 +85,11 @@ class Design(Table):
     """What `success` counts."""
     adaptive: ClassVar[bool] = True
     """Whether answers can choose the next level; otherwise the method must be "constant"."""
+
+    @property
+    def adjusts(self) -> bool:
+        """Whether the participant sets the level of the last interval while it is presented."""
+        return self.reply == "setting"
 
     @property
     def name(self) -> str:

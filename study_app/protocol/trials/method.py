@@ -95,6 +95,8 @@ class Method(Table):
 
     adaptive: ClassVar[bool] = True
     """Whether answers choose the next level."""
+    adjusts: ClassVar[bool] = False
+    """Whether its levels are those at which settings start, so that the design must be "adjustment"."""
 
     @property
     def name(self) -> str:

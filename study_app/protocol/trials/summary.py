@@ -11,6 +11,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import precision_rows
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
+from study_app.protocol.trials.methods.adjustment import Adjustment
 from study_app.protocol.trials.stimuli import DELAY, OF_LINK
 from study_app.protocol.trials.tasks.follow import Follow
 from study_app.protocol.trials.tracks import (
@@ -52,6 +53,10 @@ def design_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
         "Levels",
         f"{name} {levels[0]:.3g} to {levels[-1]:.3g} ({method.name}{aimed}), {trials} trials{of_each}{tracks}",
     )
+    if isinstance(method, Adjustment):
+        low, high = stimulus.domain
+        steps = round((high - low) / method.step(stimulus))
+        yield "Settings", f"{steps} steps from end to end, started near either, at most {method.most_s:g} s each"
     pairs = product(standards_of(protocol, block), levels)
     compared = [stimulus.comparison(standard, level) for standard, level in pairs]
     unit = quantity(stimulus.vary).unit

@@ -10,6 +10,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.kinds import default_design, default_method
 from study_app.protocol.trials.method import Method
+from study_app.protocol.trials.methods.adjustment import Adjusting, Adjustment
 from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus
 
 
@@ -96,6 +97,14 @@ def method_of(protocol: Protocol, block: Block) -> Method:
     """Return how a block's levels are chosen: a table of the file, or a kind with its defaults."""
     name = str(block.method)
     return protocol.methods[name] if name in protocol.methods else default_method(name)
+
+
+def adjusting_of(protocol: Protocol, block: Block, standard: float | None, start: float) -> Adjusting | None:
+    """Return the setting that starts at a level; None where participants set no level."""
+    method = None if block.stimulus is None else method_of(protocol, block)
+    if not isinstance(method, Adjustment):
+        return None
+    return method.adjusting(stimulus_of(protocol, block), standard, start)
 
 
 def has_correct_answer(design: Design, stimulus: Stimulus | None) -> bool:

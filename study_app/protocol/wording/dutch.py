@@ -58,6 +58,8 @@ DUTCH = Words(
         "yesno": "Hebt u het opgemerkt?",
         "rating": "Hoe sterk was het?",
         "estimation": "Hoe sterk was het? Geef een getal boven 0.",
+        "adjustment": "Stel de tweede in tot beide even sterk zijn.",
+        "adjustment_alone": "Stel het in op de sterkte waarnaar u werd gevraagd.",
     },
     design_answers={
         "first": "De eerste",
@@ -79,6 +81,9 @@ DUTCH = Words(
     number_wanted="Voer een getal boven 0 in.",
     modulus="Laat het getal voor deze {number} zijn.",
     delete_digit="Laatste cijfer wissen",
+    less="Minder",
+    more="Meer",
+    done="Klaar",
     pause_title="Pauze",
     pause_body="Neem de tijd. Alles wat u hebt geantwoord blijft bewaard. Een onderbroken onderdeel begint opnieuw.",
     pause_held_body="Wacht even; de onderzoeker gaat zo verder. Alles wat u hebt geantwoord blijft bewaard.",

@@ -58,6 +58,8 @@ ENGLISH = Words(
         "yesno": "Did you notice it?",
         "rating": "How strong was it?",
         "estimation": "How strong was it? Give a number above 0.",
+        "adjustment": "Adjust the second one until both are equally strong.",
+        "adjustment_alone": "Adjust it until it has the strength that you were asked for.",
     },
     design_answers={
         "first": "First",
@@ -79,6 +81,9 @@ ENGLISH = Words(
     number_wanted="Enter a number above 0.",
     modulus="Let the number for this one be {number}.",
     delete_digit="Delete the last digit",
+    less="Less",
+    more="More",
+    done="Done",
     pause_title="Pause",
     pause_body="Take your time. Everything you have answered is kept. A trial that was under way starts again.",
     pause_held_body="Please wait; the operator will go on. Everything you have answered is kept.",

@@ -58,6 +58,8 @@ FRENCH = Words(
         "yesno": "L'avez-vous remarqué ?",
         "rating": "Quelle était sa force ?",
         "estimation": "Quelle était sa force ? Donnez un nombre supérieur à 0.",
+        "adjustment": "Réglez le deuxième jusqu'à ce que les deux soient aussi forts.",
+        "adjustment_alone": "Réglez-le sur la force qui vous a été demandée.",
     },
     design_answers={
         "first": "Le premier",
@@ -84,6 +86,9 @@ FRENCH = Words(
     number_wanted="Entrez un nombre supérieur à 0.",
     modulus="Le nombre pour celui-ci est {number}.",
     delete_digit="Effacer le dernier chiffre",
+    less="Moins",
+    more="Plus",
+    done="Terminé",
     pause_title="En pause",
     pause_body="Prenez votre temps. Toutes vos réponses sont conservées. Un essai en cours recommence au début.",
     pause_held_body="Veuillez patienter ; la personne responsable va continuer. Toutes vos réponses sont conservées.",

@@ -58,6 +58,8 @@ GERMAN = Words(
         "yesno": "Haben Sie es bemerkt?",
         "rating": "Wie stark war es?",
         "estimation": "Wie stark war es? Nennen Sie eine Zahl über 0.",
+        "adjustment": "Stellen Sie das zweite ein, bis beide gleich stark sind.",
+        "adjustment_alone": "Stellen Sie es auf die Stärke ein, nach der Sie gefragt wurden.",
     },
     design_answers={
         "first": "Das erste",
@@ -84,6 +86,9 @@ GERMAN = Words(
     number_wanted="Geben Sie eine Zahl über 0 ein.",
     modulus="Die Zahl für diese Probe sei {number}.",
     delete_digit="Letzte Ziffer löschen",
+    less="Weniger",
+    more="Mehr",
+    done="Fertig",
     pause_title="Unterbrechung",
     pause_body="Lassen Sie sich Zeit. Alle Ihre Antworten sind gespeichert. Ein begonnener Durchgang beginnt von vorn.",
     pause_held_body="Bitte warten Sie; die Versuchsleitung macht weiter. Alle Ihre Antworten sind gespeichert.",

@@ -83,6 +83,9 @@ class Words:
     number_wanted: str
     modulus: str  # {number}, of the first trial of a magnitude estimation
     delete_digit: str
+    less: str  # of what an adjustment sets
+    more: str
+    done: str
 
     # pause and force stop
     pause_title: str

@@ -58,6 +58,13 @@ def submit(state: SessionState, event: Submitted) -> Result:
     return enter(state, state.index + 1, (written,), at_s=event.at_s)
 
 
+def keep_setting(state: SessionState, done: Commands, at_s: float) -> Result:
+    """Keep the steps of a setting as the answer, and go on; ``done`` ends its interval."""
+    state, chosen = choose(state, Chosen(at_s, state.items[0], state.steps))
+    state, kept = submit(state, Submitted(at_s))
+    return state, (*done, *chosen, *kept)
+
+
 def _heard(state: SessionState, written: Write, at_s: float) -> Result:
     """Keep the answer for the levels to come, and say whether it was correct, where that is due."""
     trial, due, design = state.trial, state.due, state.design

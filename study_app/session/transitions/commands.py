@@ -30,7 +30,8 @@ class StartTrial:
 
     The tank stays for ``linger_s`` after the task, so that its end is seen. That goes by the longest delay of the
     block, the same for all its trials: neither the participant nor any time on the disk can tell the delay from it.
-    ``interval`` counts from 1, None in a trial without a design. What is presented and delays are never printed.
+    ``interval`` counts from 1, None in a trial without a design; with ``adjusts`` the participant sets what it
+    presents, and ends it. What is presented and delays are never printed.
     """
 
     trial: int
@@ -40,6 +41,19 @@ class StartTrial:
     delay_s: float = field(repr=False)
     linger_s: float = field(repr=False)
     interval: int | None = None
+    adjusts: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Adjust:
+    """Present another value of the varied number within the interval under way, and write the line of its steps.
+
+    The force goes on from what it is; the line has the number by which recordings know the scene from then on.
+    """
+
+    presented: Stimulated = field(repr=False)
+    delay_s: float = field(repr=False)
+    fields: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +116,7 @@ class Finish:
 Command: TypeAlias = (
     ShowPage
     | StartTrial
+    | Adjust
     | LeaveTask
     | StopTrial
     | Rest

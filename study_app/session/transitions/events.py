@@ -74,8 +74,16 @@ class Retracted:
 
 
 @dataclass(frozen=True, slots=True)
+class Stepped:
+    """The participant wants more of what an adjustment sets by some steps, or less where ``steps`` is below 0."""
+
+    at_s: float
+    steps: int
+
+
+@dataclass(frozen=True, slots=True)
 class Submitted:
-    """The participant confirms the questionnaire."""
+    """The participant confirms the questionnaire, or a setting."""
 
     at_s: float
 
@@ -188,6 +196,7 @@ Event: TypeAlias = (
     | ItemShown
     | Chosen
     | Retracted
+    | Stepped
     | Submitted
     | TimeUp
     | PauseAsked

@@ -6,8 +6,11 @@ from dataclasses import replace
 
 from study_app.errors import SessionError
 from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.trials.presentation import delay_s_of
 from study_app.session.resume import FIRST
+from study_app.session.transitions.answers import keep_setting
 from study_app.session.transitions.commands import (
+    Adjust,
     FadeIn,
     Finish,
     LeaveTask,
@@ -29,6 +32,8 @@ from study_app.session.transitions.events import (
     Reconnected,
     RepeatAsked,
     ResumeAsked,
+    Stepped,
+    Submitted,
     TaskDone,
     TimeUp,
     WriteCompleted,
@@ -89,7 +94,24 @@ def choose_language(state: SessionState, event: LanguageChosen) -> Result:
 
 def leave_task(state: SessionState, _event: Continue) -> Result:
     """Let the participant end an exploration that has lasted long enough; its end is a `TaskDone`."""
-    return state, (LeaveTask(),)
+    return state, () if state.adjusts else (LeaveTask(),)
+
+
+def step(state: SessionState, event: Stepped) -> Result:
+    """Move the level that the participant sets, within its ends; outside of such an interval do nothing."""
+    setting, due = state.adjusting, state.due
+    if setting is None or due is None:
+        return state, ()
+    place = setting.moved(state.place, event.steps)
+    presented = replace(due.intervals[state.interval - 1], value=setting.comparison(place))
+    delay_s = delay_s_of(state.plan.protocol, presented)
+    moved = replace(state, steps=state.steps + event.steps, place=place)
+    return moved, (Adjust(presented, delay_s, {**which(state), "steps": event.steps}),)
+
+
+def confirm_setting(state: SessionState, _event: Submitted) -> Result:
+    """Let the participant end a setting; its end is a `TaskDone`. Where nothing is set there is nothing to confirm."""
+    return state, (LeaveTask(),) if state.adjusts else ()
 
 
 def end_task(state: SessionState, event: TaskDone) -> Result:
@@ -105,10 +127,14 @@ def end_task(state: SessionState, event: TaskDone) -> Result:
         holds, protocol = design.arrangements[due.arrangement], state.plan.protocol
         reasons = (*event.invalid, *missed(protocol.limits, due, holds, state.errors_ms, protocol.device.rate_hz))
         invalid = {"invalid": reasons} if reasons else {}
+        if (setting := state.adjusting) is not None:
+            measured["setting"] = setting.level(state.place)
         done = (*done, Write("interval_ended", {**which(state), "interval": state.interval, **measured, **invalid}))
         if reasons:
             return present_again(state, done, event.at_s)
         measured = {"outcome": event.outcome}  # the numbers are those of the intervals
+        if design.adjusts and state.interval == design.intervals:
+            return keep_setting(state, (*done, Write("trial_ended", {**which(state), **measured})), event.at_s)
         if state.interval < design.intervals:
             return rest(replace(state, interval=state.interval + 1), done, event.at_s + FADE_OUT_S + design.pause_s)
     done = (*done, Write("trial_ended", {**which(state), **measured}))
@@ -120,7 +146,7 @@ def end_task(state: SessionState, event: TaskDone) -> Result:
 
 def end_rest(state: SessionState, event: TimeUp) -> Result:
     """Present the next interval, once the rest before it has lasted long enough."""
-    return (state, ()) if before_end(state, event.at_s) else start_interval(state, ())
+    return (state, ()) if before_end(state, event.at_s) else start_interval(state, (), event.at_s)
 
 
 def end_feedback(state: SessionState, event: TimeUp) -> Result:
@@ -153,7 +179,7 @@ def resume(state: SessionState, event: ResumeAsked) -> Result:
         back = (*back, Write("force_restored", {"by": event.by}), FadeIn())
     state = replace(state, phase=state.interrupted or Phase.READING, interrupted=None, force_off=False, held=None)
     if state.phase in {Phase.TASK, Phase.RESTING}:
-        return start_trial(replace(state, attempt=state.attempt + 1), back)
+        return start_trial(replace(state, attempt=state.attempt + 1), back, event.at_s)
     if state.phase is Phase.FEEDBACK:
         return enter(state, state.index + 1, back, at_s=event.at_s)
     return state, (*back, show(state))
@@ -186,7 +212,7 @@ def repeat(state: SessionState, event: RepeatAsked) -> Result:
     if not event.reason.strip():
         raise SessionError("repeating a trial needs a reason: enter one")
     asked = Write("repeat", {"trial": state.trial.number, "reason": event.reason}, waits=True)
-    return start_trial(replace(state, attempt=state.attempt + 1), (*break_off(state), asked))
+    return start_trial(replace(state, attempt=state.attempt + 1), (*break_off(state), asked), event.at_s)
 
 
 def note(state: SessionState, event: Note) -> Result:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from study_app.protocol.blocks import Block
 from study_app.protocol.orders.schedule import FormStep, Trial
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.number import NumberView
 from study_app.protocol.trials.design import ORDINALS
+from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import (
     ChoicePage,
@@ -30,7 +32,8 @@ def page(state: SessionState) -> Page:
     """Return what the participant sees in any phase but the one before the first page."""
     match state.phase:
         case Phase.TASK | Phase.RESTING:
-            return replace(_task_page(state, state.trial), interval=_interval(state))
+            made = replace(_task_page(state, state.trial), task=state.task, interval=_interval(state))
+            return replace(made, adjusts=state.adjusts and state.phase is Phase.TASK)
         case Phase.ANSWERING:
             return _answer_page(state)
         case Phase.FEEDBACK:
@@ -87,7 +90,16 @@ def _task_page(state: SessionState, trial: Trial) -> TaskPage:
         workspace_m=protocol.device.workspace_m,
         body_radius_m=protocol.scene_for(drawn).body.diameter_m / 2 / protocol.scene.scale,
         progress=_progress(state, trial),
+        question=_setting_question(state, block),
     )
+
+
+def _setting_question(state: SessionState, block: Block) -> str:
+    """Return what a level is set to in the trials of a block; "" where none is."""
+    protocol = state.plan.protocol
+    asked = protocol.questionnaire_of(block.id)
+    set_by_hand = block.design is not None and design_of(protocol, block).adjusts
+    return _text(state, asked.intro) if set_by_hand and asked is not None else ""
 
 
 def _interval(state: SessionState) -> Interval | None:

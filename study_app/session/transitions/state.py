@@ -16,8 +16,9 @@ from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.due import Due, next_level
 from study_app.protocol.trials.keyed import Key
 from study_app.protocol.trials.method import Heard
-from study_app.protocol.trials.task import AnyTask
-from study_app.protocol.trials.tracks import design_of
+from study_app.protocol.trials.methods.adjustment import Adjusting, Adjustment
+from study_app.protocol.trials.task import AnyTask, lasting
+from study_app.protocol.trials.tracks import adjusting_of, design_of, method_of
 from study_app.session.resume import FIRST, Start
 from study_app.session.transitions.commands import Command
 
@@ -114,7 +115,8 @@ class SessionState:
     Of trials with a design ``heard`` holds those answered so far, ``due`` what the present one presents, ``interval``
     which interval it is at (from 1), and ``until_s`` when a rest or a feedback is over [s, session's clock].
     ``errors_ms`` is the mean error of the visual delay in each of its intervals so far, ``invalid`` how many of its
-    attempts were not delivered as requested.
+    attempts were not delivered as requested. ``steps`` are those of the adjustment under way, as they were asked for;
+    ``place`` is where they led to, which depends on where it started.
     """
 
     plan: Plan = field(repr=False)
@@ -133,6 +135,8 @@ class SessionState:
     until_s: float | None = None
     errors_ms: tuple[float | None, ...] = ()
     invalid: int = 0
+    steps: int = 0
+    place: int = field(default=0, repr=False)
 
     @property
     def step(self) -> Step | None:
@@ -192,8 +196,25 @@ class SessionState:
 
     @property
     def task(self) -> AnyTask:
-        """The task of the trial under way."""
-        return self.plan.protocol.tasks[self.plan.protocol.blocks[self.trial.block].task]
+        """The task of the trial under way; while its level is set, one that goes on for as long as that may take."""
+        block = self.plan.protocol.blocks[self.trial.block]
+        task = self.plan.protocol.tasks[block.task]
+        method = method_of(self.plan.protocol, block) if self.adjusts else None
+        return lasting(task, method.most_s) if isinstance(method, Adjustment) else task
+
+    @property
+    def adjusts(self) -> bool:
+        """Whether the interval under way, or the one after the rest, is set by the participant."""
+        design = self.design
+        return design is not None and design.adjusts and self.interval == design.intervals
+
+    @property
+    def adjusting(self) -> Adjusting | None:
+        """The setting under way, with where it started; None where nothing is set."""
+        if not self.adjusts or self.due is None or self.due.level is None:
+            return None
+        block = self.plan.protocol.blocks[self.trial.block]
+        return adjusting_of(self.plan.protocol, block, self.due.standard, self.due.level)
 
     @property
     def asks(self) -> bool:

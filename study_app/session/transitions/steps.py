@@ -22,7 +22,7 @@ from study_app.session.transitions.commands import (
     Write,
     WriteTables,
 )
-from study_app.session.transitions.state import Phase, SessionState
+from study_app.session.transitions.state import Answer, Phase, SessionState
 
 Commands: TypeAlias = tuple[Command, ...]
 Result: TypeAlias = tuple[SessionState, Commands]
@@ -80,7 +80,8 @@ def enter_reached(state: SessionState, done: Commands) -> Result:
         before = state.plan.schedule.steps[state.index - 1] if state.index else None
         follows = state.design is not None and isinstance(before, Trial) and before.block == step.block
         between_s = state.design.between_s if state.design is not None and follows else 0.0
-        return start_trial(state, done, rest_until_s=state.since_s + between_s if between_s else None)
+        rest_until_s = state.since_s + between_s if between_s else None
+        return start_trial(state, done, state.since_s, rest_until_s=rest_until_s)
     if isinstance(step, FormStep):
         state = replace(state, phase=Phase.ANSWERING)
         return state, (*done, Write("form_shown", {"form": step.form}), WriteTables(), show(state))
@@ -88,7 +89,7 @@ def enter_reached(state: SessionState, done: Commands) -> Result:
     return state, (*done, Write("page_shown", {"page": state.page_id}), WriteTables(), show(state))
 
 
-def start_trial(state: SessionState, done: Commands, *, rest_until_s: float | None = None) -> Result:
+def start_trial(state: SessionState, done: Commands, at_s: float, *, rest_until_s: float | None = None) -> Result:
     """Present a trial, where it has intervals the first of them, after a rest if there is one."""
     state = replace(state, phase=Phase.TASK, answers={}, interval=1, until_s=None, errors_ms=())
     trial = state.trial
@@ -101,7 +102,7 @@ def start_trial(state: SessionState, done: Commands, *, rest_until_s: float | No
             "catch": state.due.catch,
         }
     begun = (*done, Write("trial_started", {**which(state), **fields}), WriteTables())
-    return start_interval(state, begun) if rest_until_s is None else rest(state, begun, rest_until_s)
+    return start_interval(state, begun, at_s) if rest_until_s is None else rest(state, begun, rest_until_s)
 
 
 def present_again(state: SessionState, done: Commands, at_s: float) -> Result:
@@ -111,26 +112,31 @@ def present_again(state: SessionState, done: Commands, at_s: float) -> Result:
     if state.invalid >= (state.plan.protocol.limits.attempts or 1):
         return enter(state, state.index + 1, done, at_s=at_s)
     again = replace(state, attempt=state.attempt + 1)
-    return start_trial(again, done, rest_until_s=at_s + FADE_OUT_S + AGAIN_S)
+    return start_trial(again, done, at_s, rest_until_s=at_s + FADE_OUT_S + AGAIN_S)
 
 
-def start_interval(state: SessionState, done: Commands) -> Result:
+def start_interval(state: SessionState, done: Commands, at_s: float) -> Result:
     """Present what the trial presents, or its present interval."""
-    state = replace(state, phase=Phase.TASK, until_s=None)
+    state = replace(state, phase=Phase.TASK, until_s=None, steps=0, place=0)
     protocol, block = state.plan.protocol, _block(state, state.trial)
     if state.due is None:
         presented = Stimulated(state.plan.condition(state.trial))
     else:
         presented = state.due.intervals[state.interval - 1]
         done = (*done, Write("interval_started", {**which(state), "interval": state.interval}))
+    if state.adjusts:
+        item = state.items[0]
+        state = replace(state, answers={item: Answer(onset_s=at_s)})
+        done = (*done, Write("item_shown", {"trial": state.trial.number, "item": item}))
     start = StartTrial(
         trial=state.trial.number,
         attempt=state.attempt,
-        task=protocol.tasks[block.task],
+        task=state.task,
         presented=presented,
         delay_s=delay_s_of(protocol, presented),
         linger_s=longest_delay_s(protocol, block) + END_SHOWN_S,
         interval=None if state.due is None else state.interval,
+        adjusts=state.adjusts,
     )
     return state, (*done, start, show(state))
 

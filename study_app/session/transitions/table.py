@@ -12,7 +12,8 @@ Rules of this file:
 
 A session is the steps of its schedule: pages to read, forms to fill in, and trials. A trial is a task, then a
 questionnaire if its block has one. Where its block has a design it is several intervals with rests between them, then
-one question, then feedback where that is due; what it presents is known when it is entered, and a trial that is not due
+one question, then feedback where that is due; where the participant sets the level of the last interval, that setting
+is the answer. What it presents is known when it is entered, and a trial that is not due
 is passed over. A rest belongs to the trial's attempt. A pause during a task or a rest (asked for, or after a force
 stop) ends the attempt, and the trial starts again as the next attempt; a pause while reading or answering goes back to
 the same page with every choice kept, one in a feedback goes on. Whatever breaks leaves the force off and all answers on
@@ -48,6 +49,7 @@ from study_app.session.transitions.events import (
     RepeatAsked,
     ResumeAsked,
     Retracted,
+    Stepped,
     Submitted,
     TaskDone,
     TimeUp,
@@ -65,7 +67,9 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     (Phase.READING, Continue): moves.read_on,  # → reading, task, answering (a form), complete
     (Phase.READING, LanguageChosen): moves.choose_language,  # stays
     (Phase.TASK, Continue): moves.leave_task,  # stays until the task is done
-    (Phase.TASK, TaskDone): moves.end_task,  # → answering; resting; reading, task, complete without a questionnaire
+    (Phase.TASK, Stepped): moves.step,  # stays
+    (Phase.TASK, Submitted): moves.confirm_setting,  # stays until the task is done
+    (Phase.TASK, TaskDone): moves.end_task,  # → answering; resting; without questions or after a setting the next step
     # Trials of intervals: rests and feedback end by time alone.
     (Phase.RESTING, TimeUp): moves.end_rest,  # → task of the next interval
     (Phase.FEEDBACK, TimeUp): moves.end_feedback,  # → reading, task, resting, answering (a form), complete, ended

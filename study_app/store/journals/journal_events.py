@@ -63,6 +63,12 @@ EVENTS: tuple[Event, ...] = (
     ),
     Event("feedback_shown", "The participant saw whether the answer was correct.", _WHICH),
     Event("passed_over", "A trial, or the break after it, was not due.", ("reason",), ("trial", "page")),
+    Event(
+        "stepped",
+        "The participant adjusted the level by so many steps, more of the varied number above 0; `scene` is the number "
+        "of the presented scene from then on, n/a where no force depends on it.",
+        (*_WHICH, "steps", "scene"),
+    ),
     Event("target_reached", "A target was reached, on the task's clock.", ("trial", "target", "t_task_s")),
     Event(
         "trial_ended",
@@ -208,6 +214,7 @@ _MAY_BE_NULL = (
     "gap_s",
     "device",
     "t_task_s",
+    "scene",
 )
 _KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for column in (*TRIALS, *DELIVERED)} | {
     name: (kind, name in _MAY_BE_NULL)
@@ -219,7 +226,7 @@ _KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for co
         "recording's name": "recording recording_frames",
         "flag": "simulated pilot recordings measures_sealed intervals",
         "integer": "n format session entry seed torn_bytes trial attempt interval part index of target "
-        "samples_recorded samples_unrecorded frames_recorded number value changes protocol_format",
+        "samples_recorded samples_unrecorded frames_recorded number value changes protocol_format steps scene",
         "answer": "answer",
         "number": "level standard t_s gap_s t_task_s onset_s first_s last_s",
         "time": "at",

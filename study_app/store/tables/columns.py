@@ -211,6 +211,7 @@ DELIVERED: tuple[Column, ...] = (
     ),
     _signed("apparent_mass_kg", "Apparent mass of the fitted force, in addition to its damping.", "kg"),
     _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True),
+    _signed("setting", "The level that the participant set; n/a in intervals that were not adjusted."),
 )
 """What an interval delivered."""
 

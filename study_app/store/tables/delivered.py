@@ -65,7 +65,9 @@ class Delivered:
         return {name: value for name, value in asdict(self).items() if name != "clipped"}
 
 
-def delivered(protocol: Protocol, presented: Stimulated, task: AnyTask, samples: Any) -> Delivered:
+def delivered(
+    protocol: Protocol, presented: Stimulated, task: AnyTask, samples: Any, *, adjusted: bool = False
+) -> Delivered:
     """Return what an interval delivered.
 
     Parameters
@@ -78,6 +80,8 @@ def delivered(protocol: Protocol, presented: Stimulated, task: AnyTask, samples:
         The task that was done.
     samples : array of `JUDGED` (n,)
         The interval's samples, from the first one that its task took to the one that ended it.
+    adjusted : bool
+        Whether the participant set the varied number meanwhile: then no single value was delivered.
     """
     samples = _believed(samples)
     times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9
@@ -95,11 +99,12 @@ def delivered(protocol: Protocol, presented: Stimulated, task: AnyTask, samples:
     kept = len(samples) - late
     sent_n, model_n = sent_n[first + late :], model_n[first:kept]
     prompt = moved.after(from_s, times_s[kept - 1]) if late and kept > 0 else moved
-    fitted = damping(at(prompt.times_s, times_s[first:kept], sent_n), prompt) if len(prompt.times_s) else None
-    value = presented.value if presented.vary not in {None, DELAY} else None
+    judges = len(prompt.times_s) and not adjusted
+    fitted = damping(at(prompt.times_s, times_s[first:kept], sent_n), prompt) if judges else None
+    value = presented.value if presented.vary not in {None, DELAY} and not adjusted else None
     if varies_damping(presented):
         value = None if fitted is None else fitted[0]
-    if presented.vary == FORCE_DELAY:
+    if presented.vary == FORCE_DELAY and not adjusted:
         value = None if lag_s is None else 1000 * lag_s
     return Delivered(
         value_delivered=value,
@@ -140,12 +145,18 @@ def varies_damping(presented: Stimulated) -> bool:
     return (presented.vary or "").rpartition(".")[2] == DAMPING
 
 
-def undelivered(limits: Limits, presented: Stimulated, task: AnyTask, found: Delivered) -> Iterator[str]:
-    """Yield the keys of the file's limits that an interval breaks: reasons without a number."""
+def undelivered(
+    limits: Limits, presented: Stimulated, task: AnyTask, found: Delivered, *, adjusted: bool = False
+) -> Iterator[str]:
+    """Yield the keys of the file's limits that an interval breaks: reasons without a number.
+
+    Of an ``adjusted`` interval the share of the force that was sent is judged, whatever is varied.
+    """
     most = limits.level_error_percent
     if presented.vary is not None and presented.vary not in OF_CONDITION and most is not None:
-        measured = found.value_delivered if varies_damping(presented) else found.force_share
-        asked = presented.value if varies_damping(presented) else 1.0
+        fitted = varies_damping(presented) and not adjusted
+        measured = found.value_delivered if fitted else found.force_share
+        asked = presented.value if fitted else 1.0
         if abs((measured or 0.0) - asked) > abs(asked) * most / 100:  # nothing was delivered to a hand at rest
             yield "level_error_percent"
     if presented.vary not in {None, DELAY} and most is not None and found.clipped:

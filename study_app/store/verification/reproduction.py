@@ -7,12 +7,13 @@ presented, so that a difference does not propagate. No level is printed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from study_app.errors import StoreError
+from study_app.protocol.blocks import Block
 from study_app.protocol.groups.allocation import group_of
 from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.model import Protocol
@@ -23,7 +24,7 @@ from study_app.protocol.trials.answered import heard_in
 from study_app.protocol.trials.due import next_level
 from study_app.protocol.trials.keyed import Key
 from study_app.protocol.trials.presentation import arrangement_text
-from study_app.protocol.trials.tracks import design_of
+from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store import receipt
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.sealing import opened
@@ -118,8 +119,10 @@ class _Compared:
         self._schedule = schedule
         self._planned = {trial.number: trial for trial in self._schedule.trials}
 
-    def take(self, line: Line, before: Iterable[Line]) -> None:
+    def take(self, line: Line, before: Sequence[Line]) -> None:
         """Compare one line with what follows from those before it."""
+        if line["event"] in {"interval_ended", "responses"}:
+            self._take_setting(line, before)
         if line["event"] not in {"trial_started", "passed_over"} or line.get("trial") not in self._planned:
             return
         trial = self._planned[line["trial"]]
@@ -144,8 +147,34 @@ class _Compared:
                 "presented, though it was to be passed over" if due is None else "another level or arrangement was due"
             )
             self.differences.append(f"trial {trial.number}, attempt {line['attempt']}: {what}")
+        self._note(block, trial.number, follows)
+
+    def _take_setting(self, line: Line, before: Sequence[Line]) -> None:
+        """Compare the level that a participant set with the steps from where it started, and the answer with their sum.
+
+        A line that is not about a setting is left alone.
+        """
+        if line["event"] == "interval_ended" and line.get("setting") is None:
+            return
+        which = line["trial"], line["attempt"]
+        own = [one for one in before if (one.get("trial"), one.get("attempt")) == which]
+        started = next(one for one in own if one["event"] == "trial_started")
+        block = self._protocol.blocks[started["block"]]
+        setting = adjusting_of(self._protocol, block, started["standard"], started["level"]) if block.stimulus else None
+        if setting is None:
+            return
+        steps = [one["steps"] for one in own if one["event"] == "stepped"]
+        if line["event"] == "responses":
+            follows = line["items"][0]["value"] == sum(steps)
+        else:
+            follows = line["setting"] == setting.level(setting.reached(steps))
+        if not follows:
+            self.differences.append(f"trial {which[0]}, attempt {which[1]}: its steps lead to another setting")
+        self._note(block, which[0], follows)
+
+    def _note(self, block: Block, trial: int, follows: bool) -> None:
         of_block = self.trials.setdefault(block.id, {})
-        of_block[trial.number] = follows and of_block.get(trial.number, True)
+        of_block[trial] = follows and of_block.get(trial, True)
 
 
 def _group(study: StudyFolder, lines: list[Line]) -> str | None:

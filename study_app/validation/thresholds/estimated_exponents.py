@@ -24,7 +24,7 @@ from study_app.protocol.orders.schedule import build_schedule, draw_key
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.due import next_level
 from study_app.protocol.trials.keyed import Key, draw_secret
-from study_app.protocol.trials.stimuli import DELAY
+from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import condition_of, design_of, method_of, stimulus_of
 from study_app.session.simulated.design_observer import OBSERVER, Observer, estimate
 from study_app.validation.thresholds.methods_alone import PEOPLE, keyed_draw
@@ -82,7 +82,7 @@ def planted_exponent(name: str, protocol: Protocol) -> PlantedExponent | None:
         if block.stimulus is None or block.design is None:
             continue
         stimulus, task = stimulus_of(protocol, block), protocol.tasks[block.task]
-        if design_of(protocol, block).reply != "number" or stimulus.vary == DELAY or not isinstance(task, Follow):
+        if design_of(protocol, block).reply != "number" or stimulus.vary in DELAYS or not isinstance(task, Follow):
             continue
         scene = protocol.scene_for(condition_of(protocol, stimulus))
         levels = sorted(method_of(protocol, block).asked(stimulus))

@@ -16,9 +16,9 @@ def design(kind: str) -> Design:
 
 def test_every_kind_of_the_folder_is_known():
     assert set(DESIGN_KINDS) == {
-        "2ifc", "3ifc", "4ifc", "abx", "oddity", "samedifferent", "yesno", "rating", "estimation",
+        "2ifc", "3ifc", "4ifc", "abx", "oddity", "samedifferent", "yesno", "rating", "estimation", "adjustment",
     }  # fmt: skip
-    assert set(METHOD_KINDS) == {"constant", "questplus", "updown"}
+    assert set(METHOD_KINDS) == {"constant", "questplus", "updown", "adjustment"}
 
 
 @pytest.mark.parametrize(

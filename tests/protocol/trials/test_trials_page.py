@@ -13,7 +13,7 @@ from study_app.protocol.trials.tracks import design_of
 PAGE = (Path(__file__).parents[3] / "docs" / "trials.md").read_text(encoding="utf-8")
 
 
-EXAMPLE, ESTIMATION = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+EXAMPLE, ESTIMATION, ADJUSTMENT = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
 
 def test_example_of_the_page_is_a_study() -> None:
@@ -25,6 +25,12 @@ def test_example_of_estimation_replaces_stimulus_and_block_of_the_first() -> Non
     study = parse((EXAMPLE[:start] + EXAMPLE[method:end] + ESTIMATION).encode(), "example")
     assert orders_of(study).answers == 140
     assert design_of(study, study.blocks["thickness"]).reply == "number"
+
+
+def test_example_of_adjustment_replaces_stimulus_method_and_block_of_the_first() -> None:
+    study = parse((EXAMPLE[: EXAMPLE.index("[stimuli")] + ADJUSTMENT).encode(), "example")
+    assert orders_of(study).answers == 10
+    assert design_of(study, study.blocks["matching"]).adjusts
 
 
 def test_table_of_the_page_names_every_design() -> None:

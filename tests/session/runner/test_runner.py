@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 
 from study_app.errors import ServoFault, SessionError
+from study_app.session.device_buttons import CONTINUE
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TroublePage
-from study_app.session.runner import BUTTON_CONTINUE, BUTTON_STOP
+from study_app.session.runner import BUTTON_STOP
 from study_app.session.transitions.events import (
     Begin,
     Chosen,
@@ -212,12 +213,12 @@ def test_resuming_after_a_force_stop_fades_the_force_in(practising: World) -> No
 
 def test_the_first_button_goes_on_neither_from_a_consent_nor_from_a_task(world: World) -> None:
     world.runner.post(Begin(0.0))
-    world.run(0.1, buttons=BUTTON_CONTINUE)
+    world.run(0.1, buttons=CONTINUE)
     assert world.state.phase is Phase.READING  # a squeeze of the grip is no consent
     world.run(0.1)
     world.runner.post(Continue(0.2))
     world.run(0.1)
-    world.run(1.5, buttons=BUTTON_CONTINUE)
+    world.run(1.5, buttons=CONTINUE)
     assert world.state.phase is Phase.TASK  # the least time is over, but a squeeze is not a key
 
 
@@ -228,15 +229,15 @@ def test_a_button_held_down_is_one_press(world: World) -> None:
             break
         step(world)
     assert world.state.phase is Phase.READING
-    world.run(0.1, buttons=BUTTON_CONTINUE)
+    world.run(0.1, buttons=CONTINUE)
     assert world.runner.finished
     again = at_block("seeing")
     for _ in range(30):
         if again.state.phase is Phase.READING:
             break
         step(again)
-        again.servo.run(0.01, buttons=BUTTON_CONTINUE)
-    again.run(0.1, buttons=BUTTON_CONTINUE)  # pressed before the page was there
+        again.servo.run(0.01, buttons=CONTINUE)
+    again.run(0.1, buttons=CONTINUE)  # pressed before the page was there
     assert again.state.phase is Phase.READING
 
 

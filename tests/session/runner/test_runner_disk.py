@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from study_app.errors import SessionError, StoreError
+from study_app.session.device_buttons import CONTINUE
 from study_app.session.pages import EndPage, PausePage, TaskPage, TroublePage
-from study_app.session.runner import BUTTON_CONTINUE, RETRY_S
+from study_app.session.runner import RETRY_S
 from study_app.session.transitions.events import Begin, Chosen, EndAsked, ForceStopped, Note, ResumeAsked, Submitted
 from study_app.session.transitions.state import Phase
 from tests.session.fakes import LEFT, RIGHT, World, at_block
@@ -131,7 +132,7 @@ def test_buttons_answer_nothing_while_the_disk_is_full(world: World) -> None:
     stall(world)
     world.runner.post(Note(1.0, "mark", ""))
     world.run(0.1)
-    world.run(0.1, buttons=BUTTON_CONTINUE)
+    world.run(0.1, buttons=CONTINUE)
     assert world.state.stall is not None
     assert world.state.stall.before is Phase.READING
 

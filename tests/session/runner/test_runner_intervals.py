@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
-import numpy as np
 import pytest
 
 from study_app.devices.rig import Rig, open_rig, study_settings
-from study_app.devices.simulated.hand_commands import HandOrders, hand_of
 from study_app.errors import SessionError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
-from study_app.protocol.orders.schedule import build_schedule, stream
-from study_app.session.pages import TaskPage
-from study_app.session.ports import Ports
-from study_app.session.runner import BUTTONS_ANSWER, Runner
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import stream
+from study_app.session.device_buttons import ANSWERS
 from study_app.session.transitions.events import (
-    Begin,
     Chosen,
     Continue,
     PauseAsked,
@@ -27,8 +22,8 @@ from study_app.session.transitions.events import (
 )
 from study_app.session.transitions.state import Phase
 from tests.compiled import needs_servo
-from tests.protocol.trials.studies import key_of, study
-from tests.session.fakes import FakeJournal
+from tests.protocol.trials.studies import study
+from tests.session.bench import Bench
 
 pytestmark = [needs_servo, pytest.mark.slow]
 
@@ -37,63 +32,12 @@ FOLLOWED = (
     ('liquid = "thin"\n\n[conditions.other]', 'liquid = "thin"\nball = "hidden"\n\n[conditions.other]'),
 )
 PAIRS = '\n[designs.pairs]\nkind = "2ifc"\nfeedback = "always"\n'
-TO_AND_FRO_M = 0.03
-SWING_S = np.arange(0, 60, 0.005)
 STILL_N = 1e-9
 
 
-class Bench:
-    """A session of pairs at its first interval, whose windows paint at once."""
-
-    def __init__(self, rig: Rig, *edits: tuple[str, str]) -> None:
-        protocol = study(('design = "2ifc"', 'design = "pairs"'), *edits, more=PAIRS)
-        key = key_of(protocol)
-        self.servo = rig.servo
-        hand = hand_of(rig.device)
-        assert hand is not None
-        self.hand: HandOrders = hand
-        self.journal = FakeJournal([])
-        self.pages: list[Any] = []
-        ports = Ports(rig.servo, self.journal, self.present, self.clock, paints=False)
-        schedule = build_schedule(protocol, "P001", 1)
-        self.runner = Runner(protocol, schedule, key.codes, ports, "en", secret=key.secret)
-        self.reader = rig.servo.telemetry.reader()
-        self.servo.advance(20)
-        self.runner.post(Begin(self.clock()))
-
-    @property
-    def state(self) -> Any:
-        return self.runner.state
-
-    def present(self, page: Any) -> None:
-        self.pages.append(page)
-        if isinstance(page, TaskPage) and not (page.interval and page.interval.resting):
-            self.runner.frame_shown(self.servo.now_ns(), self.servo.now_ns())
-
-    def clock(self) -> float:
-        return self.servo.now_ns() / 1e9
-
-    def swing(self) -> None:
-        """Move the hand to and fro, so that whatever liquid there is resists it."""
-        places = np.column_stack((TO_AND_FRO_M * np.sin(8 * SWING_S), 0 * SWING_S, 0 * SWING_S))
-        self.hand.follow(SWING_S, places)
-
-    def run(self, seconds: float) -> Any:
-        """Let time pass and return the force at each tick [N] (n,)."""
-        self.reader.read()
-        forces = []
-        for _ in range(round(seconds * 50)):
-            self.servo.advance(20)
-            self.runner.poll()
-            forces.append(np.linalg.norm(self.reader.read().device_force_n, axis=1))
-        return np.concatenate(forces)
-
-    def run_to(self, phase: Phase) -> None:
-        for _ in range(500):
-            if self.state.phase is phase:
-                return
-            self.run(0.02)
-        raise AssertionError(phase)
+def pairs(*edits: tuple[str, str]) -> Protocol:
+    """Return the study of pairs with feedback, with edits of its text."""
+    return study(('design = "2ifc"', 'design = "pairs"'), *edits, more=PAIRS)
 
 
 @pytest.fixture(params=["scripted", "falcon-emulated"])
@@ -105,7 +49,7 @@ def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
 
 @pytest.fixture
 def bench(rig: Rig) -> Bench:
-    made = Bench(rig)
+    made = Bench(rig, pairs())
     made.swing()
     return made
 
@@ -156,17 +100,17 @@ def test_no_answer_no_task_event_and_no_button_ends_a_rest(bench: Bench) -> None
 @pytest.mark.parametrize("place", [0, 1])
 def test_buttons_2_and_3_of_the_device_answer_where_there_are_two_answers(bench: Bench, place: int) -> None:
     bench.run_to(Phase.RESTING)
-    bench.hand.press(BUTTONS_ANSWER[place])  # too early: held down since before the question it answers nothing
+    bench.hand.press(ANSWERS[place])  # too early: held down since before the question it answers nothing
     bench.run_to(Phase.ANSWERING)
     bench.run(0.2)
     assert not bench.journal.of("choice")
     bench.hand.release()
     bench.run(0.1)
-    bench.hand.press(BUTTONS_ANSWER[0] | BUTTONS_ANSWER[1])  # both at once are no answer
+    bench.hand.press(ANSWERS[0] | ANSWERS[1])  # both at once are no answer
     bench.run(0.1)
     bench.hand.release()
     bench.run(0.1)
-    bench.hand.press(BUTTONS_ANSWER[place])
+    bench.hand.press(ANSWERS[place])
     bench.run(0.1)
     assert [line["value"] for line in bench.journal.of("choice")] == [("first", "second")[place]]
     assert len(bench.journal.of("responses")) == 1
@@ -174,10 +118,10 @@ def test_buttons_2_and_3_of_the_device_answer_where_there_are_two_answers(bench:
 
 
 def test_with_three_answers_no_button_of_the_device_answers(rig: Rig) -> None:
-    bench = Bench(rig, ('kind = "2ifc"', 'kind = "3ifc"'))
+    bench = Bench(rig, pairs(('kind = "2ifc"', 'kind = "3ifc"')))
     bench.run_to(Phase.RESTING)
     bench.run_to(Phase.ANSWERING)
-    for bit in BUTTONS_ANSWER:
+    for bit in ANSWERS:
         bench.hand.press(bit)
         bench.run(0.1)
         bench.hand.release()
@@ -187,7 +131,7 @@ def test_with_three_answers_no_button_of_the_device_answers(rig: Rig) -> None:
 
 
 def test_a_rest_before_a_followed_target_lasts_until_the_ball_is_back_in_it(rig: Rig) -> None:
-    bench = Bench(rig, *FOLLOWED)
+    bench = Bench(rig, pairs(*FOLLOWED))
     bench.hand.reach_to(0.02, 0.0, 0.0)
     bench.run_to(Phase.RESTING)
     assert bench.run(3.0)[60:].max() < STILL_N

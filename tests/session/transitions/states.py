@@ -22,6 +22,7 @@ from study_app.session.transitions.events import (
     RepeatAsked,
     ResumeAsked,
     Retracted,
+    Stepped,
     TaskDone,
     WriteFailed,
 )
@@ -67,6 +68,7 @@ def event_of(kind: type[Any]) -> Any:
     """Return an event of that kind that says nothing impossible."""
     more: dict[type[Any], tuple[Any, ...]] = {
         TaskDone: ("complete", {"duration_s": 2.0}),
+        Stepped: (1,),
         ItemShown: ("liquid",),
         Chosen: ("liquid", 3),
         Retracted: ("liquid",),

@@ -77,7 +77,7 @@ def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events:
             latest.setdefault((before.trial.number, before.attempt), {})[event.item] = event.value
         if isinstance(event, Retracted):
             latest.setdefault((before.trial.number, before.attempt), {}).pop(event.item, None)
-        if isinstance(event, Submitted):
+        if isinstance(event, Submitted) and before.phase is Phase.ANSWERING:
             kept[before.trial.number] = latest[before.trial.number, before.attempt]
         state = after
     confirmed = {write.fields["trial"]: write.fields["items"] for write in disk if write.event == "responses"}

@@ -1,0 +1,53 @@
+"""A study whose participants adjust a damper to a standard, as text."""
+
+from __future__ import annotations
+
+from study_app.protocol.load import parse
+from study_app.protocol.model import Protocol
+
+TEXT = """\
+format = 2
+study.name = "matching"
+
+[liquids.damper]
+drag = { law = "linear", damping_nspm = 6 }
+
+[tasks.stir]
+kind = "follow"
+cycles = 1
+
+[stimuli.damping]
+vary = "damping_nspm"
+level = "value"
+levels = [2, 18]
+
+[methods.set]
+kind = "adjustment"
+repetitions = 4
+
+[designs.match]
+kind = "adjustment"
+
+[blocks.matching]
+stimulus = "damping"
+design = "match"
+method = "set"
+"""
+ALONE = ('kind = "adjustment"\n\n[blocks', 'kind = "adjustment"\nstandard = false\n\n[blocks')
+"""Without the interval of the standard."""
+DELAY = ('vary = "damping_nspm"\nlevel = "value"\nlevels = [2, 18]', 'vary = "delay_ms"\nlevels = [20, 200]')
+"""The visual delay is set, from the present one."""
+
+
+def text_of(*edits: tuple[str, str]) -> str:
+    """Return the study's text with edits."""
+    text = TEXT
+    for old, new in edits:
+        assert old in text, old
+        text = text.replace(old, new)
+    return text
+
+
+def matching(*edits: tuple[str, str]) -> Protocol:
+    """Return the study with edits of its text."""
+    return parse(text_of(*edits).encode(), "matching.toml")

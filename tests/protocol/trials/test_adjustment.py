@@ -1,0 +1,154 @@
+"""The method of adjustment: where settings start, where steps lead, and what check refuses."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from study_app.errors import ProtocolError
+from study_app.protocol.checks.level_warnings import level_warnings
+from study_app.protocol.describe import describe
+from study_app.protocol.trials.methods.adjustment import START_SHARE, Adjustment
+from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials.task import lasting
+from study_app.protocol.trials.tracks import adjusting_of, method_of
+from tests.protocol.trials.matching import ALONE, DELAY, matching
+from tests.protocol.trials.studies import key_of, run
+
+LOW, HIGH = math.log10(2), math.log10(18)
+WIDE = (HIGH - LOW) * START_SHARE
+DAMPING = DELAY[0]
+TWO = "[tasks", '[conditions]\none.liquid = "damper"\nlate = { liquid = "damper", delay_ms = 90 }\n\n[tasks'
+WAKE = (
+    "drag = { law",
+    """density_kg_m3 = 1000
+effects = ["drag", "wake"]
+wake = { length = 400, scaling = 1000, exponent = 0.5, breaking_angle_deg = 45, breaking_span_m = 0.068, decay = 0.99 }
+drag = { law""",
+)
+
+
+def starts(secret: bytes) -> list[float]:
+    protocol = matching(("repetitions = 4", "repetitions = 20"))
+    return [float(due.level or 0.0) for due in run(protocol, key_of(protocol, secret), "0")]
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_settings_start_alternately_near_either_end_and_the_secret_draws_which_is_first(first: int) -> None:
+    secret = next(bytes([n] * 32) for n in range(50) if (starts(bytes([n] * 32))[0] > 6) == bool(first))
+    levels = [math.log10(level) for level in starts(secret)]
+    assert len(levels) == 20
+    for number, u in enumerate(levels):
+        low, high = (LOW, LOW + WIDE) if (number + first) % 2 == 0 else (HIGH - WIDE, HIGH)
+        assert low <= u <= high
+    assert len({round(u, 6) for u in levels}) == 20
+
+
+def test_both_ends_are_first_about_equally_often_and_no_start_is_an_end() -> None:
+    firsts = [starts(bytes([n] * 32))[0] for n in range(60)]
+    assert 15 < sum(one > 6 for one in firsts) < 45
+    assert all(2 < one < 18 for one in firsts)
+
+
+@pytest.mark.parametrize("level", ["value", "difference"])
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_steps_lead_to_more_of_the_number_and_stop_at_the_ends(level: str, direction: str) -> None:
+    stimulus = Stimulus.model_validate(
+        {"vary": "b", "level": level, "levels": (1.0, 5.0), "spacing": "linear", "direction": direction}
+    )
+    setting = Adjustment.model_validate({"step_size": 0.3}).adjusting(stimulus, None if level == "value" else 9.0, 2.0)
+    one, other = setting.comparison(setting.moved(0, 1)), setting.comparison(0)
+    assert one == pytest.approx(other + 0.3)
+    ends = sorted(setting.comparison(setting.moved(0, way * 1000)) for way in (-1, 1))
+    assert ends == pytest.approx(sorted(stimulus.comparison(setting.standard, end) for end in (1.0, 5.0)))
+
+
+def test_steps_beyond_an_end_are_none_and_those_back_are_counted_from_it() -> None:
+    stimulus = Stimulus.model_validate({"vary": "b", "level": "value", "levels": (2.0, 18.0)})
+    setting = Adjustment().adjusting(stimulus, 6.0, 2.1)
+    assert setting.level(setting.reached([-1000])) == 2.0
+    assert setting.reached([-5, -5, 4, 2]) == setting.reached([-100, 6]) != setting.reached([-4])
+    assert setting.level(setting.reached([1000])) == 18.0
+    back = setting.level(setting.reached([1000, -1]))
+    assert back < 18.0 < back * 9 ** (1 / 40) * (1 + 1e-9)
+    assert setting.level(0) == 2.1
+    assert setting.level(20) == pytest.approx(2.1 * 9 ** (20 / 40))
+
+
+def test_a_step_is_a_fortieth_of_the_span_or_a_factor_on_log_spacing() -> None:
+    stimulus = Stimulus.model_validate({"vary": "b", "level": "value", "levels": (2.0, 18.0)})
+    assert Adjustment().step(stimulus) == pytest.approx((HIGH - LOW) / 40)
+    assert Adjustment(step_size=1.1).step(stimulus) == pytest.approx(math.log10(1.1))
+
+
+@pytest.mark.parametrize(
+    ("edits", "place", "message"),
+    [
+        ([('method = "set"\n', "")], "blocks.matching.method", 'set by the participant (method = "adjustment")'),
+        ([('design = "match"', 'design = "2ifc"')], "blocks.matching.method", "a level that the participant sets"),
+        (
+            [
+                TWO,
+                ("[stimuli.damping]", '[stimuli.damping]\ncondition = "one"'),
+                ('stimulus = "damping"\n', 'conditions = ["one", "late"]\nstandard = "one"\n'),
+                ('method = "set"\n', ""),
+            ],
+            "blocks.matching.design",
+            "adjusts a number, and the block varies none (vary a stimulus)",
+        ),
+        ([("levels = [2, 18]", "levels = [6, 18]")], "stimuli.damping.levels", "on both sides of the standard 6"),
+        ([('level = "value"\nlevels = [2, 18]', "levels = [0.1, 0.5]")], "stimuli.damping.levels", 'level = "value"'),
+        ([("repetitions = 4", "step_size = 0.9")], "methods.set.step_size", "a step is a factor above 1"),
+        ([("repetitions = 4", "step_size = 4")], "methods.set.step_size", "more than half the range"),
+        ([("repetitions = 4", "most_s = 1")], "methods.set.most_s", "must be at least 2"),
+        (
+            [
+                WAKE,
+                (DAMPING, DAMPING.replace("damping_nspm", "wake.length").replace("[2, 18]", "[100, 900]")),
+            ],
+            "methods.set.step_size",
+            '"wake.length" cannot change while it is presented',
+        ),
+        ([(ALONE[0], ALONE[0].replace("\n\n", '\nfeedback = "always"\n\n'))], "designs.match.feedback", "no answer"),
+        ([('method = "set"', 'method = "set"\ncatch = { share = 0.2 }')], "blocks.matching.catch", "no correct answer"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_set_is_one_fault_with_its_place(edits: list[tuple[str, str]], place: str, message: str) -> None:
+    with pytest.raises(ProtocolError) as caught:
+        matching(*edits)
+    (problem,) = caught.value.problems
+    assert problem.place.startswith(place)
+    assert message in f"{problem.message} ({problem.hint})"
+
+
+def test_a_number_whose_effect_keeps_its_state_can_be_set() -> None:
+    decay = DAMPING, DAMPING.replace("damping_nspm", "wake.decay").replace("[2, 18]", "[0.9, 0.999]")
+    assert matching(WAKE, decay).stimuli["damping"].vary == "wake.decay"
+
+
+def test_check_describes_settings_and_warns_of_an_odd_number() -> None:
+    said = " ".join(describe(matching()).split())
+    assert "ADJUSTMENT of damping_nspm, standard 6: 2 intervals, 0.6 s apart" in said
+    assert "40 steps from end to end, started near either, at most 60 s each" in said
+    odd = matching(("repetitions = 4", "repetitions = 5"))
+    assert any("5 settings cannot start equally often" in one for one in level_warnings(odd))
+    assert not any("settings" in one for one in level_warnings(matching()))
+
+
+def test_without_the_standard_there_is_one_interval_and_a_delay_may_start_at_the_present_one() -> None:
+    assert "1 interval" in describe(matching(ALONE))
+    protocol = matching(ALONE, DELAY)
+    block = protocol.blocks["matching"]
+    setting = adjusting_of(protocol, block, 0.0, 30.0)
+    assert setting is not None
+    assert setting.comparison(setting.moved(0, 1)) > 30.0
+
+
+def test_a_task_goes_on_for_as_long_as_a_setting_may_take() -> None:
+    protocol = matching()
+    method = method_of(protocol, protocol.blocks["matching"])
+    assert isinstance(method, Adjustment)
+    followed = lasting(protocol.tasks["stir"], method.most_s)
+    assert followed.limit_s == 60.0
+    assert followed.start_m == protocol.tasks["stir"].start_m
