@@ -23,12 +23,13 @@ from study_app.protocol.trials.stimuli import DELAYS, Stimulated
 from study_app.protocol.trials.task import AnyTask
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
+from study_app.session.simulated.adjusting_observer import LOOK_S
 from study_app.session.simulated.design_observer import OBSERVER, Comparison
 from study_app.session.simulated.observers import reading_s
 from study_app.session.simulated.participant import SimulatedParticipant
 from study_app.session.simulated.trial_features import FEELING, Feelings, feelings
-from study_app.session.transitions.commands import Command, Finish, ShowPage, StartTrial, Write
-from study_app.session.transitions.events import Begin, Continue, Event, TaskDone, TimeUp
+from study_app.session.transitions.commands import Adjust, Command, Finish, ShowPage, StartTrial, Write
+from study_app.session.transitions.events import Begin, Continue, Event, Stepped, TaskDone, TimeUp
 from study_app.session.transitions.state import FINAL
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.clock import SessionClock
@@ -119,6 +120,8 @@ class _Answering(SimulatedParticipant):
                 case TaskPage(interval=Interval(resting=True)) | FeedbackPage():
                     self._pass(max(0.0, (self._state.until_s or 0.0) - self._now_s) + 0.001)  # time comes in whole ms
                     self._post(TimeUp(self._now_s))
+                case TaskPage(adjusts=True) as page:
+                    self._set(page)
                 case TaskPage() as page:
                     self._pass(_least_s(page.task))
                     self._post(TaskDone(self._now_s, "complete", {}))
@@ -126,6 +129,21 @@ class _Answering(SimulatedParticipant):
                     self._fill_in(page)
                 case _:
                     raise SessionError(f"the session failed at {self.page}")
+
+    def _set(self, page: TaskPage) -> None:
+        """Set the level by what was sensed, exactly as it is, until it is done or the time is over."""
+        observer, began_s = self._adjusting(page.trial), self._now_s
+        sensed = self._sensed_in[page.trial]
+        self._pass(page.task.lead_s)
+        while True:
+            self._pass(LOOK_S)
+            steps = observer.steps(sensed[-1], self._remembered(page.trial, sensed[-1]))
+            over = self._now_s - began_s >= page.task.limit_s
+            if over or not steps:
+                break
+            self._post(Stepped(self._now_s, steps))
+        self.answers += 1
+        self._post(TaskDone(self._now_s, "timeout" if over else "complete", {}))
 
     def _felt(self, _trial: int | None) -> Felt:
         return self._feels
@@ -164,6 +182,10 @@ class _Answering(SimulatedParticipant):
                 self._store.append(event, t_s=at_s, **fields)
             case StartTrial(trial=trial, presented=presented):
                 self._sense(trial, presented)
+            case Adjust(presented=presented, fields=fields):
+                self._sensed_in[fields["trial"]].pop()
+                self._sense(fields["trial"], presented)
+                self._store.append("stepped", t_s=at_s, **fields, scene=None)
             case ShowPage(page):
                 self.page = page
             case Finish(status, reason):

@@ -66,6 +66,11 @@ class Senses:
         """Take a frame that was seen."""
         self.ages_s.append((painted_ns - view.sample_time_ns) * 1e-9)
 
+    def clear(self) -> None:
+        """Forget what came so far."""
+        for came in (self.forces_n, self.velocities_mps, self.ages_s):
+            came.clear()
+
     def felt(self) -> Felt:
         """Return the features that an opinion is made of."""
         force_n = np.concatenate(self.forces_n or [np.zeros((0, 3))])

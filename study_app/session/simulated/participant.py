@@ -10,8 +10,10 @@ from study_app.protocol.forms.show_if import Value
 from study_app.protocol.forms.simulated_observer import Felt, rater
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, stream
+from study_app.protocol.trials.tracks import design_of
 from study_app.session.pages import ChoicePage, DesignPage, Page, QuestionnairePage
-from study_app.session.simulated.design_observer import Observer, answer
+from study_app.session.simulated.adjusting_observer import AdjustingObserver
+from study_app.session.simulated.design_observer import Comparison, Observer, answer
 from study_app.session.simulated.observers import Choice, Draw, choices, filled_in, newly_shown
 from study_app.session.transitions.events import Chosen, Event, ItemShown, Submitted
 
@@ -60,6 +62,23 @@ class SimulatedParticipant(ABC):
 
     def _stream(self, name: str) -> Draw:
         return stream(self._seed, f"rehearsal/{self._who}/{name}").random
+
+    def _attended(self, trial: int) -> Comparison:
+        """Return what is attended to in a trial of a block with a design."""
+        return Comparison.of(self._study, self._study.blocks[self._trials[trial].block], self.observer)
+
+    def _adjusting(self, trial: int) -> AdjustingObserver:
+        """Return who sets the level of a trial."""
+        return AdjustingObserver(self._attended(trial), self._stream(f"{trial}/answers"))
+
+    def _remembered(self, trial: int, sensed: float) -> float:
+        """Return what a setting is compared with: the interval before, else the mean of earlier ones, else itself."""
+        block = self._study.blocks[self._trials[trial].block]
+        known = self._sensed(block)
+        if design_of(self._study, block).intervals > 1:
+            return known[trial][0]
+        earlier = [one for number in sorted(known) if number < trial for one in known[number]]
+        return sum(earlier) / len(earlier) if earlier else sensed
 
     def _fill_in(self, page: QuestionnairePage | DesignPage) -> None:
         """Answer every question by what was felt, and confirm."""

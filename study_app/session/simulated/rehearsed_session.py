@@ -6,6 +6,8 @@ What the participant does and answers in a trial is drawn from streams of that t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -31,10 +33,12 @@ from study_app.session.pages import (
 from study_app.session.ports import KeptSession, Ports
 from study_app.session.resume import FIRST, Start
 from study_app.session.runner import Runner
+from study_app.session.simulated.adjusting_observer import LOOK_S as LOOK_AT_SETTING_S
+from study_app.session.simulated.adjusting_observer import AdjustingObserver
 from study_app.session.simulated.design_observer import OBSERVER, Comparison, Observer
 from study_app.session.simulated.observers import Draw, Senses, hand_for, reading_s, rest
 from study_app.session.simulated.participant import SimulatedParticipant
-from study_app.session.transitions.events import Begin, Continue, Event, ResumeAsked
+from study_app.session.transitions.events import Begin, Continue, Event, ResumeAsked, Stepped, Submitted
 from study_app.session.trial import TankView
 
 LOOK_S = 0.05  # the session looks at the device so often
@@ -51,6 +55,20 @@ def rehearsal_rig(study: Protocol, person: str, seed: int, device: str) -> Rig:
         rig.stop()
         raise SessionError(f"device '{device}' has no hand that takes orders, so that it cannot be rehearsed on")
     return rig
+
+
+@dataclass(slots=True)
+class _Setting:
+    """A level that is being set: by whom, what was sensed since the last steps, and when they were made [s]."""
+
+    observer: AdjustingObserver
+    scale: float
+    judged_s: float = 0.0
+    done: bool = False
+    senses: Senses = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.senses = Senses(self.scale)
 
 
 class RehearsedSession(SimulatedParticipant):
@@ -166,13 +184,17 @@ class RehearsedSession(SimulatedParticipant):
         self._touch.read()
         self._next_frame_ns = self.rig.servo.now_ns()
         hand = hand_for(page.task, arm, draw, self._now_s())
+        setting = _Setting(self._adjusting(page.trial), self._study.scene.scale) if page.adjusts else None
         self.look(senses)  # the first frame, with which the trial begins, is painted at once
         while page is self.page:
             self._advance(LOOK_S)
             view = self.look(senses)
             wants_to_go_on = view is not None and hand.act(self._now_s(), view)
-            senses.feel(np.asarray(self._touch.read()))
+            samples = np.asarray(self._touch.read())
+            senses.feel(samples)
             self._poll()
+            if setting is not None and view is not None and page is self.page:
+                self._set(page, setting, view, samples)
             if wants_to_go_on and page is self.page:
                 self._post(Continue(self._now_s()))
         rest(page.task, arm)
@@ -180,6 +202,24 @@ class RehearsedSession(SimulatedParticipant):
         self._felt_in[page.trial] = (*earlier, senses.felt())
         if self._tell_felt is not None:
             self._tell_felt(page.trial, self._felt_in[page.trial])
+
+    def _set(self, page: TaskPage, setting: _Setting, view: TankView, samples: Any) -> None:
+        """Adjust what is felt by what was sensed since the last steps, and confirm where that is done."""
+        setting.senses.feel(samples)
+        setting.senses.see(self.rig.servo.now_ns(), view)
+        since_s = view.task.elapsed_s - setting.judged_s
+        if setting.done or since_s < LOOK_AT_SETTING_S or view.task.elapsed_s < page.task.lead_s + LOOK_AT_SETTING_S:
+            return
+        sensed = self._attended(page.trial).sensed(setting.senses.felt())
+        steps = setting.observer.steps(sensed, self._remembered(page.trial, sensed))
+        setting.senses.clear()
+        setting.judged_s = view.task.elapsed_s
+        if steps:
+            self._post(Stepped(self._now_s(), steps))
+        else:
+            setting.done = True
+            self.answers += 1
+            self._post(Submitted(self._now_s()))
 
     def look(self, senses: Senses) -> TankView | None:
         """Show the frames that are due since the last look; return what the newest showed, None where none was due."""
