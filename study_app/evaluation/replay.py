@@ -21,18 +21,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import StoreError
-from study_app.evaluation.recorded_delivery import delivered_again, different
+from study_app.evaluation.recorded_intervals import (
+    as_one_scene,
+    delivered_again,
+    different,
+    places_of,
+    scene_presented,
+    steps_of,
+)
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.safety import START_FADE_S, begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import Dynamics, dynamics_from
 from study_app.haptics.model.layout import LIMITER_FADE, SAMPLE, records
 from study_app.haptics.model.scene import FADE_S, Scene
-from study_app.haptics.runtime.pack import pack
+from study_app.haptics.runtime.pack import adjust_into, pack
 from study_app.haptics.runtime.recompute import take_sample, was_lost_at_read
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.answered import presented_by
-from study_app.protocol.trials.presentation import link_seed, scene_of
-from study_app.protocol.trials.stimuli import Stimulated
+from study_app.protocol.trials.presentation import link_seed
 from study_app.store import receipt, recording_files
 from study_app.store.atomic import is_there
 from study_app.store.blinded import blinding
@@ -119,14 +125,16 @@ def replay(session_folder: Path) -> Replayed:
         if not is_there(path):
             found.missing.append(f"{name}: {line['recording']} is missing, but the journal mentions it")
             continue
-        scene = _scene(protocol, key, started, kept)
-        samples, checks = recording_files.read_samples(path), recording_files.read_checks(path)
+        seed = link_seed(kept["seed"], kept["participant"], *_which(started))
+        scene, steps = scene_presented(protocol, key, started, seed), steps_of(protocol, key, started, lines)
+        recorded, checks = recording_files.read_samples(path), recording_files.read_checks(path)
         start = time.perf_counter()
-        before = _again(samples, scene, *devices[resumed], before)
+        samples = as_one_scene(recorded, steps)
+        before = _again(samples, scene, *devices[resumed], before, places_of(recorded, steps))
         found.compare(name, samples, before, checks)
         if (ended := intervals.get(_which(started))) is not None and _until_gap(samples.tick) == len(samples):
             interval = presented_by(protocol, key.codes, started).intervals[started["interval"] - 1]
-            again = delivered_again(protocol, interval, started["block"], samples, ended)
+            again = delivered_again(protocol, interval, started, samples, ended)
             found.differences += [f"{name}: the column {column} differs" for column in different(again, ended)]
         found.computed_s += time.perf_counter() - start
     return found.replayed(time.perf_counter() - began)
@@ -147,8 +155,18 @@ class _Before:
     knows_its_start: bool = True
 
 
-def _again(samples: Any, scene: Scene, limit_n: float, dynamics: Dynamics, before: _Before | None) -> _Before:
-    """Return the forces of ``samples`` computed again, in a copy; the scene that is theirs is the last one's."""
+def _again(
+    samples: Any,
+    scene: Scene,
+    limit_n: float,
+    dynamics: Dynamics,
+    before: _Before | None,
+    steps: Sequence[tuple[int, Scene]] = (),
+) -> _Before:
+    """Return the forces of ``samples`` computed again, in a copy; the scene that is theirs is the last one's.
+
+    From the samples named in ``steps`` on it has other numbers.
+    """
     out = samples.copy()
     serial = int(out.scene[-1]) if len(out) else 0
     rest = pack(scene.model_copy(update={"liquids": (), "fade_s": FADE_S}), dynamics=dynamics)
@@ -158,14 +176,15 @@ def _again(samples: Any, scene: Scene, limit_n: float, dynamics: Dynamics, befor
     if before is not None and shared is not None:
         first = shared
         _copy_forces(before.samples[len(before.samples) - first :], out[:first])
-        _run(rest, before.model, model, before.serial, serial, before.safety[0], out, first)
+        models = rest, before.model, model
+        _run_steps(models, (before.serial, serial), before.safety[0], out, first, steps, dynamics)
         return _Before(serial, model, before.safety, out, before.knows_its_start)
     safety = new_safety(limit_n)
     if len(out) and out.tick[0] != 0:
         _assume(safety[0], out)
         first = 1
     knows_its_start = not out.force_n[out.scene != serial].any()
-    _run(rest, rest, model, 0, serial, safety[0], out, first)
+    _run_steps((rest, rest, model), (0, serial), safety[0], out, first, steps, dynamics)
     return _Before(serial, model, safety, out, knows_its_start)
 
 
@@ -196,6 +215,23 @@ def _assume(safety: Any, out: Any) -> None:
     safety.fade = 0.0 if fades else 1.0
     safety.fade_s = START_FADE_S if fades else 0.0
     safety.slewed_n[:] = out.command_n[0]
+
+
+def _run_steps(
+    models: tuple[Any, Any, Any],
+    serials: tuple[int, int],
+    safety: Any,
+    out: Any,
+    first: int,
+    steps: Sequence[tuple[int, Scene]],
+    dynamics: Dynamics,
+) -> None:
+    """Take each of ``out`` from ``first`` on, with other numbers of its own scene from each step on."""
+    for place, scene in steps:
+        _run(*models, *serials, safety, out[:place], first)
+        adjust_into(models[-1], scene, dynamics=dynamics)
+        first = max(first, place)
+    _run(*models, *serials, safety, out, first)
 
 
 @kernel
@@ -308,15 +344,6 @@ def _listed(seconds: list[int]) -> str:
     shown = ", ".join(map(str, seconds[:NAMED_SECONDS]))
     more = f" … ({len(seconds)} in all)" if len(seconds) > NAMED_SECONDS else ""
     return f"second {shown}{more}"
-
-
-def _scene(protocol: Protocol, key: blinding.Key, started: Line, kept: Mapping[str, Any]) -> Scene:
-    """Return what was presented: a condition, or an interval of a trial whose sealed line is opened."""
-    seed = link_seed(kept["seed"], kept["participant"], *_which(started))
-    if "interval" not in started:
-        return scene_of(protocol, Stimulated(key.condition(started["block"], started["code"])), seed)
-    due = presented_by(protocol, key.codes, started)
-    return scene_of(protocol, due.intervals[started["interval"] - 1], seed)
 
 
 def _which(line: Line) -> tuple[int, int, int | None]:
