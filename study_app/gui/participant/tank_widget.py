@@ -15,6 +15,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QRegion, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 
+from study_app.gui.participant.intervals.setting_controls import SettingControls
 from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.participant.tank import sprites
@@ -114,6 +115,7 @@ class TankWidget(QWidget):
         self.targets: tuple[TargetPlace, ...] = ()
         self.placer: BallPlacer | None = None
         self._stroke = 1.0
+        self.controls: SettingControls | None = None
 
     @property
     def page(self) -> TaskPage:
@@ -149,6 +151,8 @@ class TankWidget(QWidget):
         """Draw another interval of the same trial, or the rest before it; a view of before is no frame of it."""
         self._page = page
         self._captions.turn_to(page)
+        if self.controls is not None:
+            self.controls.turn_to(page)
         if self.view is not None:  # the ball stays where it is until the next view
             self.view = replace(self.view, task=track(page.task).now(), ball_hidden=False)
         self._unpainted = False
@@ -163,7 +167,7 @@ class TankWidget(QWidget):
         """Say which interval begins, or comes."""
         interval = self._page.interval
         if interval is not None:
-            self.setAccessibleName(f"{interval.announced}. {self._page.instruction}")
+            self.setAccessibleName(f"{interval.announced}. {self._page.said}")
             say(self, interval.announced)
 
     def prepare(self) -> None:
@@ -256,9 +260,10 @@ class TankWidget(QWidget):
         In a rest that waits for the ball, that it is to come back; otherwise "".
         """
         todo, view, words = self._page.task, self.view, self._words
-        if view is None or view.task.lit is None or isinstance(todo, Explore):
-            return ""
-        if isinstance(todo, Follow) and not self.resting:
+        if self._page.adjusts:
+            return self._captions.setting_keys if self._by_mouse else ""
+        following = isinstance(todo, Follow) and not self.resting
+        if view is None or view.task.lit is None or isinstance(todo, Explore) or following:
             return ""
         target = todo.targets_m[view.task.lit] if isinstance(todo, Reach) else todo.start_m
         x, y, z = (there - float(here) for there, here in zip(target, view.position_m, strict=True))
@@ -278,6 +283,8 @@ class TankWidget(QWidget):
         width, height = self.width(), self.height()
         self._box, self.camera = look(self._page, self._captions, width, height)
         self._captions.lay_out(width, height, self.camera.point((0, self._box.floor, self._box.z))[1])
+        if self.controls is not None:
+            self.controls.place(self._captions)
         self.placer = BallPlacer(self.camera, self._box, self._page.body_radius_m)
         for step in range(DEPTH_STEPS):
             radius, haze = self.placer.size(step)

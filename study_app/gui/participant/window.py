@@ -15,22 +15,17 @@ from PySide6.QtGui import (
     QKeyEvent,
     QPainter,
     QPaintEvent,
-    QPixmap,
     QResizeEvent,
     QScreen,
+    QWheelEvent,
 )
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.display.screens import place
-from study_app.gui.participant.forms.form import FormWidget
-from study_app.gui.participant.intervals.choice_page import ChoiceWidget
-from study_app.gui.participant.intervals.feedback_page import FeedbackWidget
-from study_app.gui.participant.intervals.number_page import NumberWidget
-from study_app.gui.participant.pages.notices import NoticeWidget, PauseWidget
+from study_app.gui.participant.intervals.setting_controls import SettingControls
+from study_app.gui.participant.page_widgets import page_widget
 from study_app.gui.participant.pages.page_widget import PageWidget
-from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.pages.reading_page import ReadingPage
-from study_app.gui.participant.pages.text_page import TextWidget
 from study_app.gui.participant.pointer_capture import BUTTONS, PointerCapture
 from study_app.gui.participant.tank_widget import TankWidget, paint_ahead
 from study_app.gui.theme.theme import PARTICIPANT, font, load_fonts, stylesheet
@@ -38,17 +33,14 @@ from study_app.gui.widgets.accessible import give_role
 from study_app.gui.widgets.escape_key import EscapeHold
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import (
-    ChoicePage,
     DesignPage,
     EndPage,
     FeedbackPage,
-    NumberPage,
     Page,
     PausePage,
     QuestionnairePage,
     TaskPage,
     TextPage,
-    TroublePage,
 )
 from study_app.session.transitions.events import Continue, ForceStopped, PauseAsked
 
@@ -238,14 +230,26 @@ class ParticipantWindow(QWidget):
             self.tank.show_view(view)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Hear Space and Enter in the tank."""
-        if event.isAutoRepeat():
+        """Hear Space and Enter in the tank, and the arrows where a level is set."""
+        controls = None if self.tank is None else self.tank.controls
+        if (controls is not None and controls.press(event)) or event.isAutoRepeat():
             return
         key = event.key()
         if key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._may_leave_tank():
             self.event.emit(Continue(self._clock()))
         else:
             super().keyPressEvent(event)
+
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Hear that an arrow was let go."""
+        super().keyReleaseEvent(event)
+        if self.tank is not None and self.tank.controls is not None:
+            self.tank.controls.release(event)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802
+        """Hear the wheel where a level is set."""
+        if self.tank is not None and self.tank.controls is not None:
+            self.tank.controls.turn_wheel(event)
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802
         """Hold the pointer in the tank only while this window is active."""
@@ -319,40 +323,29 @@ class ParticipantWindow(QWidget):
         return self.rect().adjusted(frame, frame + above, -frame, -frame)
 
     def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
-        said, clock, text = self._words, self._clock, self.text_scale
-        made: PageWidget
-        match page:
-            case TaskPage():
-                tank = TankWidget(
-                    page,
-                    said,
-                    self,
-                    text_scale=text,
-                    on_card=self._on_card,
-                    photodiode=self._photodiode,
-                    by_mouse=self._captures,
-                )
-                tank.painted.connect(self.painted)
-                tank.swapped.connect(self.swapped)
-                return tank
-            case QuestionnairePage(labels=()):
-                made = FormWidget(page, said, clock, self, text_scale=text)
-            case QuestionnairePage():
-                made = QuestionnaireWidget(page, said, clock, self, text_scale=text)
-            case ChoicePage():
-                made = ChoiceWidget(page, said, clock, self, text_scale=text)
-            case NumberPage():
-                made = NumberWidget(page, said, clock, self, text_scale=text)
-            case FeedbackPage():
-                made = FeedbackWidget(page, said, clock, self, text_scale=text)
-            case TextPage():
-                made = TextWidget(page, said, clock, self, text_scale=text)
-            case PausePage():
-                made = PauseWidget(page, said, clock, under=_picture(old), parent=self, text_scale=text)
-            case TroublePage() | EndPage():
-                made = NoticeWidget(page, said, clock, self, text_scale=text)
+        if isinstance(page, TaskPage):
+            return self._make_tank(page)
+        made = page_widget(page, self._words, self._clock, self, old, self.text_scale)
         made.event_made.connect(self.event)
         return made
+
+    def _make_tank(self, page: TaskPage) -> TankWidget:
+        said, shown = self._words, not self._captures
+        tank = TankWidget(
+            page,
+            said,
+            self,
+            text_scale=self.text_scale,
+            on_card=self._on_card,
+            photodiode=self._photodiode,
+            by_mouse=self._captures,
+        )
+        tank.painted.connect(self.painted)
+        tank.swapped.connect(self.swapped)
+        if page.question:
+            tank.controls = SettingControls(page, said, self._clock, tank, buttons=shown)
+            tank.controls.event_made.connect(self.event)
+        return tank
 
     def _enter_tank(self, tank: TankWidget, page: TaskPage) -> None:
         """Give the keyboard to the window, and the pointer to the hand if it is the device."""
@@ -390,10 +383,3 @@ class ParticipantWindow(QWidget):
     def _stop_force(self) -> None:
         if self._page is not None:
             self.event.emit(ForceStopped(self._clock(), "participant"))
-
-
-def _picture(widget: QWidget) -> QPixmap | None:
-    """Return what a page looks like, for the pause to lie on; a pause on a pause shows the first one's ground."""
-    if isinstance(widget, PauseWidget):
-        return widget.under
-    return widget.grab() if widget.width() > 0 else None

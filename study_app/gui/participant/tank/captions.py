@@ -25,6 +25,7 @@ LEAST_SCALE = 0.72
 INSTRUCTION = 0.72  # of the window's width
 FINE = 0.9
 COUNTED_DOWN_S = 10  # before a task's limit
+CONTROLS_PX = (470, 64)  # of an adjustment's buttons, with the space above and below
 PATCH_ROOM = 88  # of the photodiode's patch in the lower right corner [px]
 CENTRED = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
 RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -60,7 +61,7 @@ class Captions:
         self._size_words(width, height)
         lines = max(2, self._instruction_lines())
         foot = height - self._top_of_foot(stacked=True) if self._text_scale > 1 else 0.0
-        return max(168 * self._scale, foot + (lines + 0.3) * self._line)
+        return max(168 * self._scale, foot + (lines + 0.3) * self._line) + self._controls_above
 
     def above(self, width: float, height: float) -> float:
         """Return the height [px] that progress and count need above the tank."""
@@ -88,7 +89,7 @@ class Captions:
         if stacked:
             self._foot.setTop(self._foot_middle() - 0.62 * small)
         tall = self._instruction_lines() * self._line
-        room = self._top_of_foot(stacked=stacked) - below
+        room = self._top_of_foot(stacked=stacked) - below - self._controls_above
         top = below + max(4 * scale, (room - tall) * 0.55)
         self._instruction = QRectF((1 - INSTRUCTION) / 2 * width, top, INSTRUCTION * width, max(room, tall))
 
@@ -105,8 +106,9 @@ class Captions:
 
     def _instruction_lines(self) -> int:
         metrics = QFontMetricsF(self._instruction_font)
-        bounds = metrics.boundingRect(QRectF(0, 0, INSTRUCTION * self._width, 1e4), CENTRED, self._page.instruction)
-        return max(1, round(bounds.height() / self._line))
+        room = QRectF(0, 0, INSTRUCTION * self._width, 1e4)
+        texts = (self._page.instruction, self._page.question)
+        return max(1, *(round(metrics.boundingRect(room, CENTRED, text).height() / self._line) for text in texts))
 
     def _foot_middle(self) -> float:
         small = QFontMetricsF(self._small).height()
@@ -139,7 +141,7 @@ class Captions:
             self._draw_count(painter, task)
         if region.intersects(self._instruction.toAlignedRect()):
             rest = page.interval if page.interval is not None and page.interval.resting else None
-            said = page.instruction if rest is None else rest.announced
+            said = page.said if rest is None else rest.announced
             _text(painter, self._instruction, CENTRED, said, self._instruction_font, PARTICIPANT.text)
         if region.intersects(self._placed(self._foot).toAlignedRect()):
             self._draw_foot(painter)
@@ -156,6 +158,31 @@ class Captions:
     def _placed(self, place: QRectF) -> QRectF:
         """Return a place of a page read from left to right, in this one."""
         return mirrored(place, self._width) if self._words.right_to_left else place
+
+    @property
+    def controls_middle(self) -> float:
+        """At which height the controls of an adjustment are [px]: that of the foot, or above it."""
+        above = self._controls_above
+        return self._foot.top() - above / 2 if above else self._foot_middle()
+
+    @property
+    def _controls_above(self) -> float:
+        """The height that controls need above the foot [px]; 0 where there is room beside it, or are none."""
+        wide, high = (side * self._fine for side in CONTROLS_PX)
+        start = 64 * caption_scale(self._width, self._height)
+        beside = start + self._foot_width() + 24 <= (self._width - wide) / 2
+        return high if self._page.question and not beside else 0.0
+
+    @property
+    def small_scale(self) -> float:
+        """How much larger than designed small words are."""
+        return self._fine
+
+    @property
+    def setting_keys(self) -> str:
+        """Which keys set a level, in a line."""
+        words = self._words
+        return f"← {words.less} · {words.more} → · {words.enter_key}: {words.done}"
 
     def _longest_hints(self) -> tuple[str, ...]:
         words = self._words
@@ -179,6 +206,8 @@ class Captions:
     def _hint_words(self, task: TaskShown | None, hint: str) -> str:
         """Return how the ball gets into its target, and how long it takes until the participant may or must go on."""
         todo, words = self._page.task, self._words
+        if self._page.adjusts:
+            return hint
         if isinstance(todo, Follow) or (self._page.interval is not None and self._page.interval.resting):
             return hint  # a count would distract from the pace, whose end is no surprise
         elapsed_s = task.elapsed_s if task else 0.0  # before the first view nothing has happened yet

@@ -1,0 +1,63 @@
+"""Which widget draws a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from PySide6.QtGui import QPixmap
+from PySide6.QtWidgets import QWidget
+
+from study_app.gui.participant.forms.form import FormWidget
+from study_app.gui.participant.intervals.choice_page import ChoiceWidget
+from study_app.gui.participant.intervals.feedback_page import FeedbackWidget
+from study_app.gui.participant.intervals.number_page import NumberWidget
+from study_app.gui.participant.pages.notices import NoticeWidget, PauseWidget
+from study_app.gui.participant.pages.page_widget import PageWidget
+from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
+from study_app.gui.participant.pages.text_page import TextWidget
+from study_app.session.pages import (
+    ChoicePage,
+    EndPage,
+    FeedbackPage,
+    NumberPage,
+    PausePage,
+    QuestionnairePage,
+    TextPage,
+    TroublePage,
+)
+
+if TYPE_CHECKING:
+    from study_app.protocol.wording.languages import Words
+
+WithoutTank = TextPage | QuestionnairePage | ChoicePage | NumberPage | FeedbackPage | PausePage | TroublePage | EndPage
+
+
+def page_widget(
+    page: WithoutTank, words: Words, clock: Callable[[], float], parent: QWidget, old: QWidget, text_scale: float
+) -> PageWidget:
+    """Return the widget of a page that is not a tank; a pause lies on a picture of the ``old`` one."""
+    match page:
+        case QuestionnairePage(labels=()):
+            return FormWidget(page, words, clock, parent, text_scale=text_scale)
+        case QuestionnairePage():
+            return QuestionnaireWidget(page, words, clock, parent, text_scale=text_scale)
+        case ChoicePage():
+            return ChoiceWidget(page, words, clock, parent, text_scale=text_scale)
+        case NumberPage():
+            return NumberWidget(page, words, clock, parent, text_scale=text_scale)
+        case FeedbackPage():
+            return FeedbackWidget(page, words, clock, parent, text_scale=text_scale)
+        case TextPage():
+            return TextWidget(page, words, clock, parent, text_scale=text_scale)
+        case PausePage():
+            return PauseWidget(page, words, clock, under=_picture(old), parent=parent, text_scale=text_scale)
+        case TroublePage() | EndPage():
+            return NoticeWidget(page, words, clock, parent, text_scale=text_scale)
+
+
+def _picture(widget: QWidget) -> QPixmap | None:
+    """Return what a page looks like, for the pause to lie on; a pause on a pause shows the first one's ground."""
+    if isinstance(widget, PauseWidget):
+        return widget.under
+    return widget.grab() if widget.width() > 0 else None
