@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis.designs.sensitivities import sensitivities
+from study_app.analysis.designs.settings import settings
 from study_app.analysis.designs.thresholds import thresholds
 from study_app.analysis.designs.weber_exponents import weber_exponents
 from study_app.analysis.results.levels import (
@@ -34,12 +35,18 @@ from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.trials.design import Reply
 from study_app.protocol.trials.stimuli import OF_LINK
 
-SUMMARIES: Final[dict[Reply, Summary]] = {"choice": "share", "rating": "mean", "number": "geometric mean"}
+SUMMARIES: Final[dict[Reply, Summary]] = {
+    "choice": "share",
+    "rating": "mean",
+    "number": "geometric mean",
+    "setting": "settings",
+}
 """How the answers at a level are summarised, by the reply that the design asks for."""
 
 READ: Final = (
     *("participant", "session", "trial", "block", "code", "track", "catch", "standard", "level", "level_delivered"),
     *("comparison", "arrangement", "analysed", "response", "value", "success", "right", "response_s", "reversal"),
+    "setting",
 )
 """The columns of tracks that are read here."""
 MOST_LEVELS: Final = 8
@@ -94,6 +101,7 @@ def _block(
         sensitivities=() if opened is None else tuple(sensitivities(block, opened)),
         family=None if block.assumed is None else block.assumed.family,
         adaptive=block.method is not None and block.method.adaptive,
+        settings=() if opened is None else tuple(settings(block, opened)),
         published=tuple(PublishedValue(**one.model_dump(exclude={"block"})) for one in block.published),
     )
 
@@ -142,6 +150,8 @@ def _median(seconds: Array) -> tuple[int, float | None]:
 
 def _answers(block: LevelBlock, opened: pd.DataFrame, bounds: tuple[float, float] | None) -> Iterator[LevelAnswers]:
     """Yield the answers at each level, and apart those to catch trials: of all participants, then of each."""
+    if block.design.adjusts:
+        return
     rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["response"].notna()]
     if block.stimulus is None:
         rows = rows.assign(comparison=rows["track"], place=rows["track"].map(_places(block)))

@@ -47,7 +47,7 @@ def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Sensitivi
             for level in levels[1:]:
                 own = [_of_ratings(person, one, levels[0], level) for person, one in _people(rows)]
                 yield from _with_group([one for one in own if one is not None])
-        case "number":
+        case "number" | "setting":
             return
 
 

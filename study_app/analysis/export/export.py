@@ -16,7 +16,7 @@ from study_app.analysis.tables.study import Study, load_study
 from study_app.store.output_files import write_files
 
 Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
-OPENED: Final = ("tracks", "thresholds")
+OPENED: Final = ("tracks", "thresholds", "settings")
 """Tables of levels that SPSS files are made of."""
 NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
 
@@ -31,7 +31,7 @@ def export(
     """Write the tables and the codebook of a study into the folder ``to``; return the files.
 
     Tables: responses, trials, aggregate; of a study with levels also intervals and, once its key is open, tracks
-    and thresholds.
+    and thresholds, and where participants set levels their settings.
 
     Files that are not as they were recorded are used as they are: ``warn`` receives each, and the codebook names it.
 

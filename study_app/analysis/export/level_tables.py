@@ -1,8 +1,8 @@
-"""The tables of a study with levels: intervals and, once the key is open, its trials and its thresholds."""
+"""The tables of a study with levels: intervals and, once the key is open, its trials, thresholds and settings."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -10,12 +10,12 @@ import pandas as pd
 
 from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.export.delivered import JUDGED, Delivered, delivered
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.levels import LevelsFound, SettingFound
 from study_app.analysis.tables.study import Study
 from study_app.analysis.tables.tracks import OF_INTERVALS, tracks
 from study_app.store.tables.column import Column, header, unsealed
 from study_app.store.tables.columns import INTERVALS, TRIALS_2, tables_of
-from study_app.store.tables.level_columns import OF_TRACKS, THRESHOLDS
+from study_app.store.tables.level_columns import OF_TRACKS, SETTINGS, THRESHOLDS
 
 _OF_TRIAL: Final = ("study", "participant", "session", "simulated", "pilot", "group", "trial", "attempt", "block")
 _OF_BLOCK: Final = ("phase", "part", "index", "code")
@@ -44,30 +44,53 @@ def level_tables(study: Study) -> Iterator[Delivered]:
     if study.revealed:
         frame = tracks(study).rename(columns={"level": "level_asked"})
         yield delivered("tracks", (*TRACKS, *_of_intervals(study)), frame)
-        yield delivered("thresholds", (*_OF_PERSON, *THRESHOLDS), _thresholds(study, frame))
+        found = levels_found(study, frame.rename(columns={"level_asked": "level"}))
+        yield delivered("thresholds", (*_OF_PERSON, *THRESHOLDS), _thresholds(study, frame, found))
+        if any(block.design.adjusts for block in study.levels):
+            yield delivered("settings", (*_OF_PERSON, *SETTINGS), _settings(study, frame, found))
 
 
-def _thresholds(study: Study, tracks: pd.DataFrame) -> pd.DataFrame:
-    """Return a row per participant and standard, or condition that is compared, of the main blocks."""
-    groups = dict(zip(tracks["participant"], tracks["group"], strict=True))
+def _settings(study: Study, tracks: pd.DataFrame, levels: Sequence[LevelsFound]) -> pd.DataFrame:
+    """Return a row per participant and standard of the main blocks whose levels participants set."""
     rows = [
-        {
-            "study": study.name,
-            "participant": participant,
-            "simulated": study.simulated,
-            "pilot": study.pilot,
-            "group": groups[participant],
-            "block": found.block,
-            "standard": standard,
-            "condition": condition,
-            **_measured(found, participant, standard, condition),
-        }
-        for found in levels_found(study, tracks.rename(columns={"level_asked": "level"}))
+        _person(study, tracks, one.participant) | {"block": found.block, **_named(one, header(SETTINGS))}
+        for found in levels
+        for one in found.own_settings
+    ]
+    return _frame(rows, (*_OF_PERSON, *SETTINGS))
+
+
+def _named(one: SettingFound, names: Sequence[str]) -> dict[str, Any]:
+    return {name: getattr(one, name) for name in names if hasattr(one, name)}
+
+
+def _person(study: Study, tracks: pd.DataFrame, participant: str | None) -> dict[str, Any]:
+    """Return what every row about a participant begins with."""
+    groups = dict(zip(tracks["participant"], tracks["group"], strict=True))
+    return {
+        "study": study.name,
+        "participant": participant,
+        "simulated": study.simulated,
+        "pilot": study.pilot,
+        "group": groups[participant],
+    }
+
+
+def _frame(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> pd.DataFrame:
+    frame = pd.DataFrame(rows, columns=list(header(tuple(columns))))
+    return frame.astype({column.name: TYPES[column.kind] for column in columns})
+
+
+def _thresholds(study: Study, tracks: pd.DataFrame, levels: Sequence[LevelsFound]) -> pd.DataFrame:
+    """Return a row per participant and standard, or condition that is compared, of the main blocks."""
+    rows = [
+        _person(study, tracks, participant)
+        | {"block": found.block, "standard": standard, "condition": condition}
+        | _measured(found, participant, standard, condition)
+        for found in levels
         for participant, standard, condition in _estimated(found)
     ]
-    columns = (*_OF_PERSON, *THRESHOLDS)
-    frame = pd.DataFrame(rows, columns=list(header(columns)))
-    return frame.astype({column.name: TYPES[column.kind] for column in columns})
+    return _frame(rows, (*_OF_PERSON, *THRESHOLDS))
 
 
 def _estimated(found: LevelsFound) -> list[tuple[str | None, float | None, str | None]]:

@@ -11,11 +11,12 @@ from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.designs.questions import questions_found
 from study_app.analysis.figures import captions
 from study_app.analysis.figures.answer_figures import KINDS, render
-from study_app.analysis.figures.level_figure import level_pictures
+from study_app.analysis.figures.levels.level_figure import level_pictures
+from study_app.analysis.figures.levels.settings_figure import setting_pictures
+from study_app.analysis.figures.levels.track_figure import track_pictures
+from study_app.analysis.figures.levels.weber_figure import weber_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.figures.question_figures import question_pictures
-from study_app.analysis.figures.track_figure import track_pictures
-from study_app.analysis.figures.weber_figure import weber_pictures
 from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.tables.study import Study, load_study
 from study_app.errors import AnalysisError
@@ -62,7 +63,7 @@ def _of_others(study: Study) -> Iterator[Picture]:
     failures = Failures()
     yield from question_pictures(study, questions_found(study), failures=failures)
     levels = levels_found(study)
-    for pictures_of in (level_pictures, track_pictures, weber_pictures):
+    for pictures_of in (level_pictures, track_pictures, weber_pictures, setting_pictures):
         yield from pictures_of(study, levels, failures=failures)
     if failures.found:
         raise AnalysisError(f"a figure cannot be drawn: {failures.found[0]}")

@@ -12,12 +12,13 @@ from typing import Any
 from study_app import __version__
 from study_app.analysis.evaluate import Progress, evaluate
 from study_app.analysis.export.export import export_files
-from study_app.analysis.figures.level_figure import level_pictures
+from study_app.analysis.figures.levels.level_figure import level_pictures
+from study_app.analysis.figures.levels.settings_figure import setting_pictures
+from study_app.analysis.figures.levels.track_figure import track_pictures
+from study_app.analysis.figures.levels.weber_figure import weber_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.report_figures import pictures
-from study_app.analysis.figures.track_figure import track_pictures
-from study_app.analysis.figures.weber_figure import weber_pictures
 from study_app.analysis.report import block_section, conduct_section, number_files, summary
 from study_app.analysis.report.answers import question_section
 from study_app.analysis.report.first_page.page import first_page
@@ -107,7 +108,7 @@ def _of_questions(study: Study, results: Results, failures: Failures) -> Iterato
     if results.questions:
         yield from question_pictures(study, results.questions, failures=failures)
     if results.levels:
-        for pictures_of in (level_pictures, track_pictures, weber_pictures):
+        for pictures_of in (level_pictures, track_pictures, weber_pictures, setting_pictures):
             yield from pictures_of(study, results.levels, failures=failures)
 
 

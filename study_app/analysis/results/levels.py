@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 from study_app.analysis.results.question_answers import GroupAnswers
 from study_app.analysis.statistics.psychometrics.goodness import WORST, drifts
 
-Summary: TypeAlias = Literal["share", "mean", "geometric mean"]
+Summary: TypeAlias = Literal["share", "mean", "geometric mean", "settings"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +116,29 @@ class ExponentFound:
 
 
 @dataclass(frozen=True, slots=True)
+class SettingFound:
+    """A participant's settings at one standard or, where ``participant`` is None, the means of all participants.
+
+    ``pse`` with the ends of its 95 % interval is a level; ``jnd``, ``constant_error`` (PSE − standard) and
+    ``hysteresis`` (started high − started low) are in u: decades on log spacing, else in the unit of the levels.
+    ``levels`` are a participant's settings, in order, and ``started_high`` says from which end; of the group ``n`` is
+    the number of participants.
+    """
+
+    participant: str | None
+    standard: float | None
+    n: int
+    pse: float
+    low: float | None
+    high: float | None
+    jnd: float | None
+    constant_error: float | None
+    hysteresis: float | None
+    levels: tuple[float, ...] = ()
+    started_high: tuple[bool, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class SensitivityFound:
     """A participant's sensitivity and bias or, where ``participant`` is None, their means over ``n`` participants.
 
@@ -171,8 +194,8 @@ class LevelsFound:
     the varied number, ``quantity`` its name in words, ``unit`` its unit, ``level_kind`` what a level is (weber,
     difference, value), all None where conditions are compared; ``family`` is the psychometric function of the
     thresholds; ``adaptive``: answers chose the levels; ``guess_rate`` is the share at chance, ``bounds`` are the ends
-    of a scale; ``withheld`` is known where the force is delayed, with jitter or loss. Without the key only ``times``
-    are known.
+    of a scale; ``withheld`` is known where the force is delayed, with jitter or loss. Where participants set the levels
+    there are ``settings`` in place of answers at levels. Without the key only ``times`` are known.
     """
 
     block: str
@@ -198,6 +221,7 @@ class LevelsFound:
     family: str | None = None
     adaptive: bool = False
     published: tuple[PublishedValue, ...] = ()
+    settings: tuple[SettingFound, ...] = ()
 
     @property
     def of_group(self) -> tuple[LevelAnswers, ...]:
@@ -215,6 +239,12 @@ class LevelsFound:
         return tuple(one for one in self.thresholds if one.participant is not None)
 
     @property
+    def own_settings(self) -> tuple[SettingFound, ...]:
+        """The participants' settings."""
+        return tuple(one for one in self.settings if one.participant is not None)
+
+    @property
     def people(self) -> tuple[str, ...]:
         """The participants who answered."""
-        return tuple(sorted({one.participant for one in self.answers if one.participant is not None}))
+        answered = {one.participant for one in self.answers} | {one.participant for one in self.settings}
+        return tuple(sorted(one for one in answered if one is not None))

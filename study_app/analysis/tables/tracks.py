@@ -138,7 +138,7 @@ def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
     """Return a row per presentation: standard, level, arrangement, and of each interval force and speed."""
     ordered = intervals.sort_values([*PRESENTATION, "interval"])
     letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")
-    found = ordered.groupby(PRESENTATION, sort=False)[["standard", "level", "catch"]].first()
+    found = ordered.groupby(PRESENTATION, sort=False)[["standard", "level", "catch", "setting"]].first()
     presented: dict[Any, str] = {}
     for which, letter in zip(zip(*(ordered[name] for name in PRESENTATION), strict=True), letters, strict=True):
         presented[which] = presented.get(which, "") + letter

@@ -39,6 +39,6 @@ def _item(design: Design, text: Localised, languages: Sequence[str]) -> Question
     if design.reply == "number":
         return Number(**about, least=LEAST)
     if design.reply == "setting":
-        return Number(**about, whole=True)
+        return Number(**about, whole=True, unit="steps")
     named = {answer: {one: words(one).design_answers[answer] for one in languages} for answer in design.answers}
     return Choice(**about, options=tuple(Option(id=answer, text=said) for answer, said in named.items()))

@@ -64,8 +64,39 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
         "true if the up–down track changed its direction here; n/a where the method has no steps.",
         may_miss=True,
     ),
+    replace(
+        _BY_NAME["setting"],
+        description="The level that the participant set, from level_asked on.",
+    ),
 )
 """What a row of tracks has in addition to the trial it is about."""
+
+SETTINGS: Final[tuple[Column, ...]] = (
+    Column("block", "text", "Id of the block."),
+    Column(
+        "standard", "number", "The standard, in the unit of the varied number; n/a where there is none.", may_miss=True
+    ),
+    Column("n", "integer", "Settings that count.", minimum=0),
+    Column("pse", "number", "Point of subjective equality, a level: the mean of the settings in u."),
+    Column("low", "number", "Lower end of the 95 % interval of the PSE (Student's t).", may_miss=True),
+    Column("high", "number", "Upper end of the 95 % interval of the PSE (Student's t).", may_miss=True),
+    Column(
+        "jnd",
+        "number",
+        "Just-noticeable difference: the standard deviation of the settings, in u (decades where levels are spaced by "
+        "their logarithm, else in the unit of the levels).",
+        minimum=0,
+        may_miss=True,
+    ),
+    Column("constant_error", "number", "PSE minus standard, in u; n/a where no standard was presented.", may_miss=True),
+    Column(
+        "hysteresis",
+        "number",
+        "Mean of the settings that started high minus mean of those that started low, in u.",
+        may_miss=True,
+    ),
+)
+"""Of one row per participant and standard of a block whose levels participants set."""
 
 THRESHOLDS: Final[tuple[Column, ...]] = (
     Column("block", "text", "Id of the block."),

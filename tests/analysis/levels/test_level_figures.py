@@ -13,8 +13,8 @@ import pytest
 from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.designs.track_courses import courses
+from study_app.analysis.figures.levels.weber_figure import published_fractions, weber_fractions
 from study_app.analysis.figures.plotting import plot
-from study_app.analysis.figures.weber_figure import published_fractions, weber_fractions
 from study_app.analysis.results.levels import LevelsFound, PublishedValue, ThresholdFound
 from study_app.analysis.statistics.psychometrics.posterior import fitted, narrowing
 from study_app.analysis.tables.study import load_study

@@ -7,7 +7,7 @@ import pytest
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
 from study_app.store.tables.columns import EXCLUSIONS, GROUP, INTERVALS, RESPONSES_2, TABLES, TRIALS_2
-from study_app.store.tables.level_columns import OF_TRACKS, THRESHOLDS
+from study_app.store.tables.level_columns import OF_TRACKS, SETTINGS, THRESHOLDS
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
 
 OF_FORMAT_2 = tuple(column for column in TRIALS_2 if column not in TABLES["trials"])
@@ -20,7 +20,8 @@ def test_every_column_of_every_file_has_its_line() -> None:
     tables = [responses, RESPONSES_2, trials, INTERVALS, participants]
     outcome, intervals, group = OF_FORMAT_2
     assert (outcome.levels[-1][0], intervals.name, group) == ("invalid", "intervals", GROUP)
-    assert list(sections.values()) == [*tables, OF_FORMAT_2, OF_TRACKS, THRESHOLDS, EXCLUSIONS, SAMPLES, FRAMES]
+    opened = (OF_TRACKS, THRESHOLDS, SETTINGS)
+    assert list(sections.values()) == [*tables, OF_FORMAT_2, *opened, EXCLUSIONS, SAMPLES, FRAMES]
     parts = re.split(r"^<summary><b>([\w, ]+)</b>: ", text, flags=re.MULTILINE)
     assert parts[1::2] == [*sections, "Journal"]
     for title, part in zip(parts[1::2], parts[2::2], strict=True):

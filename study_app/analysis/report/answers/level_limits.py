@@ -19,6 +19,8 @@ MOST_NAMED: Final = 6
 def level_limits(found: LevelsFound) -> Iterator[str]:
     """Yield the limits of a block's thresholds; none where it has no threshold."""
     own = found.own_thresholds
+    if found.own_settings:
+        yield from _of_settings(found)
     if not own:
         return
     kinds: tuple[tuple[Callable[[ThresholdFound], bool], str], ...] = (
@@ -38,6 +40,18 @@ def level_limits(found: LevelsFound) -> Iterator[str]:
             f"{found.title}: {counted(people, 'participant')}; below {FEWEST} the group has no interval, since "
             "differences between people are not known."
         )
+    yield f"{found.title}: motors are audible and were not masked: participants may have used their sound."
+
+
+def _of_settings(found: LevelsFound) -> Iterator[str]:
+    """Yield what settings cannot show."""
+    yield (
+        f"{found.title}: settings depend on how a participant decides that two are equal: their scatter is not a "
+        "threshold free of a criterion."
+    )
+    if few := [one for one in found.own_settings if one.hysteresis is None]:
+        words = "settings started near one end alone, so that hysteresis is not known"
+        yield f"{found.title}: {words} ({listed([str(one.participant) for one in few[:MOST_NAMED]])})."
     yield f"{found.title}: motors are audible and were not masked: participants may have used their sound."
 
 

@@ -19,7 +19,7 @@ LEVELS: Final = {"weber": "Weber fractions", "difference": "differences", "value
 def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsFound]) -> Iterator[str]:
     """Yield the sentences about blocks whose key is open and that have answers."""
     by_id = {block.id: block for block in blocks}
-    opened = [found for found in levels if found.revealed and found.answers]
+    opened = [found for found in levels if found.revealed and (found.answers or found.settings)]
     for found in opened:
         yield from _of_block(by_id[found.block], found)
     if any(found.thresholds for found in opened):
@@ -35,6 +35,13 @@ def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsFound]) -
             "The Weber exponent is the slope of ln JND on ln standard, by least squares for each participant; the "
             "group’s is the mean with Student’s 95 % interval."
         )
+    if any(found.settings for found in opened):
+        yield (
+            "The point of subjective equality is the mean of a participant’s settings, the just-noticeable difference "
+            "their standard deviation, the constant error the difference of mean and standard, and the hysteresis that "
+            "of settings that started high and low, all of the logarithm of the level where levels are spaced so "
+            "(Gescheider 1997). Group values are means over participants with Student’s 95 % interval."
+        )
     if any(one.d_prime is not None for found in opened for one in found.sensitivities):
         yield (
             "Sensitivity is d′ from rates with the log-linear correction (Hautus 1995), by the model of each design "
@@ -47,10 +54,18 @@ def _of_block(block: LevelBlock, found: LevelsFound) -> Iterator[str]:
     if stimulus is None:
         yield f"In “{found.title}” conditions were compared by {block.design.paper_name}."
         return
-    standards = sorted({one.standard for one in found.answers if one.standard is not None})
+    held = {one.standard for one in found.answers} | {one.standard for one in found.settings}
+    standards = sorted(one for one in held if one is not None)
     against = f" of {listed([f'{one:g}' for one in standards])} {found.unit}".rstrip() if standards else ""
     kind = LEVELS[stimulus.level_kind]
     low, high = stimulus.levels
+    if found.settings:
+        to = against.replace(" of ", " to the standard ", 1) if block.design.intervals > 1 else ""
+        yield (
+            f"In “{found.title}” participants set {found.quantity}{to} by {block.design.paper_name}, within {kind} "
+            f"from {low:g} to {high:g}, starting alternately near either end."
+        )
+        return
     chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"
     yield (
         f"In “{found.title}” {found.quantity} was judged by {block.design.paper_name}, at {kind}{against} from {low:g} "

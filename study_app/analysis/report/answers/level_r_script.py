@@ -1,4 +1,4 @@
-"""The part of the script in R about blocks with a design: d′ and criterion, reversal means, Hartung–Knapp means."""
+"""The part of the script in R about blocks with a design: d′ and criterion, reversal means, group means, settings."""
 
 from __future__ import annotations
 
@@ -6,17 +6,23 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from study_app.analysis.report.r_syntax import r_number, r_text
-from study_app.analysis.results.levels import LevelsFound, SensitivityFound, ThresholdFound
+from study_app.analysis.results.levels import (
+    ExponentFound,
+    LevelsFound,
+    SensitivityFound,
+    SettingFound,
+    ThresholdFound,
+)
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study import Study
 from study_app.protocol.trials.methods.updown import UpDown
 
 START: Final = """
 # Blocks with a design: d' and criterion, means of reversals, random-effects means with Hartung-Knapp intervals, and
-# Weber exponents.
+# Weber exponents, and settings of the method of adjustment.
 
 tracks <- read.csv("{table}", colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
-for (name in c("standard", "trial", "level_asked")) tracks[[name]] <- as.numeric(tracks[[name]])
+for (name in c("standard", "trial", "level_asked", "setting")) tracks[[name]] <- as.numeric(tracks[[name]])
 judged <- tracks[tracks$analysed == "true" & !is.na(tracks$response), ]
 at_standard <- function(rows, block, participant, standard) {{
   rows <- rows[rows$block == block & rows$participant == participant, ]
@@ -96,6 +102,24 @@ exponents <- function(what, slopes, mean, ends) {{
     same(paste(what, "Weber exponent, high"), ends[2], interval[2])
   }}
 }}
+mean_of_settings <- function(what, u, log, mean_level, ends) {{
+  level <- function(u) if (log) 10^u else u
+  same(paste(what, "PSE"), mean_level, level(mean(u)))
+  if (length(ends)) {{
+    half <- qt(0.975, length(u) - 1) * sd(u) / sqrt(length(u))
+    same(paste(what, "PSE, low"), ends[1], level(mean(u) - half))
+    same(paste(what, "PSE, high"), ends[2], level(mean(u) + half))
+  }}
+}}
+settings <- function(what, rows, log, middle, pse, ends, jnd, error, hysteresis) {{
+  in_u <- function(level) if (log) log10(level) else level
+  rows <- rows[!is.na(rows$setting), ]
+  u <- in_u(rows$setting); high <- in_u(rows$level_asked) > middle
+  mean_of_settings(what, u, log, pse, ends)
+  if (!is.na(jnd)) same(paste(what, "JND"), jnd, sd(u))
+  if (!is.na(error)) same(paste(what, "constant error"), error, mean(u) - in_u(rows$standard[1]))
+  if (!is.na(hysteresis)) same(paste(what, "hysteresis"), hysteresis, mean(u[high]) - mean(u[!high]))
+}}
 
 """
 
@@ -116,6 +140,7 @@ def _calls(block: LevelBlock, found: LevelsFound) -> Iterator[tuple[str, int]]:
         if one.participant is not None and one.level is None and one.d_prime is not None:
             yield _sensitivity(found, one, one.d_prime)
     log = "TRUE" if found.spacing == "log" else "FALSE"
+    yield from _settings(block, found, log)
     for mean in (one for one in found.thresholds if one.participant is None):
         own = [one for one in found.own_thresholds if one.standard == mean.standard]
         for each in own:
@@ -129,6 +154,35 @@ def _calls(block: LevelBlock, found: LevelsFound) -> Iterator[tuple[str, int]]:
                 )
         yield _hartung_knapp(found, mean, own, log)
     yield from _exponents(found)
+
+
+def _settings(block: LevelBlock, found: LevelsFound, log: str) -> Iterator[tuple[str, int]]:
+    """Yield the calls about levels that participants set: of each participant, and of all at a standard."""
+    if block.stimulus is None:
+        return
+    middle = sum(block.stimulus.domain) / 2
+    for one in found.settings:
+        ends = _ends(one)
+        numbers = 1 if one.low is None else 3
+        if one.participant is None:
+            own = [each.pse for each in found.own_settings if each.standard == one.standard]
+            values = ", ".join(r_number(block.stimulus.coordinate(pse)) for pse in own)
+            yield (
+                f"mean_of_settings({r_text(_what(found, one))}, c({values}), {log}, {r_number(one.pse)}, {ends})",
+                numbers,
+            )
+            continue
+        which = f"{r_text(found.block)}, {r_text(one.participant)}, {_number(one.standard)}"
+        others = (one.jnd, one.constant_error, one.hysteresis)
+        yield (
+            f"settings({r_text(_what(found, one))}, at_standard(judged, {which}), {log}, {r_number(middle)}, "
+            f"{r_number(one.pse)}, {ends}, {', '.join(map(_number, others))})",
+            numbers + sum(value is not None for value in others),
+        )
+
+
+def _ends(one: ExponentFound | SettingFound | ThresholdFound) -> str:
+    return "c()" if one.low is None or one.high is None else f"c({r_number(one.low)}, {r_number(one.high)})"
 
 
 def _sensitivity(found: LevelsFound, one: SensitivityFound, d_prime: float) -> tuple[str, int]:
@@ -148,7 +202,7 @@ def _hartung_knapp(
 ) -> tuple[str, int]:
     thresholds = ", ".join(r_number(one.threshold) for one in own)
     variances = ", ".join(r_number(one.variance or 0.0) for one in own)
-    ends = "c()" if mean.low is None or mean.high is None else f"c({r_number(mean.low)}, {r_number(mean.high)})"
+    ends = _ends(mean)
     return (
         f"hartung_knapp({r_text(_what(found, mean))}, c({thresholds}), c({variances}), {log}, "
         f"{r_number(mean.threshold)}, {ends})",
@@ -172,7 +226,7 @@ def _exponents(found: LevelsFound) -> Iterator[tuple[str, int]]:
         jnds = f"c({levels})" + (f" * c({standards})" if found.level_kind == "weber" else "")
         what = r_text(f"{found.block}, {one.participant}")
         slopes.append(f"  exponent({what}, c({standards}), {jnds}, {r_number(one.exponent)})")
-    ends = "c()" if group.low is None or group.high is None else f"c({r_number(group.low)}, {r_number(group.high)})"
+    ends = _ends(group)
     lines = ",\n".join(slopes)
     yield (
         f"exponents({r_text(f'{found.block}, group')}, c(\n{lines}), {r_number(group.exponent)}, {ends})",
@@ -180,7 +234,7 @@ def _exponents(found: LevelsFound) -> Iterator[tuple[str, int]]:
     )
 
 
-def _what(found: LevelsFound, one: ThresholdFound | SensitivityFound) -> str:
+def _what(found: LevelsFound, one: ThresholdFound | SensitivityFound | SettingFound) -> str:
     where = f" at {one.standard:g}" if one.standard is not None else ""
     if isinstance(one, SensitivityFound) and one.comparison is not None:
         where = f" with {one.comparison}"

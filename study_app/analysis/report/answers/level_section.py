@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from study_app.analysis.figures.level_figure import level_words, mean_words, summary_words, with_unit
+from study_app.analysis.figures.levels.level_figure import level_words, mean_words, summary_words, with_unit
 from study_app.analysis.figures.picture import Picture
-from study_app.analysis.report.answers import threshold_section
+from study_app.analysis.report.answers import settings_section, threshold_section
 from study_app.analysis.report.answers.withheld_section import withheld
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound
@@ -31,9 +31,13 @@ def section(found: LevelsFound, pictures: Sequence[Picture]) -> Iterator[str]:
         [[one.name, *_time_cells(one.numbers)] for one in found.times],
     )
     at_each = "Answers at each level" if found.vary is not None or not found.revealed else "Answers"
-    yield heading(3, "Answers over levels" if found.adaptive else at_each)
+    if not found.settings:
+        yield heading(3, "Answers over levels" if found.adaptive else at_each)
     if not found.revealed:
         yield paragraph(SEALED)
+        return
+    if found.settings:
+        yield from settings_section.section(found, {one.name: one for one in pictures})
         return
     if not found.answers:
         yield paragraph("No answer counts yet.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from study_app.analysis.figures.level_figure import level_words
+from study_app.analysis.figures.levels.level_figure import level_words
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
 from study_app.analysis.results.levels import LevelsFound, SensitivityFound, ThresholdFound

@@ -37,11 +37,6 @@ class Adjustment(Method):
         default=60, description="Longest time for a setting [s]."
     )
 
-    @property
-    def paper_name(self) -> str:
-        """What a paper calls it."""
-        return "the participant, from starting levels alternately near either end"
-
     def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
         """Return the ends: every level between them can be set."""
         return stimulus.levels

@@ -14,7 +14,15 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.designs.track_courses import Flags, TrackCourse, courses
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.figures.level_figure import COLOURS, COLUMNS, GAP_PT, HEAD_PT, LEFT_PT, ROW_GAP_PT, level_words
+from study_app.analysis.figures.levels.level_figure import (
+    COLOURS,
+    COLUMNS,
+    GAP_PT,
+    HEAD_PT,
+    LEFT_PT,
+    ROW_GAP_PT,
+    level_words,
+)
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.results.levels import LevelsFound
@@ -128,12 +136,13 @@ def _frame(axes: Axes, found: LevelsFound, course: TrackCourse, ends: tuple[floa
         axes.set_yscale("log")
         axes.minorticks_off()
     axes.set_ylim(*ends)
-    ticks = _ticks(found, ends)
+    ticks = level_ticks(found, ends)
     axes.set_yticks(ticks, [f"{tick:g}" if first else "" for tick in ticks])
     axes.hlines(ticks, *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
 
 
-def _ticks(found: LevelsFound, ends: tuple[float, float]) -> list[float]:
+def level_ticks(found: LevelsFound, ends: tuple[float, float]) -> list[float]:
+    """Return round levels between the ends of an axis: from 1, 2 and 5, in decades where levels are spaced so."""
     low, high = ends
     if found.spacing == "linear":
         step = 10.0 ** math.floor(math.log10(high - low))

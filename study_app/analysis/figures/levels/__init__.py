@@ -1,0 +1,1 @@
+"""Figures of blocks with a design: answers over levels, tracks, Weber fractions, settings."""
