@@ -1,4 +1,4 @@
-"""The command that plans a study: how many participants it needs."""
+"""The commands that plan a study: how many participants it needs, and what it commits to."""
 
 from __future__ import annotations
 
@@ -170,4 +170,38 @@ def _write(found: Powers | Precisions, to: Path | None) -> None:
         files = {"power.md": words.encode(), "power.csv": threshold_csv(found)}
         written = write_files(to, files) if to is not None else ()
     for path in written:
+        click.echo(path)
+
+
+@click.command()
+@FILE
+@click.option("--power", "computed", type=Target(), metavar="DIR", help="Folder that power --to wrote; included.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for preregistration.md; default: print it.")
+def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
+    """Write a preregistration from the protocol: hypotheses, design, participants, exclusions, analysis, and its hash.
+
+    In the study's folder (results/<study>) the report compares the study with it and lists every deviation.
+    """
+    from study_app.analysis.preregistration.commitment import FILE as NAME
+    from study_app.analysis.preregistration.document import preregistration
+    from study_app.protocol.load import parse, protocol_hash, source_bytes
+    from study_app.store.output_files import write_files
+
+    source = source_bytes(protocol)
+    study = parse(source, protocol)
+    power_md = None
+    if computed is not None:
+        try:
+            power_md = (computed / "power.md").read_text(encoding="utf-8")
+        except OSError as error:
+            raise click.UsageError(
+                f"--power {computed}: power.md cannot be read ({error.strerror}): give a folder that power --to wrote"
+            ) from error
+        if f"({study.study.name} {study.study.version})" not in power_md:
+            raise click.UsageError(f"--power {computed}: power.md is not of {study.study.name} {study.study.version}")
+    text = preregistration(study, protocol_hash(source), power_md)
+    if to is None:
+        click.echo(text, nl=False)
+        return
+    for path in write_files(to, {NAME: text.encode()}):
         click.echo(path)

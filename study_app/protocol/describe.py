@@ -48,7 +48,7 @@ def describe(protocol: Protocol) -> str:
         _titled("Conditions", _conditions(protocol)),
         *(_statements(protocol, name, language) for name in protocol.questionnaires),
         _titled("Decided about the analysis", _analysis(protocol)),
-        _titled("A trial is valid up to", _limits(protocol)),
+        _titled("A trial is valid up to", limit_rows(protocol)),
         *_warned(protocol),
     )
     return "\n\n".join("\n".join(section) for section in sections)
@@ -366,7 +366,8 @@ def _delivered(limits: Limits) -> Iterator[tuple[str, str]]:
             yield f"{value:g}{unit}", what
 
 
-def _limits(protocol: Protocol) -> list[tuple[str, str]]:
+def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
+    """Return the limits up to which a trial is valid: each value, and what it is of."""
     limits = protocol.limits
     least = limits.targets_percent
     return [

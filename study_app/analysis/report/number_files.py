@@ -13,6 +13,8 @@ from typing import Any, Final
 from study_app import __version__
 from study_app.analysis.export.codebook import head
 from study_app.analysis.findings import all_findings
+from study_app.analysis.preregistration.commitment import FILE as PREREGISTRATION
+from study_app.analysis.preregistration.deviations import deviations
 from study_app.analysis.report.json_values import plain
 from study_app.analysis.report.test_rows import TESTS
 from study_app.analysis.results.block_results import Results
@@ -88,6 +90,8 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
         **{what: partial(plain, text) for what, text in texts.items()},
         "results": lambda: plain(results),
     }
+    if (study.folder / PREREGISTRATION).exists():
+        parts["preregistration"] = lambda: plain(deviations(study))
     held = {name: failures.attempt(f"report.json, {name}", make) for name, make in parts.items()}
     content = {
         "format": FORMAT,
@@ -117,7 +121,7 @@ def sessions(study: Study) -> list[dict[str, Any]]:
 def files(study: Study) -> dict[str, str]:
     """Return the SHA-256 of every file that the numbers come from; recordings are in their session's checksums."""
     place = StudyFolder(study.folder)
-    found = [place.exclusions, place.key, place.reveals]
+    found = [place.exclusions, place.key, place.reveals, study.folder / PREREGISTRATION]
     for session in place.sessions():
         tables = [session.table(study.name, name) for name in ("responses", "trials")]
         found += [session.receipt, session.journal, session.checksums, *tables]

@@ -19,6 +19,7 @@ from study_app.analysis.figures.levels.weber_figure import weber_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.report_figures import pictures
+from study_app.analysis.preregistration.deviations import section as preregistration_section
 from study_app.analysis.report import block_section, conduct_section, number_files, summary
 from study_app.analysis.report.answers import question_section
 from study_app.analysis.report.first_page.page import first_page
@@ -162,6 +163,7 @@ def _page(
         ("Groups", lambda: conduct_section.groups(study, results)),
         ("Motion and force", lambda: conduct_section.motion(results)),
         ("How it was run", lambda: conduct_section.conduct(study, results)),
+        ("Preregistration", lambda: preregistration_section(study)),
         ("Methods, to paste", lambda: (heading(2, "Methods, to paste"), box([paragraph(str(texts["methods"]))]))),
         ("Reproducing this report", lambda: _again(study, results)),
         ("Answers, counted", lambda: block_section.answers(results)),

@@ -1,0 +1,132 @@
+"""Where a study left its preregistration."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.preregistration.commitment import CATCH, FILE, Commitment, written
+from study_app.analysis.preregistration.deviations import Deviations, deviations, section
+from study_app.analysis.report.write_report import report
+from study_app.analysis.tables.study import load_study
+from study_app.errors import AnalysisError
+from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
+from study_app.store.folders import StudyFolder
+from tests.analysis.conftest import Results
+
+HASH = "ab" * 32
+
+
+def receipts(results: Results, **changes: object) -> None:
+    """Change the receipts of all sessions."""
+    for session in StudyFolder(results.folder).sessions():
+        content = json.loads(session.receipt.read_text(encoding="utf-8"))
+        session.receipt.write_text(json.dumps(content | changes), encoding="utf-8")
+
+
+@pytest.fixture
+def answered(small: Results) -> Results:
+    for person in ("P001", "P002", "P003"):
+        small.add(person, lambda condition, item: 5)
+    receipts(small, protocol_hash=HASH)
+    return small
+
+
+def committed(results: Results, participants: int | None = 3, **changes: object) -> Path:
+    one = Commitment("small", "2", HASH, participants, None, (CATCH,))
+    path = results.folder / FILE
+    path.write_text(f"# Preregistration\n\n{written(one)}", encoding="utf-8")
+    return path
+
+
+def found_in(results: Results) -> tuple[str, ...]:
+    found = deviations(load_study(results.folder))
+    assert found is not None
+    return found.found
+
+
+def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
+    committed(answered)
+    assert found_in(answered) == ()
+    text = " ".join(map(str, section(load_study(answered.folder))))
+    assert "No difference was found" in text
+    assert HASH in text
+
+
+def test_without_a_preregistration_nothing_is_said(answered: Results) -> None:
+    assert deviations(load_study(answered.folder)) is None
+    assert list(section(load_study(answered.folder))) == []
+
+
+def test_fewer_participants_and_another_number_than_the_protocols_are_deviations(answered: Results) -> None:
+    committed(answered, 12)
+    assert found_in(answered) == ("fewer participants: 3 are analysed, 12 were planned",)
+    committed(answered, 2)
+    assert found_in(answered) == ("more participants: 3 are analysed, 2 were planned",)
+    committed(answered, None)
+    assert found_in(answered) == ()
+
+
+def test_sessions_under_another_protocol_are_named(answered: Results) -> None:
+    committed(answered)
+    (first, *_) = StudyFolder(answered.folder).sessions()
+    content = json.loads(first.receipt.read_text(encoding="utf-8"))
+    first.receipt.write_text(json.dumps(content | {"protocol_hash": "cd" * 32}), encoding="utf-8")
+    (line,) = found_in(answered)
+    assert line.startswith("1 session ran under another protocol (version 2) than the preregistered one")
+    assert line.endswith("P001/1")
+
+
+def test_exclusions_by_other_rules_are_listed_and_those_by_its_own_are_not(answered: Results) -> None:
+    committed(answered)
+    answered.exclude("P001", trial=2, reason="sneezed")
+    (line,) = found_in(answered)
+    assert line.startswith("an exclusion by no preregistered rule: ")
+    assert line.endswith(": sneezed (AB)")
+    by_rule = Exclusion("P002", 1, None, CATCH, "4 of 8 wrong", "2026-01-06T10:00:00.000+01:00")
+    listed = (*exclusions(answered.folder), by_rule)
+    StudyFolder(answered.folder).exclusions.write_bytes(exclusion_bytes(listed))
+    lines = found_in(answered)
+    assert lines[0] == "fewer participants: 2 are analysed, 3 were planned"
+    assert len(lines) == 2
+    assert "sneezed" in lines[1]
+
+
+def test_where_only_the_protocol_plans_participants_they_are_compared(answered: Results) -> None:
+    (first, *_) = StudyFolder(answered.folder).sessions()
+    protocol = json.loads(first.receipt.read_text(encoding="utf-8"))["protocol"]
+    analysis = {
+        "alpha": 0.05, "equivalence_bound": None, "primary": [], "names": [], "rising": [], "falling": [],
+        "noticed": None, "participants": 20,
+    }  # fmt: skip
+    receipts(answered, protocol=protocol | {"analysis": analysis})
+    assert deviations(load_study(answered.folder)) == Deviations(
+        None, ("fewer participants: 3 are analysed, 20 were planned",)
+    )
+
+
+@pytest.mark.parametrize("content", ["# nothing\n", "```json\n{}\n```\n", "```json\n{broken}\n```\n"])
+def test_a_damaged_preregistration_is_one_line(answered: Results, content: str) -> None:
+    (answered.folder / FILE).write_text(content, encoding="utf-8")
+    with pytest.raises(AnalysisError, match="does not end with what `liquid-study preregister` writes"):
+        deviations(load_study(answered.folder))
+
+
+@pytest.mark.slow
+def test_the_report_lists_deviations_and_hashes_the_file(answered: Results, tmp_path: Path) -> None:
+    committed(answered, 12)
+    written_to = tmp_path / "report"
+    report(answered.folder, written_to)
+    page = (written_to / "report.html").read_text(encoding="utf-8")
+    assert "fewer participants: 3 are analysed, 12 were planned" in page
+    content = json.loads((written_to / "report.json").read_text(encoding="utf-8"))
+    assert content["preregistration"]["found"] == ["fewer participants: 3 are analysed, 12 were planned"]
+    assert content["preregistration"]["commitment"]["protocol_hash"] == HASH
+    assert FILE in content["files"]
+    (answered.folder / FILE).unlink()
+    report(answered.folder, written_to)
+    content = json.loads((written_to / "report.json").read_text(encoding="utf-8"))
+    assert "preregistration" not in content
+    assert "Preregistration" not in (written_to / "report.html").read_text(encoding="utf-8")

@@ -1,0 +1,95 @@
+"""The preregistration's text: everything from the protocol, the same bytes each time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.preregistration import commitment
+from study_app.analysis.preregistration.document import preregistration
+from study_app.cli import commands
+from study_app.protocol.load import load, protocol_hash, shipped, source_bytes
+
+HEADS = (
+    "Hypotheses and questions",
+    "Design",
+    "Participants",
+    "Exclusions",
+    "Analysis",
+    "The protocol in words",
+    "Values that the report compares with",
+)
+
+
+def written(*words: str) -> str:
+    result = CliRunner().invoke(commands, ["preregister", *words])
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped())
+def test_every_shipped_study_has_all_sections_and_its_hash(name: str, tmp_path: Path) -> None:
+    text = written(name)
+    places = [text.index(f"\n## {head}\n") for head in HEADS]
+    assert places == sorted(places)
+    digest = protocol_hash(source_bytes(name))
+    assert f"SHA-256 `{digest}`" in text
+    assert "None" not in text
+    questions = text[places[0] : places[1]].strip().splitlines()[2:]
+    assert len(questions) >= 1
+    assert all(line.startswith("- ") for line in questions)
+    (tmp_path / commitment.FILE).write_text(text, encoding="utf-8")
+    read = commitment.read(tmp_path)
+    assert read == commitment.commitment(load(name), digest)
+    assert read is not None
+    assert (read.study, read.protocol_hash) == (load(name).study.name, digest)
+
+
+def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> None:
+    text = preregistration(load("viscosityjnd"), "0" * 64)
+    assert "Weber fraction of damping at the hand at 4, 8, 16 and 32 N·s/m?" in text
+    assert "exponent 1, Weber's law" in text
+    assert "weber 0.19, at 71 % correct, n = 10" in text
+    assert "20 are planned. The aim is a 95 % interval of the group's mean within ±15 %." in text
+    assert "50 trials per standard" in text
+    assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
+    assert "presented again, up to 3 times" in text
+    assert "Hartung–Knapp" in text
+
+
+def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
+    text = preregistration(load("rek2024"), "0" * 64)
+    assert "Hypothesis, block delays: agreement with" in text
+    assert "(comfortable) falls with the delay." in text
+    assert "within ±1 points?" in text
+    assert "like_water, honey by like_honey and light_oil by like_oil) more often than by chance?" in text
+    assert "α = 0.05; primary statements (all) are corrected by Holm" in text
+    assert "Their number is not decided." in text
+    assert "`liquid-study power rek2024 --to DIR`" in text
+
+
+def test_the_tables_of_power_are_included(tmp_path: Path) -> None:
+    (tmp_path / "power.md").write_text("# Power of Feeling (rek2024 1.0)\n\n## Delays\n\n| n |\n", encoding="utf-8")
+    text = written("rek2024", "--power", str(tmp_path))
+    assert "\n### Power of Feeling (rek2024 1.0)\n\n#### Delays\n\n| n |\n\n## Exclusions\n" in text
+    assert "No power was computed" not in text
+
+
+@pytest.mark.parametrize(
+    ("content", "line"), [(None, "power.md cannot be read"), ("# Power of x (y 1)", "is not of rek2024 1.0")]
+)
+def test_a_folder_without_this_studys_power_is_a_usage_error(content: str | None, line: str, tmp_path: Path) -> None:
+    if content is not None:
+        (tmp_path / "power.md").write_text(content)
+    result = CliRunner().invoke(commands, ["preregister", "rek2024", "--power", str(tmp_path)])
+    assert result.exit_code == 2
+    assert line in " ".join(result.output.split())
+
+
+def test_it_is_written_into_a_folder(tmp_path: Path) -> None:
+    to = tmp_path / "results" / "demo"
+    assert written("demo", "--to", str(to)).strip() == str(to / commitment.FILE)
+    assert (to / commitment.FILE).read_text(encoding="utf-8") == written("demo")
