@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from matplotlib.figure import Figure
 
 from study_app import figure_style as style
 from study_app.analysis.figures.answer_figures import marks
+from study_app.analysis.figures.page_layout import Sheet
 from study_app.analysis.results.block_results import BlockFound, Results
+from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.words import counted
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.study import Study
 
@@ -22,6 +26,27 @@ class Picture:
     name: str
     caption: str
     files: dict[str, bytes]
+
+
+def attempted(
+    pictures: Iterable[tuple[str, str, Callable[[str], Picture]]], failures: Failures | None
+) -> Iterator[Picture]:
+    """Yield figures from block, name and what draws it by that name; one that fails is kept in ``failures`` instead."""
+    held = Failures() if failures is None else failures
+    for block, name, draw in pictures:
+        drawn = held.attempt(f"figure {name}", partial(draw, name), block=block)
+        if not isinstance(drawn, Failure):
+            yield drawn
+
+
+def files_of(draw: Callable[[Sequence[str]], Sheet], forms: Sequence[str], title: str) -> dict[str, bytes]:
+    """Return the bytes of a figure in each of its forms; ``draw`` takes the fonts."""
+    return {form: style.file_bytes(draw(style.fonts_for(form)).figure, form, title) for form in forms}
+
+
+def sample_words(study: Study, n: int) -> str:
+    """Return what a caption ends with: who took part."""
+    return f"{'SIMULATED participants, no people; ' if study.simulated else ''}{counted(n, 'participant')}."
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,10 @@ from typing import Final
 
 from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures, questions
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
 from study_app.analysis.figures.questions.group_rows import Look, QuestionFigure
 from study_app.analysis.results.question_answers import QuestionFound
-from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.asked_questions import AskedQuestion
 from study_app.analysis.tables.study import Study
@@ -33,26 +33,21 @@ def question_pictures(
 
     A figure that fails is left out, and kept in ``failures``.
     """
-    held = Failures() if failures is None else failures
-    for asked, found in zip(study.others.questions, answered, strict=True):
-        if found.figure is None or not found.n:
-            continue
-        name = f"question-{found.where}-{found.item}"
-        drawn = held.attempt(f"figure {name}", partial(_picture, study, asked, found, name, forms), block=found.where)
-        if not isinstance(drawn, Failure):
-            yield drawn
+    both = zip(study.others.questions, answered, strict=True)
+    shown = [(asked, found) for asked, found in both if found.figure is not None and found.n]
+    yield from attempted(
+        (
+            (found.where, f"question-{found.where}-{found.item}", partial(_picture, study, asked, found, forms))
+            for asked, found in shown
+        ),
+        failures,
+    )
 
 
-def _picture(study: Study, asked: AskedQuestion, found: QuestionFound, name: str, forms: Sequence[str]) -> Picture:
+def _picture(study: Study, asked: AskedQuestion, found: QuestionFound, forms: Sequence[str], name: str) -> Picture:
     figure = FIGURES[found.figure or ""]
     title = found.short if found.short == found.title else f"{found.title}: {found.short}"
     look = partial(Look, title, answer_figures.marks(study), (counted(study.n, "participant"),))
-    files = {
-        form: style.file_bytes(
-            figure.draw(asked, found, look(style.fonts_for(form))).figure, form, f"{study.name}: {title}"
-        )
-        for form in forms
-    }
-    simulated = "SIMULATED participants, no people; " if study.simulated else ""
-    caption = f"{found.title}: “{found.text}” {figure.caption} {simulated}{counted(study.n, 'participant')}."
+    files = files_of(lambda fonts: figure.draw(asked, found, look(fonts)), forms, f"{study.name}: {title}")
+    caption = f"{found.title}: “{found.text}” {figure.caption} {sample_words(study, study.n)}"
     return Picture(found.where, name, caption, files)

@@ -13,9 +13,9 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound, ThresholdFound
-from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study import Study
 from study_app.psychophysics.families import Family, success
@@ -49,27 +49,19 @@ def level_pictures(
 
     A figure that fails is left out, and kept in ``failures``.
     """
-    held = Failures() if failures is None else failures
-    for found in levels:
-        if not found.answers:
-            continue
-        name = f"levels-{found.block}"
-        drawn = held.attempt(f"figure {name}", partial(_picture, study, found, name, forms), block=found.block)
-        if not isinstance(drawn, Failure):
-            yield drawn
+    shown = [found for found in levels if found.answers]
+    yield from attempted(
+        ((found.block, f"levels-{found.block}", partial(_picture, study, found, forms)) for found in shown), failures
+    )
 
 
-def _picture(study: Study, found: LevelsFound, name: str, forms: Sequence[str]) -> Picture:
-    files = {
-        form: style.file_bytes(_draw(study, found, style.fonts_for(form)).figure, form, f"{study.name}: {found.title}")
-        for form in forms
-    }
-    simulated = "SIMULATED participants, no people; " if study.simulated else ""
+def _picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+    files = files_of(partial(_draw, study, found), forms, f"{study.name}: {found.title}")
     own = len(found.people) - MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} in the table alone." if own > 0 else ""
     caption = (
         f"{found.title}: {summary_words(found)} at each level. {_panels(found)}{_chance(found)}{left_out} "
-        f"{simulated}{counted(len(found.people), 'participant')}."
+        f"{sample_words(study, len(found.people))}"
     )
     return Picture(found.block, name, caption, files)
 

@@ -24,9 +24,9 @@ from study_app.analysis.figures.levels.level_figure import (
     level_words,
 )
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
 from study_app.analysis.results.levels import LevelsFound
-from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.tables.level_blocks import LevelBlock
@@ -54,29 +54,22 @@ def track_pictures(
 
     A figure that fails is left out, and kept in ``failures``.
     """
-    held = Failures() if failures is None else failures
     adaptive = [found for found in levels if found.adaptive and found.own_thresholds]
     if not adaptive:
         return
     opened, blocks = tracks(study), {block.id: block for block in study.levels}
-    for found in adaptive:
-        name = f"tracks-{found.block}"
-        make = partial(_picture, study, found, blocks[found.block], opened, name, forms)
-        drawn = held.attempt(f"figure {name}", make, block=found.block)
-        if not isinstance(drawn, Failure):
-            yield drawn
+    make = partial(_picture, study, opened, forms)
+    yield from attempted(
+        ((found.block, f"tracks-{found.block}", partial(make, found, blocks[found.block])) for found in adaptive),
+        failures,
+    )
 
 
 def _picture(
-    study: Study, found: LevelsFound, block: LevelBlock, opened: pd.DataFrame, name: str, forms: Sequence[str]
+    study: Study, opened: pd.DataFrame, forms: Sequence[str], found: LevelsFound, block: LevelBlock, name: str
 ) -> Picture:
     shown = list(courses(block, opened, MOST_PANELS))
-    draw = partial(_draw, study, found, shown)
-    files = {
-        form: style.file_bytes(draw(style.fonts_for(form)).figure, form, f"{study.name}: {found.title}, tracks")
-        for form in forms
-    }
-    simulated = "SIMULATED participants, no people; " if study.simulated else ""
+    files = files_of(partial(_draw, study, found, shown), forms, f"{study.name}: {found.title}, tracks")
     rest = len(found.own_thresholds) - len(shown)
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
     success = "correct" if found.counts == "correct" else f"“{found.counts}”"
@@ -85,7 +78,7 @@ def _picture(
     marks += " × and +: catch trials, answered correctly and not." if any(one.catches.any() for one in shown) else ""
     caption = (
         f"{found.title}: the level of each trial. Filled: {success}; hollow: not.{marks} Band: 95 % interval of "
-        f"the threshold from the answers so far.{left_out} {simulated}{counted(len(found.people), 'participant')}."
+        f"the threshold from the answers so far.{left_out} {sample_words(study, len(found.people))}"
     )
     return Picture(found.block, name, caption, files)
 

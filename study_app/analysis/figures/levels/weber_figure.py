@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
 from study_app.analysis.results.levels import LevelsFound
-from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study import Study
 
@@ -37,14 +37,10 @@ def weber_pictures(
 
     A figure that fails is left out, and kept in ``failures``.
     """
-    held = Failures() if failures is None else failures
-    for found in levels:
-        if len(weber_fractions(found, None)) < 2:
-            continue
-        name = f"weber-{found.block}"
-        drawn = held.attempt(f"figure {name}", partial(_picture, study, found, name, forms), block=found.block)
-        if not isinstance(drawn, Failure):
-            yield drawn
+    shown = [found for found in levels if len(weber_fractions(found, None)) >= 2]
+    yield from attempted(
+        ((found.block, f"weber-{found.block}", partial(_picture, study, found, forms)) for found in shown), failures
+    )
 
 
 def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
@@ -64,18 +60,12 @@ def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
     return points
 
 
-def _picture(study: Study, found: LevelsFound, name: str, forms: Sequence[str]) -> Picture:
-    files = {
-        form: style.file_bytes(
-            _draw(study, found, style.fonts_for(form)).figure, form, f"{study.name}: {found.title}, Weber fractions"
-        )
-        for form in forms
-    }
-    simulated = "SIMULATED participants, no people; " if study.simulated else ""
+def _picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+    files = files_of(partial(_draw, study, found), forms, f"{study.name}: {found.title}, Weber fractions")
     caption = (
         f"{found.title}: Weber fraction of {found.quantity} at the threshold, over the standard. Thin: participants; "
         f"thick: random-effects mean with its 95 % interval.{_published_words(found)} "
-        f"{simulated}{counted(len(found.people), 'participant')}."
+        f"{sample_words(study, len(found.people))}"
     )
     return Picture(found.block, name, caption, files)
 
