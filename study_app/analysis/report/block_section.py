@@ -70,13 +70,17 @@ def _absent(found: BlockFound) -> Iterator[str]:
 
 
 def verdicts_mean(results: Results) -> Iterator[str]:
-    """Yield what the words of verdicts mean, once for all tables."""
+    """Yield what the words of verdicts mean, once for all tables; nothing where nothing was tested."""
+    if not results.blocks:
+        return
     yield heading(2, "What the words of verdicts mean")
     yield paragraph(VERDICTS_MEAN.format(alpha=f"{results.decided.alpha:g}"))
 
 
 def answers(results: Results) -> Iterator[str]:
-    """Yield the counts of all answers, block by block."""
+    """Yield the counts of all answers, block by block; nothing without blocks of statements."""
+    if not results.blocks:
+        return
     yield heading(2, "Answers, counted")
     for found in results.blocks:
         if found.measures:

@@ -88,7 +88,9 @@ def _first(lines: list[str]) -> list[str]:
 
 
 def _delivered(study: Study, results: Results) -> Iterator[str]:
-    yield heading(3, "Was shown what was asked for?")
+    if not results.delivered:
+        return
+    yield heading(3, "Were delays displayed as specified?")
     blocks = {found.id: found for found in results.blocks}
     yield table(
         ("Block", "Setting", "asked", "achieved", "mean error", "worst trial", "trials", "within limits"),
@@ -128,6 +130,8 @@ def _delays(one: Delivered) -> list[str]:
 def _limit(what: str, limit: float) -> str:
     """Return a limit in words: "frame gap at most 250 ms"."""
     name, _, unit = what.rpartition("_")
+    if not name:
+        return f"at most {limit:g} {unit}"
     return f"{name.replace('_', ' ')} at most {limit:g} {'%' if unit == 'percent' else unit}"
 
 
@@ -144,11 +148,15 @@ def _trials(one: Delivered) -> str:
 
 
 def _orders(results: Results) -> Iterator[str]:
+    several = [
+        (found, counts)
+        for found in results.blocks
+        if (counts := results.orders.get(found.id)) is not None and counts.orders and len(counts.codes) >= 2
+    ]
+    if not several:
+        return
     yield heading(3, "Orders as run")
-    for found in results.blocks:
-        counts = results.orders.get(found.id)
-        if counts is None or not counts.orders or len(counts.codes) < 2:
-            continue
+    for found, counts in several:
         names = {code: name(found, code) if found.revealed else code for code in counts.codes}
         yield paragraph(f"{found.title}, {counted(counts.orders, 'order')}: {_evenness(counts)}")
         yield table(
@@ -175,7 +183,9 @@ def _evenness(counts: Evenness) -> str:
 
 
 def motion(results: Results) -> Iterator[str]:
-    """Yield the section on motion and force."""
+    """Yield the section on motion and force; nothing without blocks of statements."""
+    if not results.blocks:
+        return
     yield heading(2, "Motion and force")
     measured = results.performance
     if measured is None:

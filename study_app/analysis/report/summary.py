@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from study_app.analysis.findings import all_findings
+from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.item_test import Tested
@@ -15,13 +16,19 @@ from study_app.analysis.tables.study import Study
 
 def findings(results: Results) -> tuple[str, ...]:
     """Return what was found, a sentence each."""
-    return tuple(
+    of_statements = (
         line
         for found in results.blocks
         if found.n
         for finding in all_findings()
         for line in finding.sentences(found, results.decided)
     )
+    return (*of_statements, *of_levels(results))
+
+
+def of_levels(results: Results) -> tuple[str, ...]:
+    """Return what was found in blocks of levels, a sentence each."""
+    return tuple(line for found in results.levels for line in level_findings(found))
 
 
 def none_found(results: Results) -> str:
@@ -75,7 +82,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         )
     if study.n == 1:
         yield "One participant: whatever is shown is about this person alone, and says nothing about anybody else."
-    if study.n < FEW:
+    if study.n < FEW and results.blocks:
         people = counted(study.n, "participant")
         yield (
             f"{people[:1].upper()}{people[1:]}: below {FEW} no bootstrap interval and no mixed model is given, since "

@@ -213,7 +213,9 @@ def _days(study: Study) -> str:
 
 
 def _short(texts: Mapping[str, Any], results: Results) -> Iterator[str]:
-    """Yield every finding in a sentence, with its p."""
+    """Yield every finding in a sentence, with its p; nothing without statements, where the first page has them."""
+    if not results.blocks:
+        return
     yield heading(2, "In short: every finding in a sentence")
     found = texts["findings"]
     yield bullets(found) if found else paragraph(summary.none_found(results))

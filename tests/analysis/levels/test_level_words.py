@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.report.answers.level_methods import level_methods
-from study_app.analysis.results.levels import LevelAnswers, LevelsFound, ThresholdFound
+from study_app.analysis.results.levels import ExponentFound, LevelAnswers, LevelsFound, ThresholdFound
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study import load_study
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
@@ -42,6 +43,24 @@ def people(*changed: ThresholdFound) -> list[ThresholdFound]:
 
 def test_good_thresholds_have_one_limit() -> None:
     assert list(level_limits(found(*people()))) == [MOTORS]
+
+
+def test_findings_state_threshold_interval_n_and_exponent() -> None:
+    group = ThresholdFound(None, 8.0, 3, 0.2041, 0.15, 0.27)
+    exponents = (ExponentFound(None, 3, 0.91, 0.58, 1.234), ExponentFound("P001", 4, 0.9))
+    block = replace(found(*people()), thresholds=(group, GOOD), exponents=exponents, guess_rate=0.5)
+    threshold, exponent = level_findings(block)
+    assert threshold == (
+        "Block, standard 8 N·s/m: threshold 0.204 at 75 % correct (Weber fraction of damping; "
+        "95 % interval 0.15 to 0.27; three participants)."
+    )
+    assert exponent == (
+        "Block: Weber exponent 0.91 (95 % interval 0.58 to 1.23; three participants); "
+        "1 is Weber’s law, 0 a constant JND."
+    )
+    assert list(level_findings(replace(block, thresholds=(), exponents=()))) == []
+    (alone,) = level_findings(replace(block, thresholds=(replace(group, low=None, high=None),), exponents=()))
+    assert "no interval" in alone
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ def test_a_study_of_twelve_tells_what_was_found(of_twelve: Path) -> None:
         *("In short", "What this study cannot show", "Do the liquids differ, statement by statement?"),
         *("Which of them differ?", "Were the liquids recognised?", "Do answers follow the delay?"),
         *("The lowest delay that shows", "Each delay against 0 ms", "Motion and force", "How it was run", "Exclusions"),
-        *("Was shown what was asked for?", "Orders as run", "Methods, to paste", "Reproducing this report"),
+        *("Were delays displayed as specified?", "Orders as run", "Methods, to paste", "Reproducing this report"),
     ):
         assert heading in told
     assert re.search(r"What was drawn was [\d.]+ ms old .*, and [\d.]+ ms at the shortest delay, with which", told)

@@ -30,10 +30,13 @@ HEAD_PT: Final = 42.0
 ROW_GAP_PT: Final = 36.0
 FOOT_PT: Final = 26.0
 MOST_TICKS: Final = 5
+FEWEST_TICKS: Final = 2
 SIZE_PT2: Final = 2.0
 """Area of a circle for each answer at a level."""
 ASIDE: Final = 0.025
 """How far the points of one standard are from those of the next, as a share of the axis."""
+BELOW: Final = 0.03
+"""How far the interval of one standard's threshold is drawn below that of the one before, as a share correct."""
 COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
 LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
 UNITLESS: Final = "weber"
@@ -70,7 +73,8 @@ def _panels(found: LevelsFound) -> str:
     crosses = "; crosses: catch trials" if found.has_catch_trials else ""
     if found.own_thresholds:
         return (
-            "Curves: psychometric functions at the posterior medians, with the 95 % interval of the threshold; "
+            "Curves: psychometric functions at the posterior medians; bars: 95 % intervals of the thresholds, those of "
+            "several standards one below another; "
             f"circles: answers at each level, area by their number{crosses}. First panel: all participants."
         )
     return (
@@ -156,7 +160,10 @@ def _panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -
     for number, (standard, colour) in enumerate(zip(groups, COLOURS, strict=False)):
         for one in found.own_thresholds:
             if one.standard == standard and person in {None, one.participant}:
-                _curve(axes, found, one, colour if person else style.PARTICIPANT if len(groups) == 1 else colour)
+                grey = person is None and len(groups) == 1
+                _curve(axes, found, one, style.PARTICIPANT if grey else colour)
+                if person is not None:
+                    _interval(axes, found, one, colour, number)
         if person is None and found.adaptive:
             continue
         span = 0.0 if found.own_thresholds else max(places.values()) - min(places.values())
@@ -183,18 +190,23 @@ def _line(axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float
 
 
 def _curve(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str) -> None:
-    """Draw a participant's psychometric function, with the interval of the threshold at its height."""
+    """Draw a participant's psychometric function."""
     low, high = axes.get_xlim()
     u = np.linspace(low, high, 120)
     middle = _coordinate(found, one.threshold)
     shape = cast("Family", found.family)
     psi = success(shape, u, middle, one.width or 1.0, one.guess or 0.0, one.lapse or 0.0)
     axes.plot(u, psi, color=colour, linewidth=0.9, zorder=2)
-    if one.low is not None and one.high is not None and colour != style.PARTICIPANT:
-        half = float(success(shape, middle, middle, one.width or 1.0, one.guess or 0.0, one.lapse or 0.0))
-        axes.plot(
-            [_coordinate(found, one.low), _coordinate(found, one.high)], [half, half], color=colour, linewidth=1.8
-        )
+
+
+def _interval(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str, number: int) -> None:
+    """Draw the interval of a threshold at the height of the function there, each standard's below the one before."""
+    if one.low is None or one.high is None:
+        return
+    guess = one.guess or 0.0
+    height = guess + (1.0 - guess - (one.lapse or 0.0)) / 2 - BELOW * number
+    ends = [_coordinate(found, one.low), _coordinate(found, one.high)]
+    axes.plot(ends, [height, height], color=colour, linewidth=1.2, solid_capstyle="butt", zorder=2)
 
 
 def _coordinate(found: LevelsFound, level: float) -> float:
@@ -241,12 +253,9 @@ def _frame(axes: Axes, found: LevelsFound, places: Mapping[Any, float], *, first
     xs = sorted(places.values())
     margin = 0.5 if found.vary is None else 0.06 * ((xs[-1] - xs[0]) or 1.0)
     axes.set_xlim(xs[0] - margin, xs[-1] + margin)
-    named = sorted(places, key=lambda level: places[level])
-    step = math.ceil(len(named) / MOST_TICKS)
-    shown = named if found.vary is None else named[::step]
+    shown = _shown_levels(found, places)
     axes.set_xticks(
-        [places[level] for level in shown],
-        [level.replace("_", " ") if isinstance(level, str) else f"{level:.3g}" for level in shown],
+        list(shown.values()), [level.replace("_", " ") if isinstance(level, str) else f"{level:.3g}" for level in shown]
     )
     ticks = _ticks(found)
     low, high = ticks[0][0], ticks[-1][0]
@@ -255,6 +264,21 @@ def _frame(axes: Axes, found: LevelsFound, places: Mapping[Any, float], *, first
     axes.hlines([at for at, _ in ticks], *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
     if found.guess_rate is not None:
         axes.axhline(found.guess_rate, color=style.AXIS, linewidth=0.6, linestyle=(0, (4, 3)), zorder=1)
+
+
+def _shown_levels(found: LevelsFound, places: Mapping[Any, float]) -> Mapping[Any, float]:
+    """Return the levels that are named below the axis, with their places: of many on log spacing, round ones."""
+    named = sorted(places, key=lambda level: places[level])
+    if found.vary is None or len(named) <= MOST_TICKS:
+        return {level: places[level] for level in named}
+    if found.spacing == "log":
+        low, high = places[named[0]], places[named[-1]]
+        decades = range(math.floor(low), math.ceil(high) + 1)
+        round_levels = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
+        inside = {level: math.log10(level) for level in round_levels if low <= math.log10(level) <= high}
+        if len(inside) >= FEWEST_TICKS:
+            return inside
+    return {level: places[level] for level in named[:: math.ceil(len(named) / MOST_TICKS)]}
 
 
 def _ticks(found: LevelsFound) -> list[tuple[float, str]]:

@@ -130,6 +130,8 @@ def _published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: 
                 va="top",
                 color=style.TEXT_SOFT,
                 fontproperties=sheet.font(6.5),
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+                zorder=5,
             )
         else:
             axes.plot([standard], [fraction], "o", markersize=5, fillstyle="none", color=style.TEXT_SOFT, zorder=4)

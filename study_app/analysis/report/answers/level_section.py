@@ -27,7 +27,7 @@ def section(found: LevelsFound, pictures: Sequence[Picture]) -> Iterator[str]:
     """Yield what a block's section says besides the counts of its answers."""
     yield heading(3, "Time to answer")
     yield table(
-        ("Code", "n", "median [s]", "quartiles [s]"),
+        ("Setting" if found.revealed else "Code", "n", "median [s]", "quartiles [s]"),
         [[one.name, *_time_cells(one.numbers)] for one in found.times],
     )
     at_each = "Answers at each level" if found.vary is not None or not found.revealed else "Answers"

@@ -7,11 +7,13 @@ from typing import Final
 
 from study_app.analysis.figures.levels.level_figure import level_words
 from study_app.analysis.figures.picture import Picture
+from study_app.analysis.report.answers.level_methods import FAMILIES
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
 from study_app.analysis.results.levels import LevelsFound, SensitivityFound, ThresholdFound
 from study_app.analysis.results.words import number
 from study_app.analysis.statistics.psychometrics.goodness import SETS
 
+WIDTHS: Final = {"log": "decades", "linear": "level"}
 BEYOND: Final = {None: "", "above": "above ", "below": "below "}
 MODELS: Final = {
     "differencing": " d′ is that of the differencing model, since standards vary from trial to trial.",
@@ -58,9 +60,9 @@ def _thresholds(found: LevelsFound) -> str:
             *((f"Standard{_unit(found)}",) if standards else ()),
             "Participant",
             "n",
-            "threshold",
+            _threshold_name(found),
             "95 % interval",
-            "width",
+            f"width [{WIDTHS[found.spacing]}]",
             "flat width prior",
             *((f"mean of reversals ({percent:.1f} %)",) if percent is not None else ()),
             "fit (p)",
@@ -111,6 +113,13 @@ def _unit(found: LevelsFound) -> str:
     return f" [{found.unit}]" if found.unit else ""
 
 
+def _threshold_name(found: LevelsFound) -> str:
+    """Return what a threshold is, with its unit."""
+    if found.level_kind == "weber":
+        return "threshold (Weber fraction)"
+    return "threshold" + _unit(found)
+
+
 def _target_percent(found: LevelsFound) -> float | None:
     return next((one.target_percent for one in found.own_thresholds), None)
 
@@ -131,22 +140,23 @@ def _drift(one: ThresholdFound) -> str:
 
 def _threshold_words(found: LevelsFound) -> str:
     at = "" if found.guess_rate is None else f" ({50 * (1 + found.guess_rate):.3g} % {found.counts})"
-    width = "decades" if found.spacing == "log" else "units of the level"
     percent = _target_percent(found)
+    catch = ", those to catch trials included" if found.has_catch_trials else ""
     reversals = (
         ""
         if percent is None
         else f" The mean of reversals is the classical estimate of an up–down track, at {percent:.1f} % {found.counts}."
     )
+    function = FAMILIES[found.family or ""]
     return (
-        f"A threshold is the level ({level_words(found)}) at which the {found.family} function is half-way between "
+        f"A threshold is the level ({level_words(found)}) at which the {function} function is half-way between "
         f"guesses and lapses{at}: posterior median with an equal-tailed 95 % interval, from all counted answers, at "
-        f"the levels delivered to the hand. The width, from 5 to 95 % of the rise [{width}], has a log-normal prior; "
+        f"the levels delivered to the hand. The width, from 5 to 95 % of the rise, has a log-normal prior; "
         f"the next column is the threshold under a flat one. “Above” and “below” mark thresholds beyond the levels "
         f"presented. The group is the random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from "
         f"three participants on."
         f"{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of trial "
-        f"number and deviance residual, with “!” beyond 2/√n."
+        f"number and deviance residual, with “!” beyond 2/√n. n counts answers{catch}."
     )
 
 
@@ -154,7 +164,13 @@ def _sensitivities(found: LevelsFound) -> str:
     """Return a row per standard, comparison or level and participant, the group first."""
     ones = found.sensitivities
     wheres = len({_where(one) for one in ones}) > 1
-    where = "Standard" if ones[0].standard is not None else "Level" if ones[0].level is not None else "Comparison"
+    where = (
+        f"Standard{_unit(found)}"
+        if ones[0].standard is not None
+        else "Level"
+        if ones[0].level is not None
+        else "Comparison"
+    )
     measured = any(one.d_prime is not None for one in ones)
     biased = any(one.criterion is not None for one in ones)
     answers = tuple(ones[0].shares)
@@ -188,11 +204,11 @@ def _times(found: LevelsFound) -> str:
     return table(
         (
             *((f"Standard{_unit(found)}",) if standards else ()),
-            "Level",
-            "n right",
-            "median [s]",
-            "n wrong",
-            "median [s]",
+            level_words(found),
+            "n correct",
+            "median, correct [s]",
+            "n incorrect",
+            "median, incorrect [s]",
         ),
         [
             [

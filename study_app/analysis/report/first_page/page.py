@@ -13,7 +13,7 @@ from study_app.analysis.report.first_page.answer import Answer
 from study_app.analysis.report.first_page.claims import answers, questions
 from study_app.analysis.report.html_page import render
 from study_app.analysis.report.measured import empty_studies
-from study_app.analysis.report.summary import none_found
+from study_app.analysis.report.summary import none_found, of_levels
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.section_failures import Failure, Failures
 
@@ -29,7 +29,7 @@ def first_page(results: Results, limits: Sequence[str], failures: Failures) -> M
         "first_page.html",
         answers=[_shown(one, found[one.block], failures) for one in found_answers],
         several=len({one.block for one in found_answers}) > 1,
-        without_findings=none_found(results),
+        without_findings=of_levels(results) or (none_found(results),),
         limits=list(limits),
         shown=SHOWN,
         empty=empty_studies(max((one.n for one in results.blocks), default=0)) if found_answers else "",
