@@ -1,0 +1,75 @@
+"""Errors of forces, their Pareto front, and times without what other threads take."""
+
+import math
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from study_app.evaluation.force_error import Error, error_of
+from study_app.evaluation.hand_motions import stir
+from study_app.evaluation.reference_solutions import Case, Truth
+from study_app.haptics.model.motion import Motion
+from study_app.validation.accuracy.candidates import TickRung
+from study_app.validation.accuracy.comparison import FINE_S, Row, Time, front, race
+from tests.validation.accuracy.scenes import TANK, first_seconds
+
+pytestmark = pytest.mark.slow
+
+
+def one_case(*force_n):
+    force = np.array(force_n, float)
+    motion = Motion(np.arange(len(force)) / 1000, np.zeros_like(force))
+    return Truth("one", "", (Case(motion, force, np.array([True] * (len(force) - 1) + [False])),))
+
+
+def test_errors_are_of_the_rows_that_count_and_shares_of_the_true_force():
+    error = error_of([np.array([[1.0, 0, 0], [0, 2.5, 0], [9, 9, 9]])], one_case((2, 0, 0), (0, 2, 0), (0, 0, 0)))
+    assert error.rms_n == pytest.approx(math.sqrt((1 + 0.25) / 2))
+    assert error.most_n == 1
+    assert error.rms == pytest.approx(error.rms_n / 2)
+    assert error.most == 0.5
+    assert error.direction_deg == 0
+    assert error.target == 0.05
+
+
+def test_direction_counts_where_the_force_is_felt():
+    truth = one_case((2, 0, 0), (0.04, 0, 0), (0, 0, 0))
+    error = error_of([np.array([[0, 1.0, 0], [-1, 0, 0], [0, 0, 0]])], truth)
+    assert error.direction_deg == pytest.approx(90)
+    weak = error_of(
+        [np.array([[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 0]])], one_case((1e-3, 0, 0), (1e-3, 0, 0), (0, 0, 0))
+    )
+    assert weak.direction_deg == pytest.approx(math.sqrt(90**2 / 2))
+    assert weak.target == pytest.approx(50)
+
+
+def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal():
+    def row(name, ns, rms):
+        rung = TickRung(name, name, "tick", TANK)
+        return rung, Row(
+            "numerical", "water", "t", rung, Error(0, 0, rms, 0, 0, 0.05), Time(ns, ns, 1), 1, chosen=False
+        )
+
+    points = dict([row("quick", 10, 0.5), row("dear", 20, 0.6), row("sums", 30, 1e-13), row("list", 900, 1e-16)])
+    assert [rung.name for rung in front(points)] == ["quick", "sums"]
+    alike = dict([row("quick", 100, 0.5), row("truer", 104, 0.1), row("truest", 150, 0.01)])
+    assert [rung.name for rung in front(alike)] == ["truer", "truest"]
+
+
+class WaitingRung(TickRung):
+    """A rung that is kept waiting by another thread, and notes for how long [ns]."""
+
+    def take(self, start, stop):
+        other, began = threading.Thread(target=sum, args=(range(1_000_000),)), time.perf_counter_ns()
+        other.start()
+        other.join()
+        self.waited_ns = time.perf_counter_ns() - began
+
+
+@pytest.mark.skipif(time.get_clock_info("thread_time").resolution > FINE_S, reason="no fine clock of a thread")
+def test_what_others_take_is_not_counted():
+    rung = WaitingRung("waiting", "waiting", "tick", TANK)
+    took = race((rung,), first_seconds(stir(10, 1000), 1.5), 1, 1, 1.0)[rung]
+    assert took.median_ns * rung.BATCH < 0.5 * rung.waited_ns
