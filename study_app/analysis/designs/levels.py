@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
 import numpy as np
 import pandas as pd
 
+from study_app.analysis.designs.level_conduct import catch_answers, level_conduct
 from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.designs.settings import settings
 from study_app.analysis.designs.thresholds import thresholds
@@ -65,13 +65,17 @@ def levels_found(study: Study, rows: pd.DataFrame | None = None) -> tuple[Levels
     opened = rows if rows is not None else tracks(study) if study.revealed else None
     opened = None if opened is None else opened[list(READ)]  # groups of few columns are made in less time
     bounds = {one.where.id: one.bounds for one in study.others.questions}
-    found = (_block(one, timed[timed["block"] == one.id], opened, bounds.get(one.id)) for one in main)
-    withheld = (tuple(_withheld(one, study.intervals)) if opened is not None else () for one in main)
-    return tuple(replace(one, withheld=shares) for one, shares in zip(found, withheld, strict=True))
+    return tuple(
+        _block(one, timed[timed["block"] == one.id], opened, study.intervals, bounds.get(one.id)) for one in main
+    )
 
 
 def _block(
-    block: LevelBlock, answers: pd.DataFrame, opened: pd.DataFrame | None, bounds: tuple[float, float] | None
+    block: LevelBlock,
+    answers: pd.DataFrame,
+    opened: pd.DataFrame | None,
+    intervals: pd.DataFrame,
+    bounds: tuple[float, float] | None,
 ) -> LevelsFound:
     counted = answers[answers["counted"] & answers["response"].notna()]
     stimulus = block.stimulus
@@ -98,6 +102,9 @@ def _block(
         thresholds=estimated,
         exponents=() if stimulus is None else tuple(weber_exponents(estimated, stimulus.level_kind)),
         level_times=() if opened is None else tuple(_level_times(block, opened)),
+        withheld=() if opened is None else tuple(_withheld(block, intervals)),
+        conduct=() if opened is None else tuple(level_conduct(block, opened, intervals)),
+        catches=() if opened is None else tuple(catch_answers(block, opened)),
         sensitivities=() if opened is None else tuple(sensitivities(block, opened)),
         family=None if block.assumed is None else block.assumed.family,
         adaptive=block.method is not None and block.method.adaptive,

@@ -187,6 +187,43 @@ class WithheldForce:
 
 
 @dataclass(frozen=True, slots=True)
+class LevelConduct:
+    """How the trials at a standard were presented.
+
+    ``trials`` are analysed, ``repeated`` attempts at them were presented again: ``reasons`` counts the intervals that
+    broke each limit. ``error_mean`` and ``error_largest`` are those of the delivered less the requested level, in the
+    unit of the level, over ``measured`` trials; ``pace_mps`` is the mean RMS speed of the hand [m/s],
+    ``apparent_mass_kg`` the mean apparent mass [kg].
+    """
+
+    standard: float | None
+    trials: int
+    repeated: int
+    reasons: Mapping[str, int]
+    measured: int
+    error_mean: float | None
+    error_largest: float | None
+    pace_mps: float | None
+    apparent_mass_kg: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class CatchAnswers:
+    """Catch trials of a session: how many of ``n`` were answered incorrectly; a larger share than ``most`` excludes."""
+
+    participant: str
+    session: int
+    n: int
+    wrong: int
+    most: float
+
+    @property
+    def excludes(self) -> bool:
+        """Whether the rule ``catch`` excludes the session."""
+        return self.wrong / self.n > self.most
+
+
+@dataclass(frozen=True, slots=True)
 class LevelsFound:
     """A block of levels.
 
@@ -218,6 +255,8 @@ class LevelsFound:
     sensitivities: tuple[SensitivityFound, ...] = ()
     level_times: tuple[LevelTimes, ...] = ()
     withheld: tuple[WithheldForce, ...] = ()
+    conduct: tuple[LevelConduct, ...] = ()
+    catches: tuple[CatchAnswers, ...] = ()
     family: str | None = None
     adaptive: bool = False
     published: tuple[PublishedValue, ...] = ()

@@ -26,7 +26,8 @@ class LevelBlock:
     """A block with a design.
 
     ``stimulus`` is what it varies, ``method`` how its levels were chosen: None where it compares conditions, and while
-    the key is sealed; ``published`` are the values of other studies that the protocol compares it with.
+    the key is sealed; ``published`` are the values of other studies that the protocol compares it with;
+    ``wrong_most`` is the share of incorrect answers to catch trials that is permitted, None without catch trials.
     """
 
     id: str
@@ -37,6 +38,7 @@ class LevelBlock:
     settings: tuple[Setting, ...]
     method: Method | None = None
     published: tuple[Published, ...] = ()
+    wrong_most: float | None = None
 
     @property
     def has_correct_answer(self) -> bool:
@@ -106,5 +108,6 @@ def _block(protocol: Mapping[str, Any], step: str, key: Key | None, whole: Proto
         design = default_design(table["design"])
     title = text_in(table["title"], spoken(protocol))
     return LevelBlock(
-        step, title, table["phase"], design, stimulus, settings_in(protocol, step, key), method, published
-    )
+        step, title, table["phase"], design, stimulus, settings_in(protocol, step, key), method, published,
+        (table.get("catch") or {}).get("wrong_most"),
+    )  # fmt: skip

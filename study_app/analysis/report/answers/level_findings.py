@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from study_app.analysis.figures.level_figure import level_words, with_unit
+from study_app.analysis.figures.levels.level_figure import level_words, with_unit
 from study_app.analysis.results.levels import ExponentFound, LevelsFound, ThresholdFound
 from study_app.analysis.results.words import counted, number
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from study_app.analysis.figures.levels.level_figure import level_words, mean_words, summary_words, with_unit
 from study_app.analysis.figures.picture import Picture
-from study_app.analysis.report.answers import settings_section, threshold_section
+from study_app.analysis.report.answers import level_conduct_section, settings_section, threshold_section
 from study_app.analysis.report.answers.withheld_section import withheld
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound
@@ -23,8 +23,11 @@ EXPLAINED = (
 )
 
 
-def section(found: LevelsFound, pictures: Sequence[Picture]) -> Iterator[str]:
-    """Yield what a block's section says besides the counts of its answers."""
+def section(found: LevelsFound, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:
+    """Yield what a block's section says in addition to the counts of its answers.
+
+    ``estimator`` is the name of the servo's velocity estimator, None where the receipt has none.
+    """
     yield heading(3, "Time to answer")
     yield table(
         ("Setting" if found.revealed else "Code", "n", "median [s]", "quartiles [s]"),
@@ -50,6 +53,7 @@ def section(found: LevelsFound, pictures: Sequence[Picture]) -> Iterator[str]:
         for standard in sorted({one.standard for one in found.answers}, key=lambda one: one or 0.0):
             yield _of_people(found, standard)
     yield from threshold_section.section(found, {one.name: one for one in pictures})
+    yield from level_conduct_section.section(found, estimator)
     yield from withheld(found)
 
 
