@@ -10,7 +10,7 @@ import pytest
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
-from tests.protocol.trials.studies import FIVE_POINTS, SHORT, text_of
+from tests.protocol.trials.studies import FIVE_POINTS, SHORT, text_of, text_of_damper
 
 MORE = """
 [stimuli.around]
@@ -69,22 +69,6 @@ repetitions = 4
 """
 SEQUENCE = ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "equal", "odd", "pairs"]')
 ADAPTIVE = """
-format = 2
-study.name = "adaptive"
-
-[liquids.damper]
-drag = { law = "linear", damping_nspm = 8 }
-
-[tasks.stir]
-kind = "follow"
-lead_s = 0.5
-cycles = 1
-
-[stimuli.damping]
-vary = "damping_nspm"
-standards = [4, 8]
-levels = [0.02, 0.6]
-
 [methods.steps]
 kind = "updown"
 tracks = 2
@@ -120,7 +104,7 @@ source = "Jones et al. 1997"
 def opened_adaptive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a study of up–down tracks at two standards and of QUEST+ at one, its key open."""
     folder = tmp_path_factory.mktemp("adaptive")
-    (folder / "adaptive.toml").write_text(ADAPTIVE)
+    (folder / "adaptive.toml").write_text(text_of_damper("adaptive", ADAPTIVE, (4, 8)))
     study = rehearse(folder / "adaptive.toml", participants=3, seed=1, results=folder / "study", recordings=False)
     assert unblind(study, "AB", "to analyse").left == ()
     return study
@@ -130,8 +114,8 @@ def opened_adaptive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def opened_catch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the study of adaptive tracks with catch trials, answered without servo, its key open."""
     folder = tmp_path_factory.mktemp("catch")
-    text = ADAPTIVE.replace('method = "', 'catch = { share = 0.2, wrong_most = 1 }\nmethod = "').replace("24", "48")
-    (folder / "catch.toml").write_text(text)
+    more = ADAPTIVE.replace('method = "', 'catch = { share = 0.2, wrong_most = 1 }\nmethod = "').replace("24", "48")
+    (folder / "catch.toml").write_text(text_of_damper("catch", more, (4, 8)))
     study = rehearse_answers(folder / "catch.toml", participants=2, seed=1, results=folder / "study", felt={})
     assert unblind(study, "AB", "to analyse").left == ()
     return study

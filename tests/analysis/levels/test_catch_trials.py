@@ -12,9 +12,9 @@ import pytest
 
 from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.designs.track_courses import courses
-from study_app.analysis.figures.level_figure import level_pictures
+from study_app.analysis.figures.levels.level_figure import level_pictures
+from study_app.analysis.figures.levels.track_figure import track_pictures
 from study_app.analysis.figures.picture import Picture
-from study_app.analysis.figures.track_figure import track_pictures
 from study_app.analysis.results.levels import LevelsFound
 from study_app.analysis.tables.study import Study, load_study
 from study_app.analysis.tables.tracks import TRACK, answers_of, tracks

@@ -19,24 +19,9 @@ from study_app.analysis.tables.study import load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
+from tests.protocol.trials.studies import text_of_damper
 
-PROTOCOL = """\
-format = 2
-study.name = "many"
-
-[liquids.damper]
-drag = { law = "linear", damping_nspm = 8 }
-
-[tasks.stir]
-kind = "follow"
-lead_s = 0.5
-cycles = 1
-
-[stimuli.damping]
-vary = "damping_nspm"
-standards = [4, 6, 8, 10]
-levels = [0.02, 0.6]
-
+BLOCK = """
 [methods.quest]
 kind = "questplus"
 trials = 125
@@ -66,7 +51,7 @@ def main(participants: str = "100", folder: str = "") -> int:
         results = Path(folder) if folder else Path(scratch) / "results"
         if not folder:
             protocol = Path(scratch) / "many.toml"
-            protocol.write_text(PROTOCOL)
+            protocol.write_text(text_of_damper("many", BLOCK, (4, 6, 8, 10)))
             rehearse_answers(protocol, participants=int(participants), seed=1, results=results, felt={})
             unblind(results, "AB", "a benchmark")
         print("part                     processor s   wall s")

@@ -103,6 +103,24 @@ SHORT = (
     ('code_prefix = "V"\n', ""),
 )
 """Edits that make a rehearsal short, and let blocks follow one another without parts."""
+OF_DAMPER = """
+format = 2
+study.name = "{name}"
+
+[liquids.damper]
+drag = {{ law = "linear", damping_nspm = 8 }}
+
+[tasks.stir]
+kind = "follow"
+lead_s = 0.5
+cycles = 1
+
+[stimuli.damping]
+vary = "damping_nspm"
+levels = [0.02, 0.6]
+standards = {standards}
+{more}"""
+"""A study of Weber fractions of damping, by a short paced motion."""
 SECRET = bytes(range(32))
 
 
@@ -113,6 +131,11 @@ def text_of(*edits: tuple[str, str], more: str = "") -> str:
         assert old in text
         text = text.replace(old, new)
     return text
+
+
+def text_of_damper(name: str, more: str, standards: tuple[float, ...] = (8,)) -> str:
+    """Return the text of a study of damping, with its methods and blocks."""
+    return OF_DAMPER.format(name=name, standards=list(standards), more=more)
 
 
 def study(*edits: tuple[str, str], more: str = "") -> Protocol:

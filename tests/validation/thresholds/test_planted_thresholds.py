@@ -20,28 +20,23 @@ from study_app.validation.thresholds.planted import SHIPPED, Planted, planted
 from study_app.validation.thresholds.verdicts import Verdict, markdown, spread, table, verdicts
 from study_app.validation.thresholds.whole_pipeline import run
 from tests.compiled import needs_servo
+from tests.protocol.trials.studies import text_of_damper
 
 pytestmark = pytest.mark.slow
 
-SMALL = """\
-format = 2
-study.name = "small"
-[liquids.damper]
-drag = { law = "linear", damping_nspm = 8 }
-[tasks.stir]
-kind = "follow"
-cycles = 1
-[stimuli.damping]
-vary = "damping_nspm"
-levels = [0.02, 0.6]
+SMALL = text_of_damper(
+    "small",
+    """
 [methods.short]
 kind = "questplus"
 trials = 20
+
 [blocks.thicker]
 stimulus = "damping"
 design = "2ifc"
 method = "short"
-"""
+""",
+)
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +118,7 @@ def test_a_biased_estimate_and_intervals_that_are_too_narrow_are_found(one: Plan
 
 
 def test_slopes_tell_a_constant_jnd_from_webers_law() -> None:
-    protocol = parse(SMALL.replace("levels =", "standards = [4, 8, 16]\nlevels =").encode(), "small.toml")
+    protocol = parse(SMALL.replace("standards = [8]", "standards = [4, 8, 16]").encode(), "small.toml")
     three = planted("three", protocol)
     assert three.exponent == 1
     rows = tuple((0.24, 0.2, 0.3) for _ in range(3))
