@@ -78,6 +78,7 @@ class FalconDevice(Device):
         self._patience_s = patience_s
         self.transport: Transport | None = None
         self.guard: Guard | None = None
+        self._left_guard: Guard | None = None  # of a link that was lost
         self._calibration: calibration.Calibration | None = None
         self._guard_died = False
         self._found: dict[str, Any] = {}
@@ -112,6 +113,9 @@ class FalconDevice(Device):
             if self.guarded:
                 self.guard = Guard(transport.name, self._lose_guard)
                 self.guard.start()
+            if self._left_guard is not None:
+                self._left_guard.recall()
+                self._left_guard = None
             self._home(transport)
         except BaseException:
             self.transport = transport
@@ -144,6 +148,7 @@ class FalconDevice(Device):
                 transport.close()
             finally:
                 if guard is not None:
+                    self._left_guard = guard if pushing else None
                     (guard.leave if pushing else guard.stand_down if quieted or gone else guard.release)()
 
     @property

@@ -52,6 +52,7 @@ class Guard:
         self._name = name
         self._died = died
         self.child: subprocess.Popen[bytes] | None = None
+        self._left: subprocess.Popen[bytes] | None = None
         self.listener: threading.Thread | None = None
 
     def start(self) -> None:
@@ -112,7 +113,17 @@ class Guard:
         if child is None or child.stdin is None:
             return
         child.stdin.close()
+        self._left = child
         threading.Thread(target=_see_off, args=(child, self.listener), name="guard", daemon=True).start()
+
+    def recall(self) -> None:
+        """End the process that `leave` left behind: the program has opened the Falcon again, with another guard.
+
+        Otherwise it would try for the rest of its patience to open a Falcon that is in use, and call it dangerous.
+        """
+        left, self._left = self._left, None
+        if left is not None:
+            left.kill()
 
     def _end(self, word: bytes) -> None:
         child, self.child = self.child, None

@@ -73,6 +73,9 @@ class Guard:
     def leave(self):
         self.orders.append("leave")
 
+    def recall(self):
+        self.orders.append("recall")
+
 
 def places_in_the_box(geometry):
     """Return places (x, y, z) [m] all over the safe box, but for corners beyond the encoders' known range."""
@@ -358,6 +361,22 @@ class TestInUse:
         ticks.after(1)
         opened.close()
         assert guard.orders == [order]
+
+    def test_a_falcon_that_is_opened_again_recalls_the_guard_that_waits_for_it(self, opened):
+        guard = opened.guard = Guard()
+        ticks = Ticks(opened)
+        ticks.after(600, (0.0, 1.0, 0.0))
+        opened.hand.faults.on("unplugged")
+        ticks.after(1)
+        opened.close()
+        with pytest.raises(DeviceError):
+            opened.open()
+        assert guard.orders == ["leave"]
+        opened.hand.faults.off("unplugged")
+        for _ in range(2):
+            opened.open()
+            opened.close()
+        assert guard.orders == ["leave", "recall"]
 
     def test_a_mains_adapter_that_fails_gives_no_more_positions(self, opened):
         ticks = Ticks(opened)

@@ -12,7 +12,7 @@ if not hasattr(socket, "AF_UNIX"):
 
 from study_app.devices.falcon import guard as guarding
 from study_app.devices.falcon.failures import FalconNotFound
-from study_app.devices.falcon.guard import PACKETS, Guard, watch
+from study_app.devices.falcon.guard import PACKETS, PATIENCE_S, Guard, watch
 from study_app.devices.falcon.transport.socket_frames import DESCRIPTOR
 from study_app.devices.falcon.transport.transport import open_transport
 from study_app.devices.falcon.wire.constants import FLAG_HOMING, quiet_packet
@@ -137,6 +137,17 @@ def test_a_guard_that_is_left_behind_waits_for_the_falcon_to_come_back(tmp_path)
     with Server(tmp_path / "falcon") as server:
         server.wait_for(PACKETS)
         assert server.sent() == QUIET
+
+
+def test_a_guard_that_was_left_behind_is_recalled_when_the_falcon_is_opened_again(tmp_path, capfd):
+    guard = Guard(f"falcon-socket:{tmp_path / 'falcon'}")
+    guard.start()
+    left = guard.child
+    guard.leave()
+    guard.recall()
+    guard.recall()
+    assert left.wait(PATIENCE_S / 2) != 0  # before its patience ends
+    assert capfd.readouterr().err == ""
 
 
 def test_what_ends_a_program_does_not_end_its_guard(server):
