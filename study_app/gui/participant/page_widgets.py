@@ -34,7 +34,14 @@ WithoutTank = TextPage | QuestionnairePage | ChoicePage | NumberPage | FeedbackP
 
 
 def page_widget(
-    page: WithoutTank, words: Words, clock: Callable[[], float], parent: QWidget, old: QWidget, text_scale: float
+    page: WithoutTank,
+    words: Words,
+    clock: Callable[[], float],
+    parent: QWidget,
+    old: QWidget,
+    text_scale: float,
+    *,
+    by_mouse: bool,
 ) -> PageWidget:
     """Return the widget of a page that is not a tank; a pause lies on a picture of the ``old`` one."""
     match page:
@@ -51,7 +58,8 @@ def page_widget(
         case TextPage():
             return TextWidget(page, words, clock, parent, text_scale=text_scale)
         case PausePage():
-            return PauseWidget(page, words, clock, under=_picture(old), parent=parent, text_scale=text_scale)
+            under = _picture(old)
+            return PauseWidget(page, words, clock, under=under, parent=parent, text_scale=text_scale, by_mouse=by_mouse)
         case TroublePage() | EndPage():
             return NoticeWidget(page, words, clock, parent, text_scale=text_scale)
 

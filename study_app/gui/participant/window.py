@@ -312,8 +312,7 @@ class ParticipantWindow(QWidget):
             self._put(self._make(self._page, self._widget))
 
     def _title(self) -> None:
-        title = self._words.window_title
-        self.setWindowTitle(f"{title} – pilot" if self._pilot else title)
+        self.setWindowTitle(self._words.window_title + (" – pilot" if self._pilot else ""))
         self.setAccessibleName(self.windowTitle())
 
     def _room(self) -> QRect:
@@ -325,7 +324,7 @@ class ParticipantWindow(QWidget):
     def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
         if isinstance(page, TaskPage):
             return self._make_tank(page)
-        made = page_widget(page, self._words, self._clock, self, old, self.text_scale)
+        made = page_widget(page, self._words, self._clock, self, old, self.text_scale, by_mouse=self._captures)
         made.event_made.connect(self.event)
         return made
 

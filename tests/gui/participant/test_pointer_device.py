@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QCursor, QMouseEvent, QWheelEvent
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QWidget
 
 from study_app.gui.participant.pointer_capture import NOTCHES, SHARE_OF_SCREEN, PointerCapture
-from study_app.session.pages import Page
+from study_app.session.pages import Page, PausePage
 from study_app.session.transitions.events import (
     PauseAsked,
 )
@@ -33,6 +33,18 @@ def test_pointer_is_held_and_hidden_in_the_tank_alone(captured: Opened) -> None:
     captured.window.show_page(questionnaire())
     assert not captured.window.findChild(PointerCapture).held
     assert captured.window.widget.cursor().shape() == Qt.CursorShape.ArrowCursor
+
+
+@pytest.mark.parametrize("held", [None, "pause", "force"])
+@pytest.mark.parametrize(("device", "speaks"), [("captured", False), ("opened", True)])
+def test_a_stop_speaks_of_force_but_where_the_device_is_the_mouse(
+    request: pytest.FixtureRequest, held: Any, device: str, speaks: bool
+) -> None:
+    window = request.getfixturevalue(device).window
+    window.show_page(PausePage(force_off=True, held=held))
+    shown = " ".join(one.text() for kind in (QLabel, QAbstractButton) for one in window.widget.findChildren(kind))
+    assert shown
+    assert ("force" in shown or "push" in shown) == speaks
 
 
 def other_window(captured: Opened, qtbot: Any) -> QWidget:

@@ -24,7 +24,8 @@ VEIL = 0.80  # how much of the page under a pause is hidden
 class PauseWidget(ReadingPage):
     """The pause, over the page that it interrupts; after a force stop it says that the force is off.
 
-    Where the operator stopped, there is nothing to press: the operator goes on.
+    Where the operator stopped, there is nothing to press: the operator goes on. Of a mouse, which gives no force, it
+    never speaks of one.
     """
 
     def __init__(
@@ -36,9 +37,10 @@ class PauseWidget(ReadingPage):
         under: QPixmap | None = None,
         parent: QWidget | None = None,
         text_scale: float = 1.0,
+        by_mouse: bool = False,
     ) -> None:
         self.under = under
-        if page.force_off:
+        if page.force_off and not by_mouse:
             title = words.force_held_title if page.held == "force" else words.force_off_title
             body = words.force_off_body if page.held is None else words.force_held_body
             column = ("stop", title, (body,), PARTICIPANT.bad)
