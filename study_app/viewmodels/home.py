@@ -168,7 +168,7 @@ def interrupted(
             folder=session.folder,
             source=source,
             participant=session.participant,
-            heading=f"{kind}{session.participant}, session {session.session} stopped {where}",
+            heading=f"{kind}{session.participant}, session {session.session} of {session.study} stopped {where}",
             line=f"{stopped}. {session.answers}{whole} answers are on disk; nothing before that point is missing.",
         )
     return None

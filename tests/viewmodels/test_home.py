@@ -94,7 +94,7 @@ def test_an_interrupted_session_is_told_by_where_it_stopped_and_what_is_on_disk(
     stop_at(tmp_path, "P006", steps)
     now = datetime.now().astimezone()
     told = interrupted(sessions(tmp_path, {"demo": 8}), [study_facts("rek2024"), study_facts("demo")], now)
-    assert told.heading == f"P006, session 1 stopped {where}"
+    assert told.heading == f"P006, session 1 of demo stopped {where}"
     assert f"{answers} of 8 answers are on disk" in told.line
     assert told.source == "demo"
     assert told.folder == tmp_path / "demo" / "data" / "sub-P006" / "ses-01"

@@ -176,6 +176,6 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
     timer.start(20)
     assert app.home(results.parent) == 0
     timer.stop()
-    assert steps[0] == "P001, session 1 stopped in part 1, liquid setting 2 of 2"
+    assert steps[0] == "P001, session 1 of demo stopped in part 1, liquid setting 2 of 2"
     assert "2 of 8 answers are on disk" in steps[1]
     assert steps[2:] == ["Trial 2 of 4", ["withdrawn"], False]
