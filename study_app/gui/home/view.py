@@ -108,11 +108,11 @@ class HomePlace(Place):
         QTimer.singleShot(0, self, self.show_sessions)
         QTimer.singleShot(0, self, self.read_changes)
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
+    def event(self, event: QEvent) -> bool:
         """Look for changed protocols when one comes back to the window, as from a text editor."""
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.ActivationChange and self.isActiveWindow() and self.isVisible():
+        if event.type() == QEvent.Type.WindowActivate and self.isVisible():
             self.read_changes()
+        return super().event(event)
 
     def read_changes(self) -> None:
         """Read the protocols again, outside the window's thread, where a file has changed."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QEvent, QSize, Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAccessible, QFontMetrics
-from PySide6.QtWidgets import QApplication, QLabel, QPushButton
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
 from study_app.devices.descriptor import NONE, Backend
 from study_app.gui.home.main_window import LEAST, MainWindow
@@ -216,11 +216,18 @@ def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_pat
     home = open_home(qtbot, tmp_path / "results")
     before = titles(home)
 
-    def come_back():
-        home.enter() if way == "enter" else QApplication.sendEvent(home, QEvent(QEvent.Type.ActivationChange))
+    elsewhere = QWidget()
+    qtbot.addWidget(elsewhere)
+    elsewhere.show()
 
-    home.main.activateWindow()
-    qtbot.waitUntil(home.isActiveWindow)
+    def come_back():
+        if way == "enter":
+            home.enter()
+            return
+        elsewhere.activateWindow()
+        qtbot.waitUntil(lambda: not home.isActiveWindow())
+        home.main.activateWindow()
+
     file = own_study(tmp_path)
     come_back()
     qtbot.waitUntil(lambda: sorted(titles(home)) == sorted([*before, "Own"]))
