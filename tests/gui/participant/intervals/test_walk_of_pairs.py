@@ -6,6 +6,9 @@ The session's own transitions say what comes next; the same widgets, laid out of
 from __future__ import annotations
 
 import csv
+import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -295,6 +298,12 @@ def check(walker: Walker) -> None:
     assert len(program.events("feedback_shown")) == PAIRS
     for kind in ("paused", "broke", "force_stopped", "repeat"):
         assert not program.events(kind)
+    program.process.send_signal(signal.SIGTERM)
+    program.process.wait(30)
+    for command, place in (("verify", path.parents[3]), ("reproduce", path.parent), ("replay", path.parent)):
+        words_given = [sys.executable, "-m", "study_app", command, str(place)]
+        found = subprocess.run(words_given, capture_output=True, text=True, check=False)
+        assert found.returncode == 0, found.stdout + found.stderr
 
 
 def test_pairs_and_numbers_are_answered_by_keys_alone(display: str, tmp_path: Path) -> None:
