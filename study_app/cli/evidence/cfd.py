@@ -46,6 +46,8 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
 
     if solve and to is None:
         raise click.UsageError("--solve needs --to: the folder for the solver's tables")
+    if refit and materials:
+        raise click.UsageError("--refit fits unsteady drag, which --materials leaves out: give one of them")
     if to is not None:
         make_folder(to)
     if materials:
@@ -77,10 +79,16 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
 
 
 def _materials(to: Path | None, workers: Workers, *, solve: bool) -> None:
-    """Print the law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
-    from study_app.validation.cfd.yield_flow import materials_markdown, solve_materials, stored_materials
+    """Print or write the law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
+    from study_app.validation.cfd.yield_flow import (
+        materials_markdown,
+        solve_materials,
+        stored_materials,
+        write_materials,
+    )
 
     if solve and to is not None:
         with progress(lambda text: click.echo(text, err=True)) as show, executor_for(workers) as executor:
             click.echo(solve_materials(to, executor, show))
-    click.echo(materials_markdown(stored_materials(to if solve else None)))
+    columns = stored_materials(to if solve else None)
+    click.echo(materials_markdown(columns) if to is None else write_materials(columns, to))

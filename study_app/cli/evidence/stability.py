@@ -57,8 +57,10 @@ def stability(
     from study_app.validation.stability.fidelity import fidelities
     from study_app.validation.stability.stability_cases import parse
 
-    if group is not None and (to, line, table, withheld) != (None, None, None, False):
-        raise StudyError("--group prints a table alone: remove --to, --case, --table and --withheld, or --group")
+    alone = {"case": line, "table": table, "withheld": withheld, "velocity": velocity, "delayed": delayed}
+    named = [f"--{option}" for option, value in {**alone, "group": group, "to": to}.items() if value]
+    if len(named) > 1:
+        raise StudyError(f"{' and '.join(named)} exclude each other: give one of them")
     if line is not None:
         case = parse(line)
         click.echo(str(case))
@@ -131,7 +133,7 @@ def _print_velocity() -> None:
 
 
 def _write_delayed(file: Path) -> None:
-    """Write the table of delayed forces, and print how long each may be delayed."""
+    """Write the table of delayed forces, and print the shares that are left."""
     from study_app.validation.stability import force_delay
 
     with progress() as show:

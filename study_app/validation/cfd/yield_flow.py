@@ -31,6 +31,7 @@ from study_app.validation.cfd.stored_flows import package, read, text
 
 COMMAND: Final = "liquid-study cfd --materials --solve"
 FILE: Final = "herschel_bulkley.csv"
+COMPARISON_FILE: Final = "materials.md"
 COLUMNS: Final = ("flow_index", "bingham", "drag", "drag_coarse", "drag_smooth")
 """The drag, the same on a coarser grid, and with 3.3 times the ε."""
 INDICES: Final = (0.3, 0.5, 0.7, 1.0)
@@ -177,6 +178,18 @@ def materials_markdown(columns: dict[str, Floats]) -> str:
         f"the drag by at most {grid:.2%}, 3.3 times the ε by {smooth:.2%}.",
     ]
     return "\n".join(lines)
+
+
+def write_materials(columns: dict[str, Floats], to: Path) -> Path:
+    """Write the comparison as Markdown into the folder ``to``; return the file.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written.
+    """
+    write_file(to / COMPARISON_FILE, f"{materials_markdown(columns)}\n".encode())
+    return to / COMPARISON_FILE
 
 
 def _rows(columns: dict[str, Floats], wrong: Floats) -> Iterable[str]:

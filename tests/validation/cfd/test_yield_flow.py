@@ -47,6 +47,19 @@ def test_the_command_prints_drag_and_error():
     assert f"errs by at most {np.abs(errors(stored_materials())).max():.1%} (permitted: 4%)" in lines[-1]
 
 
+def test_the_command_writes_what_it_prints(tmp_path):
+    printed = CliRunner().invoke(commands, ["cfd", "--materials"], catch_exceptions=False).output
+    written = CliRunner().invoke(commands, ["cfd", "--materials", "--to", str(tmp_path)], catch_exceptions=False)
+    assert (tmp_path / "materials.md").read_text("utf-8") == printed
+    assert written.output == f"{tmp_path / 'materials.md'}\n"
+
+
+def test_the_command_refuses_to_refit_materials():
+    refused = CliRunner().invoke(commands, ["cfd", "--materials", "--refit"])
+    assert refused.exit_code == 2
+    assert "--materials leaves out" in refused.output
+
+
 def test_a_table_that_is_missing_is_named(tmp_path):
     with pytest.raises(StudyError, match=r"herschel_bulkley\.csv cannot be used"):
         stored_materials(tmp_path)

@@ -310,7 +310,9 @@ def test_the_command_judges_only_the_groups_that_are_named():
     ("words", "said"),
     [
         (("--group", "mercury"), "no group has 'mercury' in its name: there are second plant, held, "),
-        (("--group", "lost", "--withheld"), "--group prints a table alone"),
+        (("--group", "lost", "--withheld"), "--withheld and --group exclude each other"),
+        (("--velocity", "--group", "lost"), "--velocity and --group exclude each other"),
+        (("--withheld", "--to", "shares"), "--withheld and --to exclude each other"),
     ],
 )
 def test_groups_that_cannot_be_judged_are_refused(words, said):
