@@ -1,4 +1,4 @@
-"""What a fit by least squares found, and how far to rely on it: intervals, correlations, warnings.
+"""The result of a least-squares fit: values, confidence intervals, correlations, warnings.
 
 Intervals are those of linear regression at the solution, by Student's t. Residuals follow one another, so as many of n
 count as independent as n (1 − ρ)/(1 + ρ), with ρ their correlation from one row to the next (Bayley & Hammersley 1946,
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from study_app.evaluation.identify.parameters import Parameter
+from study_app.evaluation.identify.parameters import NO_LESS_THAN, Parameter
 from study_app.evaluation.identify.search import Problem, coordinate, solve, u_range
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Scene
@@ -32,8 +32,8 @@ class Estimates:
     """The fitted parameters of a liquid, by the names they were asked for.
 
     ``values`` and ``intervals`` (95 %, within what is permitted). ``correlation`` (p, p) is that of the estimates, nan
-    where a parameter does nothing, ``following`` that of residuals from row to row. ``told_apart`` is whether every
-    parameter acts, and no two of them alike. ``scene`` has the values in it, and its effects named.
+    where a parameter does nothing, ``following`` that of residuals from row to row. ``distinguishable`` is whether
+    every parameter acts, and no two of them alike. ``scene`` has the values in it, and its effects named.
     """
 
     scene: Scene
@@ -43,7 +43,7 @@ class Estimates:
     intervals: dict[str, tuple[float, float]]
     following: float
     correlation: Floats
-    told_apart: bool
+    distinguishable: bool
     warnings: tuple[str, ...]
 
     def row(self, it: Parameter) -> tuple[str, str]:
@@ -83,20 +83,19 @@ def estimate(problem: Problem, liquid_id: str, names: Sequence[str], size: float
         "intervals": dict(zip(names, intervals, strict=True)),
         "following": following(residual),
         "correlation": correlation,
-        "told_apart": bool(acts.all()) and not pairs,
+        "distinguishable": bool(acts.all()) and not pairs,
         "warnings": warnings,
     }
 
 
 def _acts(u: Floats, slopes: Floats, problem: Problem, size: float) -> NDArray[np.bool_]:
     """Return which parameters change what was measured at all, (p,)."""
-    spans = [1.0 if coordinate(it).relative is False else max(abs(at), 0.01) for it, at in _beside(problem, u)]
+    spans = [
+        1.0 if coordinate(it).relative is False else max(abs(at), 0.01)
+        for it, at in zip(problem.parameters, u, strict=True)
+    ]
     strengths: Floats = np.linalg.norm(slopes, axis=0) * spans
     return strengths > _NO_EFFECT * size
-
-
-def _beside(problem: Problem, u: Floats) -> Iterator[tuple[Parameter, float]]:
-    yield from zip(problem.parameters, u.tolist(), strict=True)
 
 
 def _spread(slopes: Floats, acts: NDArray[np.bool_], residual: Floats) -> tuple[Floats, Floats]:
@@ -176,8 +175,8 @@ def _of_the_parameters(
 def _edge(problem: Problem, k: int, z: Floats) -> str:
     """Return why the range ends there, where the model alone does not say it."""
     it = problem.parameters[k]
-    if it.field == "scaling" and z[k] - problem.least[k] < problem.most[k] - z[k]:
-        return " (no less than the length)"
+    if it.field in NO_LESS_THAN and z[k] - problem.least[k] < problem.most[k] - z[k]:
+        return f" (no less than {NO_LESS_THAN[it.field]})"
     if it.whole and z[k] > problem.least[k]:
         return " (no more than the scaling, nor than what was measured lasts)"
     return ""

@@ -1,7 +1,7 @@
 """Parameters of a liquid from measured motion and force: least squares through the servo's own tick.
 
 The sum over rows and axes of (measured − simulated force)² is made least within the ranges that the scene's models
-permit (``search``); how sure the values are is said in ``estimates``.
+permit (``search``); ``estimates`` computes confidence intervals and warnings.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,6 +18,8 @@ from study_app.haptics.model.scene import Liquid, Scene
 
 THRESHOLDS: Final = tuple(name for effect in EFFECTS for name in effect.thresholds)
 """These decide for or against: the force does not change with them, or jumps."""
+NO_LESS_THAN: Final = {"scaling": "length", "thickened_viscosity_pa_s": "zero_shear_viscosity_pa_s"}
+"""Fields that their model does not permit to be less than another of the same table."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +27,8 @@ class Parameter:
     """One number of a scene.
 
     ``name`` is what it was asked for by, ``table`` and ``field`` where it is: "liquid", "body" or an effect's table.
-    ``least`` and ``most`` are what its model permits, ``least`` itself not where ``above``. ``whole`` numbers count.
+    ``least`` and ``most`` are what its model permits, ``least`` itself not where ``above``, and what those of
+    `NO_LESS_THAN` that are not fitted leave. ``whole`` numbers count.
     """
 
     name: str
@@ -56,7 +60,18 @@ def find(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple[Parameter,
         for other in found[:k]:
             if (one.table, one.field) == (other.table, other.field):
                 raise StudyError(f"{other.name} and {one.name} are the same parameter: name it once")
-    return found
+    return tuple(_narrowed(it, tables[it.table], found) for it in found)
+
+
+def _narrowed(it: Parameter, table: BaseModel, fitted: Sequence[Parameter]) -> Parameter:
+    """Return a parameter within what the fields of `NO_LESS_THAN` that are not fitted leave."""
+    fields = {one.field for one in fitted if one.table == it.table}
+    for greater, less in NO_LESS_THAN.items():
+        if it.field == greater and less not in fields:
+            return dataclasses.replace(it, least=float(getattr(table, less)), above=False)
+        if it.field == less and greater not in fields and hasattr(table, greater):
+            return dataclasses.replace(it, most=float(getattr(table, greater)))
+    return it
 
 
 def replace(scene: Scene, liquid_id: str, parameters: Sequence[Parameter], values: Sequence[float]) -> Scene:

@@ -1,9 +1,9 @@
 """The search for a liquid's parameters: the force along a measured motion as a function of a few numbers.
 
-Positive parameters are searched by their logarithm, a wake's decay by its rate; a length that is fitted together with
-its scaling, by the length and their ratio, which is never below 1. A length counts elements, so the force is known at
-whole lengths alone: between them it is interpolated; the search begins at several lengths, and what it finds is
-rounded, and the others are fitted once more.
+Positive parameters are searched by their logarithm, a wake's decay by its rate; two of which one may not be less than
+the other (`NO_LESS_THAN`), by the lesser and their ratio, which is never below 1. A length counts elements, so the
+force is known at whole lengths alone: between them it is interpolated; the search begins at several lengths, and what
+it finds is rounded, and the others are fitted once more.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 
 from study_app.errors import StudyError
 from study_app.evaluation.identify.measured_force import Measured, at_rate
-from study_app.evaluation.identify.parameters import Parameter, replace
+from study_app.evaluation.identify.parameters import NO_LESS_THAN, Parameter, replace
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.offline import simulate
@@ -76,8 +76,8 @@ def u_range(parameter: Parameter) -> tuple[float, float]:
 class Problem:
     """A scene, the parameters that are searched, and what was measured.
 
-    z (p,) are the numbers of the search: u, but for a scaling whose length is searched too, there the logarithm of
-    their ratio. ``least`` and ``most`` (p,) are its range, ``start`` the scene's own values in it. ``compared``,
+    z (p,) are the numbers of the search: u, but for the greater of two in `NO_LESS_THAN` there the logarithm of their
+    ratio. ``least`` and ``most`` (p,) are its range, ``start`` the scene's own values in it. ``compared``,
     ``varied`` and ``more`` are words for warnings; ``alike`` is the correlation of two estimates from which their
     parameters count as not distinguishable.
     """
@@ -92,8 +92,10 @@ class Problem:
         self._scene, self._liquid_id = scene, liquid_id
         self._coordinates = tuple(coordinate(it) for it in parameters)
         self.length = next((k for k, it in enumerate(parameters) if it.whole), None)
-        of = None if self.length is None else (parameters[self.length].table, "scaling")
-        self.scaling = next((k for k, it in enumerate(parameters) if (it.table, it.field) == of), None)
+        places = {(it.table, it.field): k for k, it in enumerate(parameters)}
+        lesser = {k: places.get((it.table, NO_LESS_THAN.get(it.field, ""))) for k, it in enumerate(parameters)}
+        self.lesser = {k: of for k, of in lesser.items() if of is not None}
+        self.scaling = next((k for k, of in self.lesser.items() if of == self.length), None)
         self.least, self.most = (np.array(ends) for ends in zip(*map(self._range, parameters), strict=True))
         self.start = np.clip(self._to_z([it.value for it in parameters]), self.least, self.most)
 
@@ -115,8 +117,8 @@ class Problem:
     def u(self, z: Floats) -> Floats:
         """Return u (p,)."""
         u = np.array(z, float)
-        if self.length is not None and self.scaling is not None:
-            u[self.scaling] += u[self.length]
+        for k, lesser in self.lesser.items():
+            u[k] += u[lesser]
         return u
 
     def slopes(self, z: Floats) -> Floats:
@@ -133,8 +135,8 @@ class Problem:
     def slopes_of_u(self, z: Floats) -> Floats:
         """Return the derivative by u instead, (m, p)."""
         slopes = self.slopes(z)
-        if self.length is not None and self.scaling is not None:
-            slopes[:, self.length] -= slopes[:, self.scaling]
+        for k, lesser in self.lesser.items():
+            slopes[:, lesser] -= slopes[:, k]
         return slopes
 
     def rounded(self, z: Floats) -> Floats:
@@ -160,22 +162,18 @@ class Problem:
 
     def _longest(self, values: Sequence[float], k: int) -> float:
         """Return the greatest whole length that the scaling permits."""
-        scaling = self._beside(self.parameters[k], "scaling") if self.scaling is None else values[self.scaling]
-        return min(self.parameters[k].most, math.floor(scaling * (1 + 1e-12)))
-
-    def _beside(self, it: Parameter, field: str) -> float:
-        """Return another number of a parameter's table."""
-        (liquid,) = (liquid for liquid in self._scene.liquids if liquid.id == self._liquid_id)
-        return float(getattr(getattr(liquid, it.table), field))
+        scaling = math.inf if self.scaling is None else values[self.scaling]
+        return math.floor(min(self.parameters[k].most, scaling) * (1 + 1e-12))
 
     def _range(self, it: Parameter) -> tuple[float, float]:
         """Return the least and the greatest z."""
-        return u_range(it)
+        least, most = u_range(it)
+        return (0.0 if self.parameters.index(it) in self.lesser else least), most
 
     def _to_z(self, values: Sequence[float]) -> Floats:
         z = np.array([it.to_u(value) for it, value in zip(self._coordinates, values, strict=True)])
-        if self.length is not None and self.scaling is not None:
-            z[self.scaling] = max(z[self.scaling] - z[self.length], 0.0)
+        for k, lesser in self.lesser.items():
+            z[k] = max(z[k] - z[lesser], 0.0)
         return z
 
 
@@ -243,14 +241,10 @@ class ForceProblem(Problem):
         return [*values[:k], below, *values[k + 1 :]], [*values[:k], above, *values[k + 1 :]], share
 
     def _range(self, it: Parameter) -> tuple[float, float]:
-        """Return the least and the greatest z: a length is no longer than its scaling, or than what was measured."""
-        if it.field == "scaling":
-            return (0.0 if self.scaling is not None else math.log(self._beside(it, "length"))), math.log(it.most)
+        """Return the least and the greatest z: a length is no longer than what was measured."""
         if it.whole:
             lasted_s = self._motion.t_s[-1] - self._motion.t_s[0]
-            most = min(it.most, math.ceil(1000 * lasted_s))
-            if self.scaling is None:
-                most = min(most, math.floor(self._beside(it, "scaling")))
+            most = math.floor(min(it.most, math.ceil(1000 * lasted_s)))
             return 0.0, max(math.log(max(most, 1)), _LENGTH_STEP)
         return super()._range(it)
 

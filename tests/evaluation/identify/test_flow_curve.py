@@ -82,9 +82,32 @@ def test_a_relaxation_time_does_not_change_a_flow_curve():
     curve = FlowCurve(RATES, 20 * RATES)
     found = fit_curve(tank("slime"), "slime", ["zero_shear_viscosity_pa_s", "relaxation_time_s"], curve)
     assert found.values["zero_shear_viscosity_pa_s"] == pytest.approx(20)
-    assert not found.told_apart
+    assert not found.distinguishable
     (warning,) = found.warnings
     assert warning.startswith("relaxation_time_s does not change the stress at these shear rates: 0.3 is its initial")
+
+
+THICKENING = ["zero_shear_viscosity_pa_s", "thickened_viscosity_pa_s", "onset_shear_rate_per_s"]
+
+
+@pytest.mark.parametrize(("least", "most"), [(5.0, 6.0), (2.0, 2.0), (3.0, 1.0)])
+def test_a_liquid_that_hardly_thickens_or_thins_ends_at_equal_viscosities(least, most):
+    """Viscosity by the shear rate, below 5 per s and above; the search starts from cornstarch's parameters."""
+    stress_pa = np.where(RATES < 5, least, most) * RATES * (1 + 0.02 * np.random.default_rng(1).standard_normal(25))
+    found = fit_curve(tank("cornstarch"), "cornstarch", THICKENING, FlowCurve(RATES, stress_pa))
+    zero, thickened, _ = found.values.values()
+    assert min(least, most) * 0.9 < zero <= thickened < max(least, most) * 1.1
+    assert thickened < max(1.02, 1.1 * most / least) * zero
+
+
+def test_a_viscosity_alone_stays_within_the_other():
+    for fitted, measured_pa_s, edge in (
+        ("zero_shear_viscosity_pa_s", 30.0, 20.0),
+        ("thickened_viscosity_pa_s", 0.5, 1.0),
+    ):
+        found = fit_curve(tank("cornstarch"), "cornstarch", [fitted], FlowCurve(RATES, measured_pa_s * RATES))
+        assert found.values[fitted] == edge
+        assert "ended at the edge of its range" in found.warnings[0]
 
 
 def test_a_narrow_range_of_shear_rates_does_not_separate_the_parameters():

@@ -43,7 +43,7 @@ def test_known_parameters_of_a_wake_are_found_again_in_noise():
         assert upper - lower < 0.02 * true
     assert isinstance(found.values["length"], int)
     assert found.rms_n == pytest.approx(0.02 * math.sqrt(2), rel=0.05)
-    assert found.told_apart
+    assert found.distinguishable
     assert found.warnings == ()
 
 
@@ -79,7 +79,7 @@ def test_a_viscosity_an_order_away_and_an_added_mass():
     found = fit(start, "oil", ["viscosity_pa_s", "added_mass.coefficient"], REACH, noisy(OIL, REACH, 0.05))
     assert found.values["viscosity_pa_s"] == pytest.approx(1.41, rel=0.01)
     assert found.values["added_mass.coefficient"] == pytest.approx(0.5, rel=0.05)
-    assert found.told_apart
+    assert found.distinguishable
 
 
 def test_a_local_wake_whose_force_has_plateaus_over_its_length():
@@ -171,10 +171,10 @@ def test_the_wider_the_noise_the_wider_the_interval():
 # --- What is doubted -------------------------------------------------------------------------------------------------
 
 
-def test_two_factors_of_the_same_force_cannot_be_told_apart():
+def test_two_factors_of_the_same_force_cannot_be_distinguished():
     names = ["drag_coefficient", "density_kg_m3"]
     found = fit(BALL, "tank", names, REACH, noisy(BALL, REACH, 0.02))
-    assert not found.told_apart
+    assert not found.distinguishable
     assert found.correlation[0, 1] == pytest.approx(-1, abs=1e-6)
     (warning,) = found.warnings
     assert "drag_coefficient and density_kg_m3 cannot be distinguished" in warning
@@ -182,13 +182,13 @@ def test_two_factors_of_the_same_force_cannot_be_told_apart():
     known_kg_m3 = found.values["drag_coefficient"] * found.values["density_kg_m3"]
     assert known_kg_m3 == pytest.approx(470, rel=0.01)
     alone = fit(BALL, "tank", ["drag_coefficient"], REACH, noisy(BALL, REACH, 0.02))
-    assert alone.told_apart
+    assert alone.distinguishable
 
 
 def test_a_parameter_that_does_nothing_is_named_and_left_alone():
     names = ["drag_coefficient", "viscosity_pa_s"]
     found = fit(OIL, "oil", names, REACH, noisy(OIL, REACH, 0.02))
-    assert not found.told_apart
+    assert not found.distinguishable
     assert any("drag_coefficient does not change the force" in warning for warning in found.warnings)
     assert found.values["drag_coefficient"] == 0.47
     assert np.isnan(found.correlation[0]).all()
@@ -211,7 +211,7 @@ def test_a_scaling_never_falls_below_its_length():
     assert found.values["length"] <= found.values["scaling"]
     alone = fit(TANK, "tank", ["scaling"], REVERSE, force_of(override_all(TANK, {"scaling": 300}), REVERSE))
     assert alone.values["scaling"] == pytest.approx(300)
-    assert any("no less than the length" in warning for warning in alone.warnings)
+    assert any("no less than length" in warning for warning in alone.warnings)
 
 
 def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
