@@ -122,7 +122,7 @@ def physical_n(scene: Scene, speed_mps: float, rate_per_s: float, t_s: Floats) -
 
 
 def _unsteady_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s: float) -> Floats:
-    """Return unsteady drag by the letter, of a stroke whose acceleration is known, and buoyancy, (n, 3) [N]."""
+    """Return unsteady drag by its equations, of a stroke whose acceleration is known, and buoyancy, (n, 3) [N]."""
     t_s = motion.t_s
     v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
     even_s = np.full(len(t_s), 1 / scene.rate_hz)
@@ -131,7 +131,7 @@ def _unsteady_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s: floa
 
 
 def _non_newtonian_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s: float) -> Floats:
-    """Return non-Newtonian drag by the letter, added mass and buoyancy, (n, 3) [N]."""
+    """Return non-Newtonian drag by its equations, added mass and buoyancy, (n, 3) [N]."""
     liquid, t_s = scene.liquids[0], motion.t_s
     v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
     added_n = 0.5 * liquid.density_kg_m3 * scene.body.volume_m3 * dv

@@ -1,4 +1,4 @@
-"""Non-Newtonian drag by the letter of its law: what ``haptics.kernels.effects.non_newtonian`` must equal.
+"""Non-Newtonian drag, directly from its equations: ``haptics.kernels.effects.non_newtonian`` must equal it.
 
 The steady force is that of ``haptics.model.laws.rheology``; the states are integrated here in many steps per tick, and
 share no code with the kernel.

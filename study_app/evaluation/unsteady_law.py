@@ -1,4 +1,4 @@
-"""Unsteady drag by the letter of its law: what ``haptics.kernels.effects.unsteady_drag`` must equal.
+"""Unsteady drag, implemented directly from its equations: ``haptics.kernels.effects.unsteady_drag`` must equal it.
 
 Written from the law's equations, with exact exponentials for every step, and with the acceleration and the constants
 given. It shares no code and no constants with the kernel.

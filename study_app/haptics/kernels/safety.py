@@ -120,7 +120,7 @@ def limit_slope(model: Any, safety: Record, sample: Record) -> None:
 
     Drag that builds up late gets what is left of B, at the greater speed that it belongs to: in fast strokes it follows
     so soon that freed handles of 50 g and less swung at scales of 10 and more.
-    A force that grows more steeply than B brings its excess along.
+    What a force that grows more steeply than B exceeds it by, ``excess_n``, is removed whole.
     Where the body passes between liquids they share the limit B, so that their sum keeps it.
     """
     parameters = model.parameters[0]

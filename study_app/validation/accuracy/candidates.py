@@ -123,7 +123,7 @@ class UnsteadyRung(TickRung):
     """Unsteady drag; against a solved motion of the fit, with constants that are fitted without that motion."""
 
     def forces_against(self, truth: Truth) -> list[Floats]:
-        """Return the forces, as `Rung.forces_against`; by the letter where a motion is left out of the fit."""
+        """Return the forces, as `Rung.forces_against`; by the equations where a motion is left out of the fit."""
         if truth.left_out is None:
             return super().forces_against(truth)
         found = []

@@ -1,4 +1,4 @@
-"""How true the force of each liquid is, up to which speed, and what a tick costs; and how far drag laws differ."""
+"""Accuracy of the force of each liquid, up to which speed, and what a tick costs; and how far drag laws differ."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from study_app.validation.accuracy import candidate_sets
 from study_app.validation.cfd.solver_truths import solver_truths
 from study_app.validation.cfd.stored_flows import held_out, stored, training
 
-NO_TRUTH_REYNOLDS: Final = 1000.0
+NO_REFERENCE_REYNOLDS: Final = 1000.0
 """Above, no solution or measurement of an unsteady motion is known to this program."""
 FILE: Final = "liquids.md"
 REYNOLDS: Final = (1.0, 10.0, 100.0, 200.0, 1e3, 3e3, 1e4, 3e4, 1e5)
@@ -109,7 +109,7 @@ def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) ->
         speed_mps,
         mps_per_reynolds,
         model.name,
-        creeping if speed_mps <= NO_TRUTH_REYNOLDS * mps_per_reynolds else None,
+        creeping if speed_mps <= NO_REFERENCE_REYNOLDS * mps_per_reynolds else None,
         None if steady is None else share(steady),
         max(map(share, solved)) if solved else None,
         (min(speeds) / mps_per_reynolds, max(speeds) / mps_per_reynolds) if solved else (math.nan, math.nan),
@@ -179,11 +179,11 @@ _HEADINGS: Final = (
     "ns per tick",
 )
 _WHAT: Final = (
-    "Errors: RMS of the error over RMS of the force, the greatest of several truths, with velocities known. Creeping "
-    "flow: at Re 0.01. Steady drag: against experiments. Fluid solver: at 1 kHz; unsteady drag meets each motion with "
-    "constants that are fitted to the other motions. Solved up to: the speed at Re {:.3g}, the greatest of a solved "
-    f"motion, or the scene's greatest speed. Above Re {NO_TRUTH_REYNOLDS:g} nothing here is a truth: steady drag is as "
-    "uncertain as published laws of it differ, and the force of a motion that is not steady is not known. "
+    "Errors: RMS of the error over RMS of the force, the greatest of several references, with velocities known. "
+    "Creeping flow: at Re 0.01. Steady drag: against experiments. Fluid solver: at 1 kHz; unsteady drag meets each "
+    "motion with constants that are fitted to the other motions. Solved up to: the speed at Re {:.3g}, the greatest of "
+    f"a solved motion, or the scene's greatest speed. Above Re {NO_REFERENCE_REYNOLDS:g} there is no reference for "
+    "unsteady motion, and steady drag is as uncertain as published laws of it differ. "
     "Strokes: at the scene's greatest speed and acceleration, against the laws themselves, with velocities known and "
     "with those of the scene's estimator from encoder counts. Below, drag coefficients by each law."
 )

@@ -36,8 +36,8 @@ TRAINING: Final = (
 )
 """Motions by profile, liquid and Reynolds number, that the constants of unsteady drag are fitted to.
 
-They are besides those of `cases`, with which alone the constants are not determined: those have no motion that goes
-back through its own wake.
+They are added to those of `cases`, which alone do not determine the constants: none of them goes back through its own
+wake.
 """
 HELD_OUT: Final = (
     (OSCILLATION_KC4, "honey", 3.0),

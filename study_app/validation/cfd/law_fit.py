@@ -1,6 +1,6 @@
 """The constants of unsteady drag by least squares over solved motions, and the errors of motions left out of the fit.
 
-What is fitted is the law by the letter, along motions whose speed and acceleration are known exactly: the constants are
+The equations of the law are fitted along motions whose speed and acceleration are known exactly: the constants are
 then those of the flow, and no delay of a tick or of a velocity estimator is fitted into them.
 """
 

@@ -77,7 +77,7 @@ def stored(folder: Traversable | None = None) -> tuple[Table, ...]:
 
 
 def training(folder: Traversable | None = None) -> tuple[Table, ...]:
-    """Return the tables of the motions that constants are fitted to besides those of `stored`.
+    """Return the tables of the motions that constants are fitted to in addition to those of `stored`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How true each liquid's force is: published drag laws, a survey of three liquids, and what the command refuses."""
+"""Accuracy of each liquid's force: published drag laws, a survey of three liquids, and what the command refuses."""
 
 import pytest
 from click.testing import CliRunner
@@ -61,7 +61,7 @@ def test_the_survey_says_up_to_which_speed_the_force_was_solved(found, tmp_path)
     assert [by_name[name][6] for name in CHOSEN] == ["–", "0.6 m/s", "0.14 m/s"]
     assert by_name["water"][1] == "40,700 (0.6 m/s)"
     assert len(by_name["100,000"]) == len(PUBLISHED) + 4
-    assert "Above Re 1000 nothing here is a truth" in text
+    assert "Above Re 1000 there is no reference for unsteady motion" in text
 
 
 def test_what_cannot_be_surveyed_is_said_in_a_line():

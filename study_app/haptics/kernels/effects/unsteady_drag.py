@@ -11,9 +11,8 @@ With w the velocity relative to the liquid, ν = µ/ρ, and vectors w, y, z, e, 
     h  = D/(2√(πν)) Σ b_i m_i,  m_i' = dw/dt − (k_i + c_m u/D) m_i   history, carried away with the flow
 
 The exponentials are 1/√t within 1.5 % from 1 ms to 30 s. As Re → 0, F is that of Stokes, the added mass and Basset.
-The constants are fitted to this project's fluid solver at Re 0.3 to 100 by ``liquid-study cfd --refit``, which says
-how well. Each
-tick costs the same, and a step is stable however long it is.
+The constants are fitted to this project's fluid solver at Re 0.3 to 100 by ``liquid-study cfd --refit``, which prints
+the errors. Each tick costs the same, and a step is stable however long it is.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ _START: Final[dict[str, dict[str, float]]] = {
     },
 }
 """What the lab begins with: ketchup, shampoo, slime and cornstarch in water."""
-_NOT_IN_IT: Final = "no thixotropy, no impact, no fracture, no yielding by unsteady flow"
+_NOT_MODELLED: Final = "not modelled: thixotropy, impact, fracture, yielding by unsteady flow"
 
 
 def steady_n(scene: Scene, liquid: Liquid, speed_mps: float, steepest_nspm: float = math.inf) -> tuple[float, float]:
@@ -146,7 +146,7 @@ EFFECT = Effect(
     extent="area",
     format=2,
     bars=lambda extremes: (_REPLACES, "non-Newtonian drag instead: the liquid has the parameters of a flow curve"),
-    note=lambda liquid: f", {liquid.non_newtonian.kind}: {_NOT_IN_IT}",
+    note=lambda liquid: f"; {liquid.non_newtonian.kind}, {_NOT_MODELLED}",
     model=Rheology,
     missing='kind = "herschel-bulkley", "carreau", "maxwell" or "shear-thickening", ...',
     excludes=_REPLACES,

@@ -127,7 +127,7 @@ def test_the_gate_chooses_it_where_a_liquid_has_a_flow_curve(name):
     (liquid,) = resolve(tank(name, effects="auto")).liquids
     assert "non_newtonian" in liquid.effects
     assert not {"drag", "unsteady_drag", "history"} & set(liquid.effects)
-    assert "no thixotropy" in "\n".join(describe_gate(tank(name, effects="auto")))
+    assert "not modelled: thixotropy" in "\n".join(describe_gate(tank(name, effects="auto")))
 
 
 def test_a_newtonian_liquid_is_written_as_before():
