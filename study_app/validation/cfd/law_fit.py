@@ -72,13 +72,14 @@ class _Solved:
 
     def residuals(self, constants: Constants) -> Floats:
         """Return the errors (n,), whose sum of squares is the square of the RMS share."""
-        error_n = self._error_n(constants)
-        return error_n / math.sqrt(float((self._force_n**2).sum()))
+        residuals: Floats = self._error_n(constants) / np.linalg.norm(self._force_n)
+        return residuals
 
     def errors(self, constants: Constants) -> tuple[float, float]:
         """Return the RMS and the greatest error as shares of the RMS and the greatest force."""
-        share = math.sqrt(float((self.residuals(constants) ** 2).sum()))
-        return share, float(np.abs(self._error_n(constants)).max() / np.abs(self._force_n).max())
+        error_n = self._error_n(constants)
+        share = float(np.linalg.norm(error_n) / np.linalg.norm(self._force_n))
+        return share, float(np.abs(error_n).max() / np.abs(self._force_n).max())
 
     def _error_n(self, constants: Constants) -> Floats:
         case = self._case
@@ -104,7 +105,7 @@ def refit(
         raise StudyError(f"{len(tables)} solved motion(s): a fit that leaves one out needs at least two")
     solved = [_Solved(it) for it in tables]
     tell(f"fitting the constants to {len(tables)} motions ...")
-    constants = _fit(solved, BEGIN)
+    constants = fit_constants(tables)
     errors = []
     for table, one in zip(tables, solved, strict=True):
         tell(f"... without {table.case.liquid_id}, {table.notes['title']} ...")
