@@ -57,6 +57,19 @@ RESULTS = click.option(
 )
 
 
+def exclude_each_other(**given: object) -> None:
+    """Refuse options, by name, of which more than one is given (neither None nor False).
+
+    Raises
+    ------
+    click.UsageError
+        Names those given.
+    """
+    names = [f"--{name}" for name, value in given.items() if value is not None and value is not False]
+    if len(names) > 1:
+        raise click.UsageError(f"{' and '.join(names)} exclude each other: give one of them")
+
+
 def takes_study(function: Command) -> Command:
     """Give a command RESULTS, or ``--results DIR`` instead; the function gets the study's folder as ``results``."""
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.options import Target
+from study_app.cli.options import Target, exclude_each_other
 from study_app.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -43,7 +43,9 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
     Wakes are compared with their definition, models of a real liquid with experiments, exact solutions and a solver.
     """
     if every:
-        _survey(scene, liquid, to)
+        exclude_each_other(liquids=every, liquid=liquid)
+        exclude_each_other(liquids=every, path=None if path == DEFAULT_PATH else path)
+        _survey(scene, to)
         return
     from study_app.store.output_files import make_folder
     from study_app.validation.accuracy.accuracy_report import markdown
@@ -67,14 +69,12 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
         click.echo(written)
 
 
-def _survey(file: str | None, liquid: str | None, to: Path | None) -> None:
+def _survey(file: str | None, to: Path | None) -> None:
     """Print or write the accuracy of the force of every liquid of a file."""
     from study_app.protocol.load import load_scenes
     from study_app.store.output_files import make_folder
     from study_app.validation.accuracy.liquid_survey import survey, survey_markdown, write_survey
 
-    if liquid is not None:
-        raise click.UsageError("--liquids compares all liquids of a file: leave out --liquid")
     if to is not None:
         make_folder(to)
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
@@ -95,11 +95,11 @@ def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scen
         if liquid in thesis or liquid in real:
             return thesis.get(liquid or ""), real.get(liquid or ""), ()
         known = ", ".join(dict.fromkeys([*thesis, *real]))
-        raise click.UsageError(f"--liquid {liquid}: there are {known}; name another file's liquid with --scene")
+        raise click.UsageError(f"--liquid {liquid}: there are {known}; or give FILE, which has it")
     if liquid is None:
         there = load_scenes(scene)
         if len(there) > 1:
-            raise click.UsageError(f"--scene {scene}: say which --liquid of {', '.join(there)}")
+            raise click.UsageError(f"{scene}: say which --liquid of {', '.join(there)}")
         liquid = next(iter(there))
     chosen = load_scene(scene, liquid)
     if chosen.liquids[0].viscosity_pa_s is None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.options import Target
+from study_app.cli.options import Target, exclude_each_other
 from study_app.cli.parallel import executor_for, takes_workers
 from study_app.cli.progress import progress
 from study_app.workers.executors import Workers
@@ -44,10 +44,9 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     from study_app.validation.cfd.solver import solve as solve_all
     from study_app.validation.cfd.stored_flows import held_out, steady, stored, training
 
+    exclude_each_other(refit=refit, materials=materials)
     if solve and to is None:
         raise click.UsageError("--solve needs --to: the folder for the solver's tables")
-    if refit and materials:
-        raise click.UsageError("--refit fits unsteady drag, which --materials leaves out: give one of them")
     if to is not None:
         make_folder(to)
     if materials:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.options import EXIT_FOUND, Target
+from study_app.cli.options import EXIT_FOUND, Target, exclude_each_other
 from study_app.cli.parallel import executor_for, takes_workers
 from study_app.cli.progress import progress
 from study_app.errors import StudyError
@@ -57,10 +57,9 @@ def stability(
     from study_app.validation.stability.fidelity import fidelities
     from study_app.validation.stability.stability_cases import parse
 
-    alone = {"case": line, "table": table, "withheld": withheld, "velocity": velocity, "delayed": delayed}
-    named = [f"--{option}" for option, value in {**alone, "group": group, "to": to}.items() if value]
-    if len(named) > 1:
-        raise StudyError(f"{' and '.join(named)} exclude each other: give one of them")
+    exclude_each_other(
+        to=to, case=line, table=table, withheld=withheld, velocity=velocity, delayed=delayed, group=group
+    )
     if line is not None:
         case = parse(line)
         click.echo(str(case))

@@ -18,7 +18,8 @@ pytestmark = pytest.mark.slow
 def test_what_the_command_cannot_do_is_said_in_a_line():
     for words, said in (
         (["--liquid", "watr"], "there are water"),
-        (["rek2024"], "say which --liquid of"),
+        (["--liquid", "watr"], "or give FILE, which has it"),
+        (["rek2024"], "rek2024: say which --liquid of"),
         (["--liquid", "water", "--path", "circl"], "did you mean 'circle'"),
     ):
         refused = CliRunner().invoke(commands, ["accuracy", *words])

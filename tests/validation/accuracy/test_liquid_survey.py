@@ -66,7 +66,8 @@ def test_the_survey_says_up_to_which_speed_the_force_was_solved(found, tmp_path)
 
 def test_what_cannot_be_surveyed_is_said_in_a_line():
     for words, said in (
-        (["--liquids", "--liquid", "honey"], "leave out --liquid"),
+        (["--liquids", "--liquid", "honey"], "--liquids and --liquid exclude each other"),
+        (["--liquids", "--path", "circle"], "--liquids and --path exclude each other"),
         (["rek2024", "--liquids"], "no liquid has a viscosity"),
     ):
         refused = CliRunner().invoke(commands, ["accuracy", *words])

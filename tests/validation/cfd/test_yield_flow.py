@@ -57,7 +57,7 @@ def test_the_command_writes_what_it_prints(tmp_path):
 def test_the_command_refuses_to_refit_materials():
     refused = CliRunner().invoke(commands, ["cfd", "--materials", "--refit"])
     assert refused.exit_code == 2
-    assert "--materials leaves out" in refused.output
+    assert "--refit and --materials exclude each other" in refused.output
 
 
 def test_a_table_that_is_missing_is_named(tmp_path):
