@@ -124,6 +124,8 @@ class SessionRows:
         self._intervals[*which, line["interval"]] = len(self.intervals)
         earlier = None if before is None else self.intervals[before]
         trial = self._row_of(line)
+        if trial.get("intervals") is None:
+            raise StoreError(f"the journal's line {line['n']} is an interval of trial {line['trial']}, which has none")
         trial["intervals"] += 1
         self.intervals.append(interval_row(trial, self._started[which], line, earlier))
 

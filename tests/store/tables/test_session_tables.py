@@ -270,6 +270,14 @@ def test_the_end_of_a_trial_that_never_started_is_refused() -> None:
         trials(script.lines)
 
 
+def test_an_interval_of_a_trial_without_intervals_is_refused() -> None:
+    script = Script()
+    script.trial(4)
+    script.add("interval_started", trial=4, attempt=1, interval=1)
+    with pytest.raises(StoreError, match="line 3 is an interval of trial 4, which has none"):
+        trials(script.lines)
+
+
 def test_cannot_judge_is_an_answer_and_a_statement_left_out_is_none() -> None:
     script = Script()
     script.trial(1)
