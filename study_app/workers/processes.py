@@ -165,7 +165,7 @@ class ProcessExecutor(CancellingExecutor):
             found = pool.submit(function, *args, **kwargs)
         except (BrokenExecutor, OSError, RuntimeError) as error:  # the system starts no process
             found = Future()
-            found.set_exception(error)
+            found.set_exception(BrokenExecutor(str(error)) if isinstance(error, OSError) else error)
         found.add_done_callback(lambda found: self._messages.put(_Finished(case, pool, found)))
 
 
@@ -186,8 +186,8 @@ def _settled(case: _Case, found: Future[Any], *, cancel: bool) -> bool:
             return False
         cause = error
         error = WorkerError(
-            f"a worker process ended unexpectedly {ATTEMPTS} times during the same cases (it was killed, or the "
-            "memory was exhausted): try again with fewer --workers"
+            f"a worker process ended unexpectedly {ATTEMPTS} times during the same cases, or could not be started (it "
+            "was killed, or the memory was exhausted): try again with fewer --workers"
         )
         error.__cause__ = cause
     if case.future.set_running_or_notify_cancel():

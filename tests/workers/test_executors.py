@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -10,12 +11,14 @@ import textwrap
 from concurrent.futures import Executor, Future
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
 
 from study_app.errors import Problem, ProtocolError, StudyError, WorkerError
 from study_app.workers.executors import Workers, open_executor
+from study_app.workers.spawning import CONTEXT
 from tests.workers.cases import die, draw, killed_once, loaded, refuse, refuse_file
 
 pytestmark = pytest.mark.slow
@@ -53,6 +56,30 @@ def test_a_case_that_always_kills_its_process_is_one_clear_line() -> None:
     ):
         list(executor.map(die, range(4)))
     assert "\n" not in str(raised.value)
+
+
+@posix
+@pytest.mark.parametrize("failing", [1, 100])
+def test_a_process_that_cannot_be_started_is_started_again_or_one_clear_line(
+    failing: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[object] = []
+    start = CONTEXT.Process.start
+
+    def fail(process: Any) -> None:
+        started.append(process)
+        if len(started) <= failing:
+            raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+        start(process)
+
+    monkeypatch.setattr(CONTEXT.Process, "start", fail)
+    with open_executor(Workers(2)) as executor:
+        found = [executor.submit(draw, seed) for seed in range(4)]
+        if failing == 1:
+            assert [one.result() for one in found] == [draw(seed) for seed in range(4)]
+        else:
+            with pytest.raises(WorkerError, match="or could not be started"):
+                found[0].result()
 
 
 def test_an_error_of_a_case_is_raised_where_its_result_is_asked_for() -> None:
