@@ -106,7 +106,7 @@ class Block(Table):
     order: Order = Field(
         default="fixed",
         description="fixed: as written; shuffled: anew in each repetition; constrained: all trials together, within "
-        "max_repeats and min_distance; williams, latin: rows of a square, dealt by the number in the participant's id.",
+        "max_repeats and min_distance; williams, latin: rows of a square, by the number in the participant's id.",
     )
     max_repeats: int | None = Field(
         default=None, ge=1, le=100, description="How often a condition may come in a row; order constrained only."

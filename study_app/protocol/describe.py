@@ -237,9 +237,9 @@ def _constraint(block: Block) -> str:
 
 
 def _beside_the_trials(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
-    """Yield how rows are dealt, and when there are breaks."""
+    """Yield how rows are assigned, and when there are breaks."""
     if block.order in ("williams", "latin") and len(block.conditions) > 1:
-        yield "Rows", "dealt by the number in the participant's id: P007 is number 7, whatever the seed"
+        yield "Rows", "assigned by the number in the participant's id (P007 is number 7), not by the seed"
     if block.break_page is not None:
         title = protocol.text(protocol.pages[block.break_page].title, language)
         yield (

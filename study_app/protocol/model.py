@@ -336,8 +336,8 @@ class Protocol(Table):
         return tuple(self.blocks[step] for step in self.steps if step in self.blocks)
 
     @property
-    def deals_rows(self) -> bool:
-        """Whether a block is in the order of a square, whose rows are dealt to participants."""
+    def assigns_rows(self) -> bool:
+        """Whether a block is in the order of a square, whose rows are assigned to participants."""
         return any(block.order in ("williams", "latin") for block in self.blocks_in_order)
 
     @property

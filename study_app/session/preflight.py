@@ -276,8 +276,8 @@ def _withheld(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
 
 
 def _balance(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
-    """Say which row of a square the participant takes, where the protocol deals rows."""
-    if not protocol.deals_rows:
+    """Say which row of a square the participant takes, where the protocol assigns rows."""
+    if not protocol.assigns_rows:
         return ()
     number = enrolment(facts.participant)
     if number is None:

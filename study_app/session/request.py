@@ -131,18 +131,18 @@ def check_row(row_of: str | None, study: Protocol) -> None:
     Raises
     ------
     SessionError
-        No block has a Williams or Latin order, or the id has no number that determines a row.
+        The study assigns no rows, or the id has no number that would determine one.
     """
     if row_of is None:
         return
-    if not study.deals_rows:
+    if not study.assigns_rows:
         raise SessionError(
             f"row of {row_of!r}: no block of {study.study.name} has a Williams or Latin order, so no participant has a "
             "row; leave it out"
         )
     if not ID_PATTERN.fullmatch(row_of) or enrolment(row_of) is None:
         raise SessionError(
-            f"row of {row_of!r}: rows are dealt by the number in a participant's id; give the id of the participant "
+            f"row of {row_of!r}: rows are assigned by the number in a participant's id; give the id of the participant "
             "who is replaced, such as P007"
         )
 

@@ -139,7 +139,7 @@ body = { en = "Let go.", nl = "Laat los." }
     .replace('scale = "agreement"', 'scale = "agreement"\nitem_order = "shuffled"')
     .replace('order = "shuffled"\ntask = "reach"', 'order = "williams"\ntask = "reach"')
 )
-"""The sound protocol with constraints, breaks, dealt rows and items in random order."""
+"""The sound protocol with constraints, breaks, assigned rows and items in random order."""
 
 
 DECIDED = """\

@@ -111,7 +111,7 @@ def test_what_only_some_protocols_have():
         ('order = "latin"', "2 trials, in a Latin square of 2 rows"),
         (
             'order = "latin"',
-            "Rows         dealt by the number in the participant's id: P007 is number 7, whatever the seed",
+            "Rows         assigned by the number in the participant's id (P007 is number 7), not by the seed",
         ),
         (f'{ORDER}\nbreak_every = 1\nbreak_page = "rest"', "Breaks       3, after every 1 trial: Rest"),
         (f'{ORDER}\nbreak_every = 2\nbreak_page = "rest"', "Breaks       1, after every 2 trials: Rest"),

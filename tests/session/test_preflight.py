@@ -117,9 +117,9 @@ def test_less_room_is_enough_without_recordings() -> None:
 
 def test_a_dealt_order_wants_a_number_in_the_id() -> None:
     blocks = small.TABLES["blocks"] | {"feeling": small.TABLES["blocks"]["feeling"] | {"order": "williams"}}
-    dealt = Protocol.model_validate(small.TABLES | {"blocks": blocks})
-    assert verdicts(dealt)["Balance"] == "ok"
-    assert verdicts(dealt, participant="Anna")["Balance"] == "warning"
+    assigned = Protocol.model_validate(small.TABLES | {"blocks": blocks})
+    assert verdicts(assigned)["Balance"] == "ok"
+    assert verdicts(assigned, participant="Anna")["Balance"] == "warning"
     assert "Balance" not in verdicts()
 
 

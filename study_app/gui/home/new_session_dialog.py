@@ -184,7 +184,7 @@ class NewSessionDialog(QDialog):
         grid.addLayout(both, 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
         folder = field_with_button(self.results, change)
         add_field(grid, 10, 0, "Results folder of this study", folder, hint=self.where, across=2)
-        if self.facts.protocol.deals_rows:
+        if self.facts.protocol.assigns_rows:
             add_field(
                 grid, 12, 0, "Replaces participant", self.row_of, hint="whose row of the square is taken; else empty"
             )

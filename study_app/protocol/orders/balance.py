@@ -127,7 +127,7 @@ def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
 def balance(protocol: Protocol, participants: Sequence[str], seed: int, session: str = "") -> Balance:
     """Return how even the orders of ``participants`` (ids) would be, all of them under ``seed``.
 
-    In a study each session has a seed of its own; to orders dealt from a square the seed makes no difference.
+    In a study each session has a seed of its own; orders from a square do not depend on the seed.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Orders dealt from a square: Williams designs and cyclic Latin squares, and which participant takes which row.
+"""Orders from a square: Williams designs and cyclic Latin squares, and which participant takes which row.
 
 A Williams design (Williams 1949, Australian Journal of Scientific Research A 2, 149) of n codes is the sequence 0, 1,
 n − 1, 2, n − 2, … with each of 0 … n − 1 added modulo n; for odd n also with every row reversed. Once through its rows,
@@ -10,8 +10,8 @@ first code lies from the last one shown: 1, 2, …, n − 1 and round again (bac
 follows itself, each repetition is as even as the first, and after as many repetitions as `borders_even` says the
 borders between them are even too.
 
-**Rows** are dealt by enrolment: the last number in the participant's id (P007 is number 7). Numbers 1 … rows are the
-first round, the next as many the second; each round deals all rows in an order of its own. That order comes from a
+**Rows** are assigned by enrolment: the last number in the participant's id (P007 is number 7). Numbers 1 … rows are the
+first round, the next as many the second; each round assigns all rows in an order of its own. That order comes from a
 stream of the *study*, not of the session, because sessions have seeds of their own and would not fill a round. So a
 session's row depends on the study's name, the block's name and the id alone. It is predictable, which does no harm:
 rows are rows of codes, and what a code stands for is sealed. An id without a number takes a row drawn from the id
@@ -67,7 +67,7 @@ def enrolment(participant: str) -> int | None:
     return int(numbers[-1]) if numbers else None
 
 
-def dealt_row(study: str, block: str, rows: int, participant: str) -> int:
+def assigned_row(study: str, block: str, rows: int, participant: str) -> int:
     """Return the row (from 0) that a participant takes in a block of a study."""
     number = enrolment(participant)
     if number is None:

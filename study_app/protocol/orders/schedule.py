@@ -14,7 +14,7 @@ interleaved     of a block with a design: every round presents each track once, 
                 stream "order/PARTICIPANT/BLOCK/ROUND"
 blocked         of a block with a design: one track after another, in random order, from stream
                 "order/PARTICIPANT/BLOCK"
-williams latin  a row of a square, dealt by the number in the participant's id, whatever the seed (see ``squares``)
+williams latin  a row of a square, assigned by the number in the participant's id, not by the seed (see `latin_squares`)
 ==============  ========================================================================================================
 """
 
@@ -29,7 +29,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.order_constraint import Constraint
 from study_app.protocol.orders.block_orders import BlockOrder, FormOrder, Orders, block_codes, orders_of
 from study_app.protocol.orders.constrained import arrange
-from study_app.protocol.orders.latin_squares import dealt_row, row, row_count
+from study_app.protocol.orders.latin_squares import assigned_row, row, row_count
 from study_app.protocol.streams import Draw, shuffle, stream
 from study_app.protocol.trials.tracks import tracks_of
 
@@ -151,7 +151,7 @@ def codes_of(study: str, block: BlockOrder, participant: str, seed: int, row_of:
             )
             return tuple(code for code, slots in tracks for _ in range(slots))
         case "williams" | "latin" as square:
-            taken = dealt_row(study, block.id, row_count(square, len(codes)), row_of or participant)
+            taken = assigned_row(study, block.id, row_count(square, len(codes)), row_of or participant)
             return tuple(codes[number] for number in row(square, len(codes), taken, times))
 
 

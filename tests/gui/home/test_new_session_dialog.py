@@ -319,7 +319,7 @@ def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, results, 
     assert dialog.begin.isEnabled()
     assert dialog.chosen().row_of == "P002"
     dialog.row_of.setText("anna")
-    assert "rows are dealt by the number" in dialog.verdict.text()
+    assert "rows are assigned by the number" in dialog.verdict.text()
     assert not dialog.begin.isEnabled()
 
 

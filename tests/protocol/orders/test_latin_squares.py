@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.orders.latin_squares import Square, borders_even, dealt_row, enrolment, row, row_count
+from study_app.protocol.orders.latin_squares import Square, assigned_row, borders_even, enrolment, row, row_count
 
 SIZES = range(2, 13)
 
@@ -93,19 +93,19 @@ def test_the_number_in_an_id(participant: str, number: int | None):
 @given(st.integers(1, 30), st.integers(0, 40), st.text("abcxyz", min_size=1, max_size=5))
 def test_every_round_deals_every_row(rows: int, rounds: int, study: str):
     numbers = range(1 + rounds * rows, 1 + (rounds + 1) * rows)
-    assert sorted(dealt_row(study, "block", rows, f"P{number:03d}") for number in numbers) == list(range(rows))
+    assert sorted(assigned_row(study, "block", rows, f"P{number:03d}") for number in numbers) == list(range(rows))
 
 
 def test_rounds_blocks_and_studies_deal_in_orders_of_their_own():
-    def dealt(study: str, block: str, rounds: int) -> tuple[int, ...]:
-        return tuple(dealt_row(study, block, 12, f"P{1 + 12 * rounds + place}") for place in range(12))
+    def assigned(study: str, block: str, rounds: int) -> tuple[int, ...]:
+        return tuple(assigned_row(study, block, 12, f"P{1 + 12 * rounds + place}") for place in range(12))
 
-    orders = [dealt("a", "x", 0), dealt("a", "x", 1), dealt("a", "y", 0), dealt("b", "x", 0)]
+    orders = [assigned("a", "x", 0), assigned("a", "x", 1), assigned("a", "y", 0), assigned("b", "x", 0)]
     assert len(set(orders)) == 4
 
 
 def test_rows_are_dealt_the_same_on_every_machine():
-    assert [dealt_row("rek2024", "liquids", 6, f"P{number:03d}") for number in range(1, 13)] == [
+    assert [assigned_row("rek2024", "liquids", 6, f"P{number:03d}") for number in range(1, 13)] == [
         2,
         1,
         5,
@@ -119,11 +119,11 @@ def test_rows_are_dealt_the_same_on_every_machine():
         0,
         4,
     ]
-    assert dealt_row("rek2024", "liquids", 6, "P7") == dealt_row("rek2024", "liquids", 6, "P007")
+    assert assigned_row("rek2024", "liquids", 6, "P7") == assigned_row("rek2024", "liquids", 6, "P007")
 
 
 def test_an_id_without_a_number_draws_its_row():
     names = [first + second + third for first in "abcdefghij" for second in "abcdefghij" for third in "abcdef"]
-    counts = Counter(dealt_row("study", "block", 6, name) for name in names)
+    counts = Counter(assigned_row("study", "block", 6, name) for name in names)
     assert sum((counts[row] - 100) ** 2 / 100 for row in range(6)) < 20.5  # χ², 5 degrees of freedom, p = 0.001
-    assert dealt_row("study", "block", 6, "anna") == dealt_row("study", "block", 6, "anna")
+    assert assigned_row("study", "block", 6, "anna") == assigned_row("study", "block", 6, "anna")
