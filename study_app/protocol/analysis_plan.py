@@ -22,7 +22,7 @@ LISTS = ("primary", "names", "rising", "falling")
 
 
 class Published(Table):
-    """A value of another study, which figures show beside the study's own."""
+    """A value of another study, which figures show next to the study's own."""
 
     block: Id = Field(description="The block whose results it is comparable with.")
     measure: Literal["weber", "threshold", "exponent", "pse"] = Field(description="What was measured.")

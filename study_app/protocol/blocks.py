@@ -45,7 +45,7 @@ class Criterion(Table):
 
 
 class Catch(Table):
-    """Easy trials among the others: whoever answers too many of them incorrectly did not attend to the task."""
+    """Easy trials among the others: a participant who answers many of them incorrectly does not attend to the task."""
 
     share: Annotated[float, within(0.01, 0.5, "a catch trial in 100 to one in 2 others")] = Field(
         default=0.1, description="Catch trials per other trial of a track: one in every stretch of 1/share trials."

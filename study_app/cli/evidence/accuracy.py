@@ -32,7 +32,7 @@ REAL = "physical2"
     "--liquids",
     "every",
     is_flag=True,
-    help="Compare the liquids of FILE instead, each with its own model: accuracy of its force, up to which speed, and "
+    help="Compare the liquids of FILE instead, each with its own model: error of its force, up to which speed, and "
     "what a tick costs; default: physical2.",
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for table and figure; default: print.")
@@ -70,7 +70,7 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
 
 
 def _survey(file: str | None, to: Path | None) -> None:
-    """Print or write the accuracy of the force of every liquid of a file."""
+    """Print or write the error of the force of every liquid of a file."""
     from study_app.protocol.load import load_scenes
     from study_app.store.output_files import make_folder
     from study_app.validation.accuracy.liquid_survey import survey, survey_markdown, write_survey

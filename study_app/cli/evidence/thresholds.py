@@ -1,4 +1,4 @@
-"""The command that plants thresholds and looks whether they are recovered."""
+"""The command that checks whether known thresholds of simulated observers are recovered."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from study_app.workers.executors import Workers
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
 def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, to: Path | None) -> None:
-    """Recover planted thresholds: by the methods and the analysis alone, and through the whole program.
+    """Recover known thresholds of simulated observers, by methods and analysis alone and by the whole program.
 
     For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) many studies of ten equal
     observers choose levels and are analysed; in magnitude estimation an exponent is planted. Then three participants
