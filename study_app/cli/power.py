@@ -95,11 +95,14 @@ def power(
     from study_app.analysis.power.plan import compares_statements
     from study_app.analysis.power.threshold_studies import plans
     from study_app.protocol.load import load
+    from study_app.store.output_files import make_folder
 
     study = load(protocol)
     planned = plans(study, trials)
     if trials and not planned:
         raise click.UsageError(f"--trials: {study.study.name} has no main block of thresholds")
+    if to is not None:
+        make_folder(to)
     found: Powers | Precisions | None = None
     steps: Iterator[Powers] | Iterator[Precisions]
     cancelled = False

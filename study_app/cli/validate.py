@@ -39,12 +39,14 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     from study_app.analysis.power.plan import plan
     from study_app.protocol.load import load
     from study_app.session.simulated.trial_features import feelings
-    from study_app.store.output_files import write_files
+    from study_app.store.output_files import make_folder, write_files
     from study_app.validation.report_rates.known_effects import simulated
     from study_app.validation.report_rates.rate_tables import markdown, table
     from study_app.validation.report_rates.rates import Rate
     from study_app.validation.report_rates.simulation import validate
 
+    if to is not None:
+        make_folder(to)
     rates: tuple[Rate, ...] = ()
     begun, done = time.monotonic(), 0
 

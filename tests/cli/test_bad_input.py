@@ -14,6 +14,11 @@ FAST = "t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps\n0,0,0,0,0,0,0\n0.001,0,0,0,1e308,1
 SIMULATE = ("simulate", "rek2024", "--liquid", "water")
 CURRENT = 'current={kind="uniform", velocity_mps=[1e308, 0, 0]}'
 SAMPLE = str(Path(__file__).parents[2] / "results" / "sample-rek2024")
+LONG = tuple(
+    (*command, "--to", "far.csv")
+    for command in (("power", "demo"), ("stability",), ("validate",), ("validate-report",))
+)
+"""Commands that would find out minutes later."""
 
 
 @pytest.mark.slow
@@ -27,6 +32,7 @@ SAMPLE = str(Path(__file__).parents[2] / "results" / "sample-rek2024")
         (("rehearse", "demo", "--results", ""), "--results': is empty"),
         (("run", "demo", "--participant", "P001", "--results", ""), "--results': is empty"),
         (("validate-report", "--to", ""), "--to': is empty"),
+        *((words, "far.csv (it is a file, not a folder)") for words in LONG),
         pytest.param((*SIMULATE, "--path", "far.csv", "--to", "o.csv"), "must be finite", marks=needs_servo),
         pytest.param((*SIMULATE, "--path", "fast.csv", "--to", "o.csv"), "must be finite", marks=needs_servo),
     ],

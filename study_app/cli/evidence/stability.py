@@ -52,6 +52,7 @@ def stability(
     of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the driver of the Falcon in
     front of its emulator. Ends with 3 if one is unstable with safety on.
     """
+    from study_app.store.output_files import make_folder
     from study_app.validation.stability import stability_report as found
     from study_app.validation.stability.case_groups import groups, some, sweep
     from study_app.validation.stability.fidelity import fidelities
@@ -60,6 +61,8 @@ def stability(
     exclude_each_other(
         to=to, case=line, table=table, withheld=withheld, velocity=velocity, delayed=delayed, group=group
     )
+    if to is not None:
+        make_folder(to)
     if line is not None:
         case = parse(line)
         click.echo(str(case))

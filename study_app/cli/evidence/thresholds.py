@@ -36,7 +36,7 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
     code 3 if one exceeds it.
     """
     from study_app.protocol.load import load
-    from study_app.store.output_files import write_files
+    from study_app.store.output_files import make_folder, write_files
     from study_app.validation.thresholds.many_studies import NAMES, methods_alone, plant
     from study_app.validation.thresholds.verdicts import Verdict, markdown, table
     from study_app.validation.thresholds.whole_pipeline import PEOPLE, run
@@ -45,6 +45,8 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
         chosen = [(name, plant(Path(name).stem, load(name))) for name in files or NAMES]
     except ValueError as error:
         raise click.UsageError(str(error)) from error
+    if to is not None:
+        make_folder(to)
     begun = time.monotonic()
     judged: list[Verdict] = []
     with progress() as show, executor_for(workers) as executor:
