@@ -40,6 +40,8 @@ _OF_THE_SCENE: Final = {
         _P("motion.acceleration_mps2", "Hardest", "m/s²", 0.1, 200.0, logarithmic=True, decimals=1),
     )
 }
+_OF_A_SESSION: Final = frozenset({"scene", "velocity", "knee", "accuracy", "motion"})
+"""Tables whose numbers hold for all liquids."""
 QUANTITIES: Final = _OF_THE_SCENE | {it.name: it for effect in EFFECTS for it in effect.controls}
 
 
@@ -57,10 +59,18 @@ def quantity(name: str) -> Parameter:
     raise KeyError(name)
 
 
+def can_vary(name: str) -> bool:
+    """Return whether a number belongs to a condition: to its liquid, region, ball or delay."""
+    return any(name in {known, known.partition(".")[2]} for known in QUANTITIES if _table(known) not in _OF_A_SESSION)
+
+
 def quantity_words(name: str) -> str:
     """Return the name of a quantity within a sentence, such as "viscosity" or "wake scaling"."""
     row = quantity(name)
-    table = row.name.partition(".")[0]
-    effect = NAMED.get(table)
+    effect = NAMED.get(_table(row.name))
     words = row.label if effect is None or effect.with_liquid else f"{effect.label} {row.label}"
     return words.lower()
+
+
+def _table(name: str) -> str:
+    return name.partition(".")[0]

@@ -15,7 +15,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.checks.adjustment import misfits, settings
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.quantities import quantity
+from study_app.protocol.quantities import can_vary
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, did_you_mean
 from study_app.protocol.table import Table
@@ -159,14 +159,14 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
     else:
         try:
             present_value(protocol, stimulus)
-            quantity(stimulus.vary)
-        except KeyError:
-            message = f"{stimulus.vary} does not belong to a liquid: it holds for the whole session"
-            yield Fault((*place, "vary"), message, f"a number of the liquid, or {', '.join(OF_CONDITION)}")
         except StudyError:
-            known = {*OF_CONDITION, *number_names(protocol.scene_for(condition))}
+            known = {*OF_CONDITION, *filter(can_vary, number_names(protocol.scene_for(condition)))}
             message = f'there is no number "{stimulus.vary}" in condition "{condition}"'
             yield Fault((*place, "vary"), message, did_you_mean(stimulus.vary, known))
+        else:
+            if not can_vary(stimulus.vary):
+                message = f"{stimulus.vary} does not belong to a liquid: it holds for the whole session"
+                yield Fault((*place, "vary"), message, f"a number of the liquid, or {', '.join(OF_CONDITION)}")
 
 
 def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:

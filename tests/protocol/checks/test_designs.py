@@ -21,6 +21,10 @@ REST = '[pages.rest]\nkind = "break"\ntitle = "Rest"\nbody = "Rest."\n'
         ([('condition = "oil"\nvary', 'condition = "oill"\nvary')], "", "condition", 'there is no condition "oill"'),
         ([('condition = "oil"\nvary', "vary")], "", "condition", "is missing, and there are several"),
         ([('"viscosity_pa_s"', '"viscosty_pa_s"')], "", "vary", 'did you mean "viscosity_pa_s"?'),
+        *(
+            ([('"viscosity_pa_s"', f'"{name}"')], "", "vary", f"{name} does not belong to a liquid")
+            for name in ("force_limit_n", "scene.scale", "threshold_mps", "relative", "fade_s")
+        ),
         ([('"viscosity_pa_s"', '"drag.law"'), ("standards = [1, 2]\n", "")], "", "vary", 'no number "drag.law"'),
         (
             [('liquid = "thin"\n\n[conditions.other]', 'liquids = ["thin", "thick"]\n\n[conditions.other]')],
