@@ -186,7 +186,12 @@ class NewSessionDialog(QDialog):
         add_field(grid, 10, 0, "Results folder of this study", folder, hint=self.where, across=2)
         if self.facts.protocol.assigns_rows:
             add_field(
-                grid, 12, 0, "Replaces participant", self.row_of, hint="whose row of the square is taken; else empty"
+                grid,
+                12,
+                0,
+                "Replaces participant",
+                self.row_of,
+                hint="whose row of the square is used; empty: the own row",
             )
         grid.addWidget(self.device_options, 14, 0, 1, 2)
         self._area = QScrollArea()
