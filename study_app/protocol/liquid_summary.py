@@ -30,9 +30,9 @@ def warnings(protocol: Protocol) -> tuple[str, ...]:
     return (
         *_alike(protocol, felt),
         *_clipped(felt),
-        *_lawless(protocol, felt),
+        *_ignoring_viscosity(protocol, felt),
         *_practised(protocol),
-        *_told_by_size(protocol),
+        *_of_different_sizes(protocol),
     )
 
 
@@ -72,7 +72,7 @@ def _clipped(felt: dict[str, Steady]) -> Iterator[str]:
             )
 
 
-def _lawless(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
+def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
     """Yield the liquids with a viscosity whose drag does not depend on it, and how wrong that is."""
     for name in protocol.liquids:
         scene = protocol.scene_of(name)
@@ -112,7 +112,7 @@ def _practised(protocol: Protocol) -> Iterator[str]:
                 )
 
 
-def _told_by_size(protocol: Protocol) -> Iterator[str]:
+def _of_different_sizes(protocol: Protocol) -> Iterator[str]:
     """Yield the blocks whose conditions show balls of different sizes, by which participants can tell them apart."""
     for block in protocol.main_blocks:
         sizes = {1000 * protocol.scene_for(it).body.diameter_m for it in protocol.conditions_in(block.id)}

@@ -35,7 +35,7 @@ MODULUS: Final = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Observer:
-    """What a simulated participant can tell apart.
+    """What a simulated participant can discriminate.
 
     Attributes
     ----------
