@@ -29,7 +29,7 @@ def presented_by(protocol: Protocol, codes: Mapping[str, Mapping[str, str]], sta
     design = design_of(protocol, block)
     track = track_of(protocol, block, codes[block.id][started["code"]])
     arrangement = arrangement_of(design, started["arrangement"])
-    return due_of(protocol, block, track, arrangement, started["level"], catch=started["catch"])
+    return due_of(protocol, block, track, arrangement, started["level"], catch=started.get("catch", False))
 
 
 def heard_of(
@@ -81,6 +81,6 @@ def heard_in(protocol: Protocol, lines: Iterable[Mapping[str, Any]]) -> tuple[He
                 start["level"],
                 arrangement,
                 answer,
-                catch=start["catch"],
+                catch=start.get("catch", False),
             )
     return tuple(found[number] for number in sorted(found))

@@ -22,7 +22,7 @@ from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.tables.columns import LATER, SEALED
+from study_app.store.tables.columns import LATER
 from study_app.store.tables.csv_files import in_columns_of
 from study_app.store.tables.participants import write_participants
 from study_app.store.tables.session_tables import table_columns
@@ -99,7 +99,8 @@ def _rewrite(place: Place, lines: list[Line], key: Key) -> list[str]:
     before, after = (dict(table_files(place, lines, one)) for one in (None, key))
     for path, columns in zip(after, table_columns(lines, opened=True).values(), strict=True):
         held = path.read_bytes() if is_there(path) else b""
-        sealed, content = (in_columns_of(held, whole[path], columns, LATER - SEALED)[0] for whole in (before, after))
+        may_lack = LATER - {column.name for column in columns if column.sealed}
+        sealed, content = (in_columns_of(held, whole[path], columns, may_lack)[0] for whole in (before, after))
         if held not in (sealed, content):
             left.append(
                 f"{path} differs from the journal, so it was not changed: "

@@ -326,6 +326,7 @@ LATER = frozenset(
         "recording_lost",
         "group",
         "intervals",
+        "catch",
         "invalid_reasons",
         *(column.name for column in DELIVERED),
     }

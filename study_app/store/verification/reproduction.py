@@ -135,7 +135,7 @@ class _Compared:
             if due is not None:
                 self.differences.append(f"trial {trial.number}: passed over, though it was due by the answers")
             return
-        presented = (line["level"], line["standard"], line["arrangement"], line["catch"])
+        presented = (line["level"], line["standard"], line["arrangement"], line.get("catch", False))
         follows = due is not None and presented == (
             due.level,
             due.standard,

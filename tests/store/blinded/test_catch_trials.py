@@ -6,6 +6,7 @@ import csv
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -13,9 +14,11 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
+from study_app.store.checksums import write_checksums
 from study_app.store.exclusions import exclusions, include
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.protocol.trials.studies import SHORT, text_of
@@ -113,6 +116,33 @@ def test_levels_of_a_study_with_catch_trials_follow_and_the_tables_name_them(stu
     with next(session.path.rglob("*intervals*.csv")).open(encoding="utf-8") as file:
         levels = [row["level"] for row in csv.DictReader(file) if (row["block"], row["catch"]) == ("viscosity", "true")]
     assert levels == ["0.0002"] * 2 * 20
+
+
+def test_sessions_of_versions_without_catch_trials_are_reproduced_and_unblinded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def append(store: SessionStore, event: str, **fields: Any) -> None:
+        fields.pop("catch", None)
+        append_all(store, event, **fields)
+
+    append_all = SessionStore.append
+    monkeypatch.setattr(SessionStore, "append", append)
+    (tmp_path / "levels.toml").write_text(text_of(*SHORT))
+    study = rehearse(tmp_path / "levels.toml", participants=1, seed=2, results=tmp_path / "study", recordings=False)
+    (session,) = StudyFolder(study).sessions()
+    assert reproduced(session.path).followed == ["viscosity: 12 of 12 levels follow from the answers"]
+    assert unblind(study, "AB", "to analyse").left == ()
+    (path,) = session.path.rglob("*intervals*.csv")
+    with path.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert {row.pop("catch") for row in rows} == {"n/a"}
+    assert verify(study).errors == ()
+    with path.open("w", encoding="utf-8", newline="") as file:  # as the earlier version unblinded it
+        writer = csv.DictWriter(file, rows[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    write_checksums(session, {})
+    assert verify(study).errors == ()
 
 
 def test_a_share_that_is_permitted_excludes_nobody(tmp_path: Path) -> None:
