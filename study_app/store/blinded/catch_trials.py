@@ -21,6 +21,7 @@ from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.exclusions import Exclusion, exclude, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
+from study_app.store.sessions.folder_lock import is_open
 
 RULE: Final = "catch"
 
@@ -28,8 +29,8 @@ RULE: Final = "catch"
 def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
     """Exclude the sessions that answered too many catch trials incorrectly; return what was added.
 
-    A session that is excluded already, or was included again by a person, keeps that decision. The study's key must be
-    open.
+    A session that is excluded already, or was included again by a person, keeps that decision; one that runs is not
+    judged. The study's key must be open.
 
     Raises
     ------
@@ -40,7 +41,7 @@ def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
     decided = {row.what[:2] for row in exclusions(folder) if row.trial is None} | _included_again(study)
     added: list[Exclusion] = []
     for session in study.sessions():
-        if (session.participant, session.number) in decided:
+        if (session.participant, session.number) in decided or is_open(session.path):
             continue
         reason = ""
         with contextlib.suppress(StoreError, KeyError, TypeError, ValueError, AttributeError):  # `verify` names damage

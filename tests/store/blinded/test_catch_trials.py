@@ -106,6 +106,16 @@ def test_sessions_that_cannot_be_excluded_are_named(study: Path) -> None:
     assert len(unblind(study, "AB", "once more").excluded) == 2
 
 
+def test_running_sessions_are_not_judged(study: Path) -> None:
+    opening = open_alone(StudyFolder(study).session("P001", 1).path)
+    try:
+        found = unblind(study, "AB", "to analyse")
+    finally:
+        opening.release()
+    assert [row.participant for row in found.excluded] == ["P002"]
+    assert [row.participant for row in unblind(study, "AB", "once more").excluded] == ["P001"]
+
+
 def test_levels_of_a_study_with_catch_trials_follow_and_the_tables_name_them(study: Path) -> None:
     for session in StudyFolder(study).sessions():
         assert reproduced(session.path).followed[-1:] == ["viscosity: 60 of 60 levels follow from the answers"]
