@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.psychometric_bands import psychometric_bands
 from study_app.analysis.designs.track_courses import courses
 from study_app.analysis.figures.levels.level_figure import level_pictures
 from study_app.analysis.figures.levels.track_figure import track_pictures
@@ -18,6 +19,7 @@ from study_app.analysis.figures.picture import Picture
 from study_app.analysis.results.levels import LevelsFound
 from study_app.analysis.tables.study import Study, load_study
 from study_app.analysis.tables.tracks import TRACK, answers_of, tracks
+from study_app.psychophysics.families import success
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +94,22 @@ def test_figures_mark_catch_trials_by_crosses(study: Study, staircase: LevelsFou
     (levels_drawn,) = level_pictures(study, [staircase], ["svg"])
     assert "crosses: catch trials" in levels_drawn.caption
     assert _crosses(levels_drawn) == len({(one.participant, one.standard) for one in staircase.own_thresholds})
+
+
+def test_a_block_of_one_standard_has_a_band_around_each_function(
+    study: Study, staircase: LevelsFound, opened: pd.DataFrame
+) -> None:
+    quest = next(found for found in levels_found(study) if found.block == "quest")
+    block = next(block for block in study.levels if block.id == "quest")
+    bands = psychometric_bands(block, opened, quest.people, (-1.5, -0.2))
+    assert set(bands) == set(quest.people)
+    for one in quest.own_thresholds:
+        u, low, high = bands[str(one.participant)]
+        psi = success("weibull", u, np.log10(one.threshold), one.width or 1, 1 / 3, one.lapse or 0)
+        assert (low <= high).all()
+        assert ((low <= psi + 0.02) & (psi - 0.02 <= high)).all()
+    captions = [picture.caption for picture in level_pictures(study, [quest, staircase], ["svg"])]
+    assert ["with the 95 % band" in caption for caption in captions] == [True, False]
 
 
 def _crosses(picture: Picture) -> int:

@@ -137,7 +137,7 @@ def test_weber_fractions_are_drawn_where_there_are_two_standards(opened_adaptive
     assert (plotted / "weber-staircase.png").exists()
     assert not (plotted / "weber-quest.png").exists()
     assert {"4", "8", "Weber fraction"} < set(words_in(plotted / "weber-staircase.svg"))
-    assert "published 0.1917" in words_in(plotted / "weber-staircase.svg")
+    assert "dotted: published 0.1917" in words_in(plotted / "weber-staircase.svg")
     caption = (plotted / "weber-staircase.txt").read_text(encoding="utf-8")
     assert "published values, Jones et al. 1997: weber 0.1917 (at 71 % correct, n = 10)." in caption
     (block_found,) = (one for one in levels_found(load_study(opened_adaptive)) if one.block == "staircase")

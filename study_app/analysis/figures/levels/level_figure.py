@@ -11,13 +11,16 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from study_app import figure_style as style
+from study_app.analysis.designs.psychometric_bands import psychometric_bands
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
 from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound, ThresholdFound
 from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.results.words import counted
+from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.tracks import tracks
 from study_app.psychophysics.families import Family, success
 
 MOST_PEOPLE: Final = 23
@@ -59,22 +62,32 @@ def level_pictures(
 
 
 def _picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
-    files = files_of(partial(_draw, study, found), forms, f"{study.name}: {found.title}")
+    bands = _bands(study, found)
+    files = files_of(partial(_draw, study, found, bands), forms, f"{study.name}: {found.title}")
     own = len(found.people) - MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} in the table alone." if own > 0 else ""
     caption = (
-        f"{found.title}: {summary_words(found)} at each level. {_panels(found)}{_chance(found)}{left_out} "
+        f"{found.title}: {summary_words(found)} at each level. {_panels(found, bool(bands))}{_chance(found)}{left_out} "
         f"{sample_words(study, len(found.people))}"
     )
     return Picture(found.block, name, caption, files)
 
 
-def _panels(found: LevelsFound) -> str:
+def _bands(study: Study, found: LevelsFound) -> Mapping[str, Array]:
+    """Return the bands of the participants' functions, where there is one in each panel."""
+    if not found.own_thresholds or len(_standards(found)) > 1:
+        return {}
+    block = next(block for block in study.levels if block.id == found.block)
+    return psychometric_bands(block, tracks(study), found.people[:MOST_PEOPLE], _limits(found, _places(found)))
+
+
+def _panels(found: LevelsFound, banded: bool) -> str:
+    band = ", with the 95 % band" if banded else ""
     crosses = "; crosses: catch trials" if found.has_catch_trials else ""
     if found.own_thresholds:
         return (
-            "Curves: psychometric functions at the posterior medians; bars: 95 % intervals of the thresholds, those of "
-            "several standards one below another; "
+            f"Curves: psychometric functions at the posterior medians{band}; bars: 95 % intervals of the thresholds, "
+            "those of several standards one below another; "
             f"circles: answers at each level, area by their number{crosses}. First panel: all participants."
         )
     return (
@@ -114,7 +127,7 @@ def _chance(found: LevelsFound) -> str:
 
 
 @style.own_settings()
-def _draw(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
+def _draw(study: Study, found: LevelsFound, bands: Mapping[str, Array], fonts: Sequence[str]) -> Sheet:
     people = found.people[:MOST_PEOPLE]
     rows = math.ceil((1 + len(people)) / COLUMNS)
     height = HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + FOOT_PT + 14
@@ -128,6 +141,9 @@ def _draw(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
         sheet.text(x, y - 4, "All" if person is None else person, size=7, weight="bold")
         axes = sheet.axes(x, y, width, PANEL_PT)
         _panel(axes, found, person, first=column == 0)
+        if person is not None and person in bands:
+            u, lower, upper = bands[person]
+            axes.fill_between(u, lower, upper, color=style.BAND, linewidth=0, zorder=1)
         for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
             label.set_fontproperties(sheet.font(6.5))
     sheet.text(LEFT_PT, height - 10, level_words(found), size=7, colour=style.TEXT_SOFT)
@@ -250,9 +266,7 @@ def _places(found: LevelsFound) -> dict[Any, float]:
 
 def _frame(axes: Axes, found: LevelsFound, places: Mapping[Any, float], *, first: bool) -> None:
     """Draw the axes: levels below, shares, points or numbers at the left."""
-    xs = sorted(places.values())
-    margin = 0.5 if found.vary is None else 0.06 * ((xs[-1] - xs[0]) or 1.0)
-    axes.set_xlim(xs[0] - margin, xs[-1] + margin)
+    axes.set_xlim(*_limits(found, places))
     shown = _shown_levels(found, places)
     axes.set_xticks(
         list(shown.values()), [level.replace("_", " ") if isinstance(level, str) else f"{level:.3g}" for level in shown]
@@ -264,6 +278,13 @@ def _frame(axes: Axes, found: LevelsFound, places: Mapping[Any, float], *, first
     axes.hlines([at for at, _ in ticks], *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
     if found.guess_rate is not None:
         axes.axhline(found.guess_rate, color=style.AXIS, linewidth=0.6, linestyle=(0, (4, 3)), zorder=1)
+
+
+def _limits(found: LevelsFound, places: Mapping[Any, float]) -> tuple[float, float]:
+    """Return the ends of the horizontal axis."""
+    low, high = min(places.values()), max(places.values())
+    margin = 0.5 if found.vary is None else 0.06 * ((high - low) or 1.0)
+    return low - margin, high + margin
 
 
 def _shown_levels(found: LevelsFound, places: Mapping[Any, float]) -> Mapping[Any, float]:

@@ -118,21 +118,15 @@ def _published_words(found: LevelsFound) -> str:
 
 
 def _published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: Sheet) -> None:
+    """Draw published values: a circle at a standard, a dotted line over all, which is named above the axes."""
+    over_all = [f"{fraction:g}" for standard, fraction in points if standard is None]
+    if over_all:
+        words = f"dotted: published {', '.join(over_all)}"
+        x = sheet.width_pt - MARGIN_PT - sheet.text_width(words, 7)
+        sheet.text(x, 28, words, size=7, colour=style.TEXT_SOFT)
     for standard, fraction in points:
         if standard is None:
             axes.axhline(fraction, color=style.TEXT_SOFT, linewidth=1.0, linestyle=":", zorder=2)
-            axes.annotate(
-                f"published {fraction:g}",
-                (axes.get_xlim()[1], fraction),
-                xytext=(0, -2),
-                textcoords="offset points",
-                ha="right",
-                va="top",
-                color=style.TEXT_SOFT,
-                fontproperties=sheet.font(6.5),
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
-                zorder=5,
-            )
         else:
             axes.plot([standard], [fraction], "o", markersize=5, fillstyle="none", color=style.TEXT_SOFT, zorder=4)
 
