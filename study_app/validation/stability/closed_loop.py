@@ -15,6 +15,7 @@ import numpy as np
 
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.estimators.kalman import take_force
+from study_app.haptics.kernels.force_link import delay_force
 from study_app.haptics.kernels.loop import follow_delay
 from study_app.haptics.kernels.passivity import log_acted, log_command, update_observer
 from study_app.haptics.kernels.plant import measure, move, push
@@ -288,6 +289,9 @@ def _answer(model: Any, safety: Any, sample: Any, loop: Any) -> None:
         step_model(model, interval_s, safety.delay_ticks)
     write_sample(model.state[0], sample)
     update_observer(model, safety, interval_s)
-    copy(sample.force_n, sample.device_force_n)
+    copy(model.state[0].force_n, sample.device_force_n)
     copy(model.state[0].lift_n, safety.passivity.lift_n)
+    link = model.parameters[0].link
+    if link.acts != 0:
+        delay_force(link, model.state[0].link, model.forces_n, sample.device_force_n)
     log_command(safety.passivity, sample.device_force_n)

@@ -20,9 +20,9 @@ from tests.haptics.scenes import COMPILED
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 
 
-def imposed(case):
+def imposed(case, *, safe=True):
     """Return the trace of a position that is imposed: circles of 20 mm at 0.1 m/s, begun within 0.2 s."""
-    bench, trace = new_bench(case, safe=True), records(TRACE, 1500)
+    bench, trace = new_bench(case, safe=safe), records(TRACE, 1500)
     bench.loop.rigid = 1
     t_s = np.arange(1500) / 1000
     angle = 5 * (t_s + 0.2 * np.expm1(-t_s / 0.2))
@@ -48,6 +48,15 @@ def test_the_force_of_the_effects_comes_so_late(delay, liquid, scale, more):
     assert np.abs(prompt.sent_n).max() > 0.01
     within = 0.01 if "estimator" in more else 1e-9  # the filter knows the force sent
     assert late.sent_n[300:] == pytest.approx(shifted_n[300:], abs=within)  # the fade-in is over
+
+
+@compiled
+@pytest.mark.slow
+def test_the_force_comes_so_late_without_safety_too():
+    case = Case(liquid="physical_tar", scale=1.0, quantum_um=1.0, delay=0)
+    prompt, late = (imposed(it, safe=False).sent_n for it in (case, parse(f"{case} force_delay_ms=7")))
+    assert np.abs(prompt).max() > 1
+    assert late[7:] == pytest.approx(prompt[:-7], abs=1e-9)
 
 
 @compiled
