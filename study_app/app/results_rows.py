@@ -18,7 +18,7 @@ def left_out(row: Exclusion) -> LeftOut:
 
 def opened(reveal: Mapping[str, str]) -> Opened:
     """Return how the key was opened."""
-    by, reason = str(reveal.get("by", "somebody")), str(reveal.get("reason", "no reason given"))
+    by, reason = str(reveal.get("by", "unknown")), str(reveal.get("reason", "no reason given"))
     return Opened(_time(reveal.get("at")), by, reason)
 
 

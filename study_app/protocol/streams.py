@@ -23,7 +23,7 @@ def stream(seed: int, name: str) -> random.Random:
 
 
 def study_stream(study: str, name: str) -> random.Random:
-    """Return a stream that is the same in every session of a study, whatever the session's seed."""
+    """Return a stream that is the same in every session of a study, for any seed of the session."""
     return stream(0, f"study/{study}/{name}")
 
 

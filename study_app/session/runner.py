@@ -10,7 +10,7 @@ starts and its recording begins (see ``trial``).
 Where the program or the machine stood still within a trial, the session pauses, and the trial comes again.
 
 Where the disk takes nothing, the session stalls: zero force, a calm page, and what was to be done is kept and tried
-again until it is done, in order and once. Then the session is paused, and goes on when somebody asks for it.
+again until it is done, in order and once. Then the session is paused, and goes on when the operator resumes it.
 """
 
 from __future__ import annotations

@@ -264,7 +264,7 @@ class Recorder:
                         path.unlink(missing_ok=True)
 
     def _record(self, begin: _Begin) -> Kept:
-        """Write one trial's files; the queue is then past the trial's end, whatever became of them."""
+        """Write one trial's files; the queue is then past the trial's end, even if they were not written."""
         samples_path, frames_path = recording_files(self._folder, *begin.which)
         facts = {**self._facts, **_keys(*begin.which)}
         coming = _Coming(self._next)

@@ -59,7 +59,7 @@ class MachineSettings(_Strict):
     """What this machine is like.
 
     ``screen`` is the participant's by its name, ``screen_number`` tells screens of one name apart and counts from 1;
-    ``viewing_distance_mm`` and ``screen_width_mm`` are None until somebody measured them. ``firmware`` is the file
+    ``viewing_distance_mm`` and ``screen_width_mm`` are None until they are measured. ``firmware`` is the file
     of a device's program, ``workspace`` the folder of protocols and results (None: not chosen: `study_app.workspace`);
     ``recent`` are the protocol files outside it that were opened last, newest first; ``operator`` are the initials that
     were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at. Whether ``device`` is

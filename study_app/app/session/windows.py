@@ -55,7 +55,7 @@ def open_windows(
 
     ``start`` is where a resumed session goes on, ``text_scale`` how much larger than designed the participant's words
     must be at least, ``photodiode`` whether the tank has a corner for one. With ``refresh_hz`` there are so many
-    frames a second by the clock, whatever the screen's rate is.
+    frames a second by the clock, at any refresh rate of the screen.
     """
     clock, device, servo = store.clock.seconds, rig.device, rig.servo
     journal = WatchedJournal(store, progress_of(opened(store.lines, store.key)), clock)

@@ -1,4 +1,4 @@
-"""Beside the sessions: what there is to feel with, and the way into the lab."""
+"""The sidebar of the sessions: haptic devices, and the way into the lab."""
 
 from __future__ import annotations
 

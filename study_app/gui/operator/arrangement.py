@@ -2,7 +2,7 @@
 
 In this order: the notes that were written, lesser rows of the device, words in the rail, signs on buttons; then the
 rail shows its dots alone, and where the session is stands at the head of the middle; last, the middle scrolls. The
-force stop keeps its place and size whatever happens.
+force stop keeps its place and size in every state.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Beside the figures: the sessions with their filters, and what is excluded from the analysis."""
+"""The sidebar of the figures: the sessions with their filters, and what is excluded from the analysis."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def number(value: float) -> str:
 
 
 def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = None) -> QPen:
-    """Return a cosmetic pen: its width is px of the screen whatever the plot's scale."""
+    """Return a cosmetic pen: its width is px of the screen at any scale of the plot."""
     made = QPen(QColor(colour), width)
     made.setCosmetic(True)
     made.setCapStyle(Qt.PenCapStyle.FlatCap)

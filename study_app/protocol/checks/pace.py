@@ -58,7 +58,7 @@ def _hidden(protocol: Protocol) -> Iterator[Fault]:
             continue
         for name in protocol.conditions_in(block.id):
             if protocol.conditions[name].ball == "hidden":
-                message = f'is hidden, but block "{block.id}" has a reaching task: nobody could aim'
+                message = f'is hidden, but block "{block.id}" has a reaching task: it cannot be aimed'
                 yield Fault(("conditions", name, "ball"), message, 'a task of kind "follow" or "explore"')
 
 

@@ -26,7 +26,7 @@ def _kind_of(value: Any) -> str:
 
 
 def _as_it_is(value: Any, validated: Callable[[Any], Question]) -> Question:
-    """Return a question that was made in Python as it is, of whatever kind."""
+    """Return a question that was made in Python as it is, of any kind."""
     return value if isinstance(value, Question) else validated(value)
 
 

@@ -13,7 +13,7 @@ last k·d trials hold each code at most k times, so Σ min(left, k) ≥ k·d mus
 need j ≤ m·(others left + 1). A search through every state of small blocks (a test) finds no dead end. The chance of an
 order drawn in this way is known, and not the same for all. So ``PROPOSALS`` are drawn and go through Metropolis' rule
 for independent proposals, which tends to all possible orders being equally likely; all arithmetic in it is exact. The
-chain starts with the codes round and round, so there is an order after that many steps whatever is drawn. In small
+chain starts with the codes round and round, so there is an order after that many steps for any draw. In small
 blocks the exact chances are within 10⁻⁴ of uniform in total variation (a test); of a single proposal, within 0.3.
 """
 

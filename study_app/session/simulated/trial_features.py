@@ -61,7 +61,7 @@ def feelings(
 
 
 def _presented(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial) -> tuple[Where, ...]:
-    """Return what a trial presents, interval by interval; nothing where it is passed over whatever is answered."""
+    """Return what a trial presents, interval by interval; nothing where it is passed over with any answers."""
     if protocol.blocks[trial.block].design is None:
         return ((trial.block, key.codes[trial.block][trial.code]),)
     due = next_level(protocol, key, schedule, trial, ())

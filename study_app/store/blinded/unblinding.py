@@ -1,6 +1,6 @@
 """Opening a study: the reveal is recorded, and what was sealed appears in tables, their checksums and the description.
 
-Whatever ends the program in between, the journals hold everything, and opening the study again finishes it.
+If the program ends in between, the journals hold everything, and opening the study again finishes it.
 """
 
 from __future__ import annotations

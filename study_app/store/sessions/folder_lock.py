@@ -171,7 +171,7 @@ def process_began(process: int) -> float | None:
     Raises
     ------
     psutil.AccessDenied
-        It runs, and belongs to somebody of whom this account may know nothing.
+        It runs, and belongs to another account, which hides it.
     """
     try:
         running = psutil.Process(process)

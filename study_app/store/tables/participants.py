@@ -142,7 +142,7 @@ def write_participants(
     known : mapping
         Rows by session folder whose journals need not be read, since this program has just written them.
     whole : bool
-        Whether every journal is read, whatever the table says.
+        Whether every journal is read, even where the table is up to date.
 
     Raises
     ------

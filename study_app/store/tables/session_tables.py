@@ -32,7 +32,7 @@ class SessionRows:
 
     ``responses`` has one row per response, in the order of confirmation; ``trials`` one per presentation of a trial, in
     order; the running one has no outcome yet. ``changed`` is the index of the first row of ``trials`` that was added or
-    changed since somebody set it; rows of ``responses`` never change. ``intervals`` has one row per interval of a trial
+    changed since it was last set; rows of ``responses`` never change. ``intervals`` has one row per interval of a trial
     with a design, ``changed_intervals`` is likewise the first of them that was added or changed.
 
     Raises

@@ -76,7 +76,7 @@ def _changed_since(place: Place) -> tuple[Doubt, ...]:
 def _listed(place: Place, contents: Contents) -> tuple[Mapping[str, str], tuple[Doubt, ...]]:
     """Return the checksums made when the session had ended, and what is wrong with their list.
 
-    Where there is one the session had ended, whatever is left of its journal.
+    Where there is one the session had ended, even if its journal is incomplete.
     """
     ended = bool(contents.lines) and contents.lines[-1]["event"] == "session_ended"
     if not ended and not is_there(place.folder.checksums):

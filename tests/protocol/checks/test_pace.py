@@ -91,7 +91,7 @@ def study(edits: Iterable[tuple[str, str]]) -> Protocol:
         (
             [HIDDEN, REACH],
             "conditions.damper.ball",
-            'is hidden, but block "thicker" has a reaching task: nobody could aim',
+            'is hidden, but block "thicker" has a reaching task: it cannot be aimed',
             'a task of kind "follow" or "explore"',
         ),
     ],
