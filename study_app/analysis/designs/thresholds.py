@@ -43,17 +43,19 @@ class Counts:
 
 def counts_of(stimulus: Stimulus, rows: pd.DataFrame) -> Counts:
     """Return counts by level from rows of tracks, each at the mean of its delivered levels."""
-    groups = rows.groupby("level", sort=True)
-    delivered = groups["level_delivered"].mean().astype("Float64").to_numpy(dtype=float, na_value=math.nan)
-    asked = groups["level"].first().to_numpy(dtype=float)
-    has_place = np.isfinite(delivered) & ((delivered > 0) | (stimulus.spacing == "linear"))
+    asked, places = np.unique(rows["level"].to_numpy(dtype=float), return_inverse=True)
+    each = rows["level_delivered"].astype("Float64").to_numpy(dtype=float, na_value=math.nan)
+    known, k = np.isfinite(each), len(asked)
+    measured = np.bincount(places[known], minlength=k)
+    delivered = np.bincount(places[known], each[known], minlength=k) / np.maximum(measured, 1)
+    has_place = (measured > 0) & ((delivered > 0) | (stimulus.spacing == "linear"))
     placed = np.where(has_place & (asked != 0), delivered, asked)
-    successes = groups["success"].sum().to_numpy(dtype=float)
+    successes = np.asarray(np.bincount(places, rows["success"].to_numpy(dtype=float), minlength=k), float)
     return Counts(
         levels=np.array([stimulus.coordinate(float(level)) for level in placed]),
         successes=successes,
-        failures=groups["success"].count().to_numpy(dtype=float) - successes,
-        places=np.asarray(groups.ngroup(), np.int64),
+        failures=np.asarray(np.bincount(places, minlength=k) - successes, float),
+        places=np.asarray(places, np.int64),
     )
 
 
