@@ -16,7 +16,7 @@ GROUPS: Final = {
     "Study": "check design power preregister run resume rehearse studies sessions workspace",
     "Data": "export plot report unblind exclude include verify rebuild reproduce replay",
     "Model": "scene simulate identify figures",
-    "Evidence": "accuracy stability timing soak cfd validate validate-report screenshots",
+    "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds screenshots",
     "Devices": "devices emulate-falcon",
 }
 

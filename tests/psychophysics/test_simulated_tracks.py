@@ -50,7 +50,7 @@ def test_search_tracks_choose_the_levels_that_the_search_chooses_one_by_one(lear
             counts[0 if success else 1, place] += 1
 
 
-def test_search_tracks_begin_where_they_are_told_to():
+def test_search_tracks_begin_at_the_given_level():
     found = search_tracks(search(), observers(), draws(3), begin=14)
     assert (found.levels[:, 0] == LEVELS[14]).all()
 

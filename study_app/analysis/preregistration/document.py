@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from study_app import __version__
+from study_app.analysis.power.plan import compares_statements
 from study_app.analysis.preregistration.commitment import Commitment, commitment, written
 from study_app.analysis.preregistration.questions import analyses, hypotheses
 from study_app.analysis.results.words import counted
@@ -115,7 +116,7 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
         yield from ("", *reasons)
     if power is not None:
         yield from ("", *(f"##{line}" if line.startswith("#") else line for line in power.rstrip().splitlines()))
-    elif not reasons:
+    elif compares_statements(protocol):
         yield ""
         yield (
             f"No power was computed for this text: `liquid-study power {protocol.study.name} --to DIR` computes it, "

@@ -33,7 +33,7 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
 def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
     design = design_of(protocol, block)
     if block.stimulus is None:
-        yield f"Block {block.id}: how well are {listed(block.conditions)} told apart from {block.standard} (d′)?"
+        yield f"Block {block.id}: how well can {listed(block.conditions)} be discriminated from {block.standard} (d′)?"
         return
     stimulus = stimulus_of(protocol, block)
     what, unit = quantity_words(stimulus.vary), quantity(stimulus.vary).unit

@@ -1,4 +1,4 @@
-"""The command that checks whether known thresholds of simulated observers are recovered."""
+"""The commands about thresholds: known ones are recovered, and two procedures are compared on the same people."""
 
 from __future__ import annotations
 
@@ -71,3 +71,30 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
     click.echo(f"{beyond} of {len(judged)} values exceed their limits" if beyond else "every value is within its limit")
     if beyond:
         click.get_current_context().exit(EXIT_FOUND)
+
+
+@click.command("delay-thresholds")
+@click.option("--people", type=click.IntRange(5, 1000), default=40, show_default=True, help="Simulated people.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for the table and the figure.")
+def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
+    """Compare the delay rated as different (rek2024) with the detected one (delaydetect), of the same simulated people.
+
+    The forced choice does not depend on a person's criterion; the rating does.
+    """
+    from study_app import figure_style as style
+    from study_app.store.output_files import write_files
+    from study_app.validation.thresholds.noticed_delays import compare, markdown
+    from study_app.validation.thresholds.noticed_figure import CAPTION, TITLE, draw
+
+    with progress() as show:
+        show("simulating people")
+        found = compare(people, seed)
+    click.echo(markdown(found), nl=False)
+    if to is not None:
+        files = {"delay-thresholds.md": markdown(found).encode(), "delay-thresholds.txt": f"{CAPTION}\n".encode()}
+        for form in style.FORMATS:
+            drawn = draw(found, style.fonts_for(form)).figure
+            files[f"delay-thresholds.{form}"] = style.file_bytes(drawn, form, TITLE)
+        for path in write_files(to, files):
+            click.echo(path)

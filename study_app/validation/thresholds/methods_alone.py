@@ -6,8 +6,8 @@ What is presented is what was requested, so that errors are those of methods and
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -26,7 +26,7 @@ from study_app.protocol.trials.method import Heard
 from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import design_of, method_of, stimulus_of
-from study_app.session.simulated.design_observer import Comparison
+from study_app.session.simulated.design_observer import Comparison, Observer
 from study_app.validation.thresholds.planted import Planted
 
 PEOPLE: Final = 10
@@ -62,7 +62,9 @@ class StudyFound:
         return math.exp(sum(values) / len(values))
 
 
-def simulate(one: Planted, number: int, seed: int, people: int = PEOPLE) -> StudyFound:
+def simulate(
+    one: Planted, number: int, seed: int, people: int = PEOPLE, observers: Sequence[Observer] = ()
+) -> StudyFound:
     """Return what a study of equal observers finds; ``number`` names its draws.
 
     Parameters
@@ -75,11 +77,16 @@ def simulate(one: Planted, number: int, seed: int, people: int = PEOPLE) -> Stud
         Of all randomness.
     people : int
         Number of participants.
+    observers : sequence of Observer, optional
+        Participants who differ, in place of ``people`` equal ones.
     """
     random = stream(seed, f"validate/{one.name}/{number}").random
     key = Key(draw_key(one.protocol, random), draw_secret(random))
-    names = [f"P{person:03d}" for person in range(1, people + 1)]
-    rows = [row for name in names for row in _rows(one, key, name, seed)]
+    who = observers or (one.observer,) * people
+    names = [f"P{person:03d}" for person in range(1, len(who) + 1)]
+    rows = [
+        row for name, own in zip(names, who, strict=True) for row in _rows(replace(one, observer=own), key, name, seed)
+    ]
     frame = pd.DataFrame(rows, columns=list(COLUMNS)).astype({"level_delivered": "Float64", "success": "boolean"})
     found = list(thresholds(_level_block(one), frame))
     group = tuple(_ends(row) for row in found if row.participant is None)

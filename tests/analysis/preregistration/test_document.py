@@ -58,6 +58,7 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
     assert "presented again, up to 3 times" in text
     assert "Hartung–Knapp" in text
+    assert "No power was computed" not in preregistration(load("thickness"), "0" * 64)
 
 
 def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
