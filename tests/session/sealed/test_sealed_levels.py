@@ -64,6 +64,22 @@ stimulus = "value"
 design = "estimation"
 method = "five"
 
+[stimuli.around]
+condition = "oil"
+vary = "viscosity_pa_s"
+level = "value"
+levels = [0.5, 8]
+
+[methods.set]
+kind = "adjustment"
+repetitions = 2
+
+[blocks.match]
+task = "stir"
+stimulus = "around"
+design = "adjustment"
+method = "set"
+
 [blocks.pairs]
 task = "stir"
 design = "2ifc"
@@ -98,7 +114,7 @@ catch = { share = 0.2 }
 """
 SEQUENCE = (
     'sequence = ["viscosity"]',
-    'sequence = ["viscosity", "detect", "rate", "number", "pairs", "chosen", "expected"]',
+    'sequence = ["viscosity", "detect", "rate", "number", "match", "pairs", "chosen", "expected"]',
 )
 SESSIONS = 12
 HIDDEN = {"sealed", "resolved", "key_hash", "at", "previous", "fingerprint"}
@@ -124,6 +140,16 @@ def answer_blindly(
     return 1 + int(share * 3) if design.reply == "rating" else round(1 + 9 * share, 2)
 
 
+class BlindSetting:
+    """Steps by the draw alone, beyond the end that is near in some settings, whatever was felt."""
+
+    def __init__(self, _attended: Any, draw: Callable[[], float]) -> None:
+        self._steps = [*[1] * 7, 80, -90, -7, 3, *(round(9 * draw()) - 4 or 1 for _ in range(4)), 0]
+
+    def steps(self, _sensed: float, _standard: float) -> int:
+        return self._steps.pop(0)
+
+
 def run(protocol: Path, folder: Path, secret: int) -> Path:
     """Rehearse a session under a key drawn from ``secret``."""
     folder.mkdir(parents=True)
@@ -135,6 +161,7 @@ def run(protocol: Path, folder: Path, secret: int) -> Path:
 def blindly() -> Any:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(participant, "answer", answer_blindly)
+        patch.setattr(participant, "AdjustingObserver", BlindSetting)
         yield patch
 
 

@@ -22,7 +22,7 @@ START: Final = """
 # Weber exponents, and settings of the method of adjustment.
 
 tracks <- read.csv("{table}", colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
-for (name in c("standard", "trial", "level_asked", "setting")) tracks[[name]] <- as.numeric(tracks[[name]])
+for (name in c("standard", "trial", "level_asked")) tracks[[name]] <- as.numeric(tracks[[name]])
 judged <- tracks[tracks$analysed == "true" & !is.na(tracks$response), ]
 at_standard <- function(rows, block, participant, standard) {{
   rows <- rows[rows$block == block & rows$participant == participant, ]
@@ -114,7 +114,7 @@ mean_of_settings <- function(what, u, log, mean_level, ends) {{
 settings <- function(what, rows, log, middle, pse, ends, jnd, error, hysteresis) {{
   in_u <- function(level) if (log) log10(level) else level
   rows <- rows[!is.na(rows$setting), ]
-  u <- in_u(rows$setting); high <- in_u(rows$level_asked) > middle
+  u <- in_u(as.numeric(rows$setting)); high <- in_u(rows$level_asked) > middle
   mean_of_settings(what, u, log, pse, ends)
   if (!is.na(jnd)) same(paste(what, "JND"), jnd, sd(u))
   if (!is.na(error)) same(paste(what, "constant error"), error, mean(u) - in_u(rows$standard[1]))

@@ -1,0 +1,207 @@
+"""Levels that a participant set follow from the steps, every force from the recording; whoever changes one is found."""
+
+from __future__ import annotations
+
+import csv
+import io
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.evaluation.recorded_intervals import places_of, steps_of
+from study_app.evaluation.replay import replay
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.session.simulated.rehearsal import rehearse, resume
+from study_app.store.blinded.blinding import read_key
+from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.blinded.whole_protocol import whole_protocol
+from study_app.store.journals import journal
+from study_app.store.receipt import read
+from study_app.store.recording_files import read_samples
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+from tests.protocol.trials.matching import ALONE, DELAY, text_of
+from tests.store.forging import Lines, change, cut
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+SHORT = ("repetitions = 4", "repetitions = 3")
+WATER = (
+    'drag = { law = "linear", damping_nspm = 6 }',
+    """density_kg_m3 = 1000
+viscosity_pa_s = 1
+effects = ["drag", "wake"]
+drag = { law = "haider-levenspiel" }
+wake = { length = 400, scaling = 1000, exponent = 0.5, breaking_angle_deg = 45, breaking_span_m = 0, decay = 0.99 }""",
+)
+VISCOSITY = (DELAY[0], 'vary = "viscosity_pa_s"\nlevel = "value"\nlevels = [0.4, 2.5]')
+
+
+@pytest.fixture(scope="module")
+def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("protocol") / "matching.toml"
+    path.write_text(text_of(SHORT))
+    return path
+
+
+@pytest.fixture(scope="module")
+def study(protocol: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rehearse(protocol, participants=1, seed=2, results=tmp_path_factory.mktemp("matching") / "study")
+
+
+@pytest.fixture
+def session(study: Path, tmp_path: Path) -> Path:
+    """Return the session in a copy of the study, which may be changed."""
+    shutil.copytree(study, tmp_path / "study")
+    return session_of(tmp_path / "study")
+
+
+def session_of(study: Path) -> Path:
+    return next((study / "data").glob("sub-*/ses-*"))
+
+
+def lines_of(session: Path) -> list[dict[str, Any]]:
+    return opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2]))
+
+
+def test_settings_follow_every_force_is_computed_again_and_the_study_is_sound(study: Path) -> None:
+    session = session_of(study)
+    found = reproduced(session)
+    assert (found.differences, found.followed) == ([], ["matching: 3 of 3 levels follow from the answers"])
+    proved = replay(session)
+    assert (proved.differences, proved.missing, proved.uncompared) == ((), (), ())
+    assert proved.recordings == 6
+    checked = verify(study, None)
+    assert (checked.errors, checked.warnings) == ((), ())
+
+
+def test_the_recording_says_at_which_tick_each_step_took_effect(study: Path) -> None:
+    session = session_of(study)
+    lines, key = lines_of(session), read_key(study)
+    protocol = whole_protocol(read(session / "receipt.json")["protocol"], key)
+    started = next(line for line in lines if line["event"] == "trial_started") | {"interval": 2}
+    steps = steps_of(protocol, key, started, lines)
+    made = [line for line in lines if line["event"] == "stepped" and line["trial"] == started["trial"]]
+    assert len(steps) == len(made) > 2
+    recorded = next(
+        line for line in lines if line["event"] == "recorded" and line["trial"] == 1 and line.get("interval") == 2
+    )
+    samples = read_samples(session / recorded["recording"])
+    places = places_of(samples, steps)
+    assert [place for place, _ in places] == [int(np.flatnonzero(samples.scene == step.serial)[0]) for step in steps]
+    dampings = [scene.liquids[0].drag.damping_nspm for _, scene in places]
+    ends = [*(place for place, _ in places[1:]), len(samples) - 300]
+    for (place, _), damping, until in zip(places, dampings, ends, strict=True):
+        own = samples[place + 60 : until]
+        v = own.velocity_mps / protocol.scene.scale
+        measured = -(own.device_force_n * v).sum() / (v * v).sum()
+        assert measured == pytest.approx(damping, rel=0.03)
+
+
+def other_setting(lines: Lines) -> None:
+    next(line for line in lines if line.get("setting") is not None and line["trial"] == 2)["setting"] *= 1.01
+
+
+def other_step(lines: Lines) -> None:
+    next(line for line in lines if line["event"] == "stepped" and line["trial"] == 2)["steps"] += 1
+
+
+def other_answer(lines: Lines) -> None:
+    for line in lines:
+        if line["event"] == "choice" and line["trial"] == 2:
+            line["value"] += 1
+        elif line["event"] == "responses" and line["trial"] == 2:
+            line["items"][0]["value"] += 1
+
+
+def other_start(lines: Lines) -> None:
+    next(line for line in lines if line["event"] == "trial_started" and line["trial"] == 2)["level"] *= 1.001
+
+
+@pytest.mark.parametrize(
+    ("edit", "named"),
+    [
+        (other_setting, "trial 2, attempt 1: its steps lead to another setting"),
+        (other_step, "trial 2, attempt 1: its steps lead to another setting"),
+        (other_answer, "trial 2, attempt 1: its steps lead to another setting"),
+        (other_start, "trial 2, attempt 1: another level"),
+    ],
+)
+def test_what_was_changed_with_the_key_at_hand_is_found(
+    session: Path, edit: Callable[[Lines], None], named: str
+) -> None:
+    change(session, edit)
+    found = reproduced(session)
+    assert any(named in line for line in found.differences), found.differences
+    assert found.followed == ["matching: 2 of 3 levels follow from the answers"]
+
+
+def test_a_step_that_took_effect_at_another_scene_is_found_by_replay(session: Path) -> None:
+    def later(lines: Lines) -> None:
+        made = [line for line in lines if line["event"] == "stepped" and line["trial"] == 1]
+        made[0]["steps"], made[1]["steps"] = made[1]["steps"] + 9, made[0]["steps"] - 9
+
+    change(session, later)
+    assert any("trial 1, attempt 1, interval 2" in line for line in replay(session).differences)
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75, 0.95])
+def test_a_session_that_was_killed_and_resumed_is_set_as_one_that_was_not(
+    session: Path, protocol: Path, share: float
+) -> None:
+    def told() -> tuple[list[Any], list[Any]]:
+        lines = lines_of(session)
+        last = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
+        sets = {line["trial"]: line["setting"] for line in lines if line.get("setting") is not None}
+        answers = {line["trial"]: line["items"][0]["value"] for line in lines if line["event"] == "responses"}
+        return [(n, line["level"], sets[n]) for n, line in sorted(last.items())], sorted(answers.items())
+
+    whole = told()
+    cut(session, round(share * (session / "journal.jsonl").stat().st_size))
+    resume(session, protocol=protocol)
+    assert [row[:2] for row in told()[0]] == [row[:2] for row in whole[0]]
+    assert told() == whole
+    assert reproduced(session).differences == []
+    assert replay(session).differences == ()
+
+
+def test_settings_are_in_the_tables_only_after_unblinding(session: Path) -> None:
+    def intervals() -> list[dict[str, str]]:
+        return [*csv.DictReader(io.StringIO(next(session.glob("*intervals*")).read_text()))]
+
+    assert "setting" not in intervals()[0]
+    unblind(session.parents[2], "somebody", "to test")
+    rows = intervals()
+    assert [row["setting"] == "n/a" for row in rows] == [True, False] * 3
+    assert {row["value_delivered"] for row in rows if row["setting"] != "n/a"} == {"n/a"}
+    assert verify(session.parents[2], None).errors == ()
+
+
+@pytest.mark.parametrize(
+    "edits", [(ALONE, DELAY), (WATER, VISCOSITY), (ALONE,)], ids=["delay", "viscosity with a wake", "alone"]
+)
+def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tmp_path: Path) -> None:
+    unjudged = ("[liquids", "[limits]\nwithheld_percent = 100\nlevel_error_percent = 100\n\n[liquids")
+    path = tmp_path / "matching.toml"
+    path.write_text(text_of(SHORT, unjudged, *edits))
+    session = session_of(rehearse(path, participants=1, seed=5, results=tmp_path / "study"))
+    assert reproduced(session).differences == []
+    proved = replay(session)
+    assert (proved.differences, proved.uncompared) == ((), ())
+    lines = lines_of(session)
+    scenes = {line["scene"] is None for line in lines if line["event"] == "stepped"}
+    assert scenes == {DELAY in edits}
+    assert sum(line["event"] == "responses" for line in lines) == 3
+
+
+def test_settings_without_a_servo_follow_too(protocol: Path, tmp_path: Path) -> None:
+    study = rehearse_answers(protocol, participants=1, seed=2, results=tmp_path / "study")
+    found = reproduced(session_of(study))
+    assert (found.differences, found.followed) == ([], ["matching: 3 of 3 levels follow from the answers"])
+    assert verify(study, None).errors == ()
