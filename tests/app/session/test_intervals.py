@@ -1,4 +1,4 @@
-"""A session of pairs in windows without a screen, attended by keys alone."""
+"""Sessions of pairs and of settings in windows without a screen, attended by keys alone."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from study_app import app
+from study_app.evaluation.replay import replay
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.session.pages import ChoicePage, FeedbackPage, TaskPage
+from study_app.session.pages import ChoicePage, EndPage, FeedbackPage, TaskPage
+from study_app.store.verification.reproduction import reproduced
 from tests.app.people import Person, events, rows, window
 from tests.compiled import needs_servo
 from tests.protocol.trials.studies import BLOCK, HEAD
@@ -89,3 +92,83 @@ def test_a_session_of_pairs_is_attended_by_keys_alone(tmp_path: Path) -> None:
     ended = [event["t_s"] for event in told if event["event"] == "trial_ended"]
     shown = [event["t_s"] for event in told if event["event"] == "item_shown"]
     assert all(item - end < 1.0 for end, item in zip(ended, shown, strict=True))
+
+
+SETTING = """
+[stimuli.around]
+condition = "oil"
+vary = "viscosity_pa_s"
+level = "value"
+levels = [0.5, 2]
+
+[methods.set]
+kind = "adjustment"
+repetitions = 2
+
+[blocks.viscosity]
+part = 1
+title = "Viscosity"
+setting_label = "Setting"
+code_prefix = "V"
+task = "stir"
+stimulus = "around"
+design = "adjustment"
+method = "set"
+"""
+STEPS = (Qt.Key.Key_Right, Qt.Key.Key_Right, Qt.Key.Key_Left, Qt.Key.Key_Right)
+
+
+class Adjusting(Person):
+    """Steps by keys, then confirms until the next page comes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.page: TaskPage | None = None
+        self.looks = 0
+
+    def look(self) -> None:
+        participant = window(ParticipantWindow)
+        page = None if participant is None else participant.page
+        if not isinstance(page, TaskPage):
+            if not isinstance(page, EndPage) or window(OperatorWindow) is not None:  # closed already
+                super().look()
+        elif page.adjusts and participant.tank.view is not None:
+            self.looks = 0 if page is not self.page else self.looks + 1
+            self.page = page
+            QTest.keyClick(participant, STEPS[self.looks] if self.looks < len(STEPS) else Qt.Key.Key_Return)
+        else:
+            QTest.keyClick(participant, Qt.Key.Key_Right)  # nothing is set yet
+
+
+def test_levels_are_set_by_keys_alone(tmp_path: Path) -> None:
+    text = HEAD + SETTING
+    for old, new in (EDITS[2], *EDITS[4:]):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "levels.toml").write_text(text)
+    results = tmp_path / "results" / "levels"
+    person = Adjusting()
+    code = app.run(
+        str(tmp_path / "levels.toml"),
+        participant="P001",
+        seed=5,
+        device="scripted",
+        windowed=True,
+        operator="AK",
+        results=results,
+        tell=lambda _line: None,
+    )
+    person.deleteLater()
+    assert code == 0
+    told = events(results)
+    assert told[-1]["status"] == "completed"
+    last = {line["trial"]: line["attempt"] for line in told if line["event"] == "trial_started"}
+    counted = [line for line in told if line.get("attempt") == last.get(line.get("trial"), 0)]  # a pause may repeat one
+    made = [(line["trial"], line["steps"]) for line in counted if line["event"] == "stepped"]
+    assert made == [(trial, steps) for trial in (1, 2) for steps in (1, 1, -1, 1)]
+    assert len({line["scene"] for line in told if line["event"] == "stepped"}) >= 8
+    assert [row["response"] for row in rows(results, "responses")] == ["2", "2"]
+    assert [line["interval"] for line in counted if line["event"] == "interval_ended"] == [1, 2, 1, 2]
+    session = next((results / "data").glob("sub-*/ses-*"))
+    assert reproduced(session).differences == []
+    assert replay(session).differences == ()

@@ -23,6 +23,7 @@ from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.journals import journal
 from study_app.store.receipt import read
 from study_app.store.recording_files import read_samples
+from study_app.store.verification.leaks import certain_telltales, find_leaks, recorded_numbers
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
@@ -198,6 +199,17 @@ def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tm
     scenes = {line["scene"] is None for line in lines if line["event"] == "stepped"}
     assert scenes == {DELAY in edits}
     assert sum(line["event"] == "responses" for line in lines) == 3
+
+
+def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: Path) -> None:
+    lines, key = lines_of(session_of(study)), read_key(study)
+    protocol = whole_protocol(read(session_of(study) / "receipt.json")["protocol"], key)
+    numbers = recorded_numbers(protocol, lines)
+    assert {line["setting"] for line in lines if line.get("setting") is not None} <= numbers
+    assert len(numbers) > sum(line["event"] == "trial_started" for line in lines) + 6
+    words = certain_telltales(key.tables, {}, numbers)
+    assert find_leaks(study, words) == []
+    assert words.in_text(f"{lines[-1]['n']} {max(numbers - {18.0})!r}")
 
 
 def test_settings_without_a_servo_follow_too(protocol: Path, tmp_path: Path) -> None:
