@@ -30,6 +30,10 @@ The liquid may owe 1 mJ; with D = -1 mJ - E, its debt beyond that:
 
 Letting go and damping come at once, past the slew limit. A debt is forgiven at 1 mW, less than a hand's own damping
 takes at 15 mm/s: without any force none could be paid.
+
+Where a force link acts, no debt is forgiven, the gain does not come back before the next scene, and it falls further
+as long as there is a debt: a late force lets a handle go on swinging at the power that is forgiven, or at the gain at
+which it neither gives nor takes energy.
 """
 
 from __future__ import annotations
@@ -53,6 +57,7 @@ SMOOTHING_S = 2e-3
 SURE_MPS = 0.04
 BRAKE = 0.5
 RECOVERY_PER_S = 0.5
+INDEBTED_S = 0.1
 DELIVERY_STEPS_PER_N = 2.0**14
 
 
@@ -123,10 +128,11 @@ def update_observer(model: Any, safety: Record, interval_s: float) -> None:
         passivity.velocity_mps[axis] += weight * (step_m * per_s - passivity.velocity_mps[axis])
         mean_n = passivity.later_impulse_ns[axis] / passivity.impulse_s
         observe_incremental(passivity.fast, axis, mean_n, step_m * per_s, interval_s)
-    close_incremental(passivity.fast, interval_s)
+    close_incremental(passivity.fast, interval_s if parameters.link.acts == 0 else 0.0)
     if square_m2 > passivity.longest_m * passivity.longest_m:
         passivity.longest_m = math.sqrt(square_m2)
-    stored_j, forgiven_j = filter_storage(model, passivity), FORGIVEN_W * interval_s
+    stored_j = filter_storage(model, passivity)
+    forgiven_j = FORGIVEN_W * interval_s if parameters.link.acts == 0 else 0.0
     passivity.stored_j[passivity.row] = stored_j
     late_j = max(stored_j, passivity.stored_j[_row_before(passivity, delay_ticks)])
     later_j = max(late_j, passivity.stored_j[_row_before(passivity, delay_ticks + 1)])
@@ -169,7 +175,10 @@ def _forgive(balance_j: float, forgiven_j: float) -> float:
 def reduce_gain(parameters: Record, passivity: Record, sample: Record) -> None:
     """Send a share of the force, halved by every halving debt, and all of it again only seconds after the last."""
     left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
-    passivity.gain = min(passivity.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
+    if parameters.link.acts == 0:
+        passivity.gain = min(passivity.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
+    elif left_j < 0.0:
+        passivity.gain *= max(1.0 - parameters.period_s / INDEBTED_S, 0.0)
     if left_j < 0.0:
         passivity.gain = min(passivity.gain, HALVING_J / (HALVING_J - left_j))
     if passivity.gain < 1.0:

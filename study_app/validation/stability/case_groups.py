@@ -58,6 +58,18 @@ DRAWN: Final[Mapping[str, tuple[Any, ...]]] = {
 }
 
 
+LINKS: Final[Mapping[str, tuple[Any, ...]]] = {
+    "estimator": ("ewma", "kalman"),
+    "motion": (REACHES, CIRCLES, SINE),
+    "release_s": (0.6, 0.7, 0.8),
+    "force_delay_ms": (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0),
+    "force_jitter_ms": (0.0, 0.0, 5.0, 20.0, 50.0),
+    "force_loss": (0.0, 0.0, 0.1, 0.5),
+}
+"""How a study delays forces; a link that does nothing is one of 48."""
+LATE_CASES: Final = 1000
+"""Loops with a force link."""
+
 FALCONS: Final[Mapping[str, tuple[Any, ...]]] = {
     **DRAWN,
     "mass_kg": FALCONS_KG,
@@ -114,6 +126,7 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), FALCONS_KG))
     found.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
     found += _of_materials(seed, light, count)
+    found.append(_late_forces(seed, light, count))
     fewer = min(KALMAN_CASES, count or KALMAN_CASES)
     return (*found, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
 
@@ -129,6 +142,14 @@ def _of_materials(seed: str, choices: Mapping[str, tuple[Any, ...]], count: int 
         yield Group(f"{name}, {change}", tuple(_drawn(f"{seed} {name} {change}", few, choices)))
     free = tuple(_releases(f"{seed} {name}", PLANTS, HANDLES_KG, materials))
     yield Group(f"{name}, let go in mid-stroke", some(free, count))
+
+
+def _late_forces(seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None) -> Group:
+    """Return loops with a force link: held, thrown and let go, in half of them the strongest damper."""
+    name = "late forces"
+    whole = tuple(_grid(GRIPS, PLANTS, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
+    cases = some(whole, min(LATE_CASES, count or LATE_CASES))
+    return Group(name, tuple(_drawn(f"{seed} {name}", cases, {**choices, **LINKS})))
 
 
 def _with_kalman(group: Group, count: int) -> Group:

@@ -10,6 +10,9 @@
 - *force*: above 40 Hz the force exceeds that of the same motion played without feedback by more than 0.05 N in the mean
   square root over a stretch of 0.4 s or more, the strongest 0.1 s of each aside.
 
+Where a study delays the force, the handle works at the bounds of the controller: an encoder count and the noise count
+for the energy, the swing may reach 100 mm/s, and the force a fifth more than that of the motion without feedback.
+
 "The same motion without feedback" is the most restless of three: the hand's own as long as it holds the handle, the
 motors off; the handle's, without what is faster than 40 Hz; and the latter with the encoder's last count undecided, as
 where a handle rests between two counts. The last two begin from the same state of the liquid, and samples are lost and
@@ -49,6 +52,10 @@ MISJUDGED_ALLOWANCE_J: Final = 10e-3
 SLOW_HZ: Final = 12.0
 FAST_HZ: Final = 40.0
 SWING_MPS: Final = 0.04
+LATE_SWING_MPS: Final = 0.1
+"""The same of a force that a study delays: 1 mJ, which the controller tolerates, moves 0.2 kg at this speed."""
+LATE_SHARE: Final = 0.2
+"""Such a force is restless beyond this share of the one without feedback: jitter and loss make steps of its size."""
 ONCE_S: Final = 0.1
 TIRED: Final = 0.8
 RESTLESS_N: Final = 0.05
@@ -95,7 +102,10 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
     if bench.loop.broken:
         return Verdict(case, safe, ("not finite",), math.nan, math.nan, math.nan, math.nan, math.nan, acted(trace))
     balance_j, strongest_n, longest_m = lowest_balance(trace)
+    linked = bool(case.force_delay_ms or case.force_jitter_ms or case.force_loss)
     permitted_j = -ALLOWANCE_J - (1 + max(case.delay, case.slows_to)) * strongest_n * longest_m
+    if linked:
+        permitted_j -= strongest_n * (case.quantum_um + case.noise_um) * 1e-6
     if case.misjudged:
         permitted_j = min(permitted_j, -MISJUDGED_ALLOWANCE_J)
     swing_mps = swing(trace, case)
@@ -104,8 +114,8 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
         False,
         safe and np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N * (1.0 + 1e-9),
         balance_j < permitted_j,
-        swing_mps > SWING_MPS,
-        fast_n - played_n > RESTLESS_N,
+        swing_mps > (LATE_SWING_MPS if linked else SWING_MPS),
+        fast_n - played_n > (max(RESTLESS_N, LATE_SHARE * played_n) if linked else RESTLESS_N),
     )
     reasons = tuple(reason for reason, holds in zip(REASONS, found, strict=True) if holds)
     return Verdict(case, safe, reasons, balance_j, permitted_j, swing_mps, fast_n, played_n, acted(trace))

@@ -6,6 +6,7 @@ from pydantic import ValidationError
 
 from study_app.errors import StudyError
 from study_app.haptics.kernels.force_link import delay_force, uniform
+from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.force_link import FORCES, PROMPT, ForceLink
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_STOP, STATUS_NON_FINITE
@@ -154,6 +155,43 @@ def test_a_body_that_bobs_through_a_surface_gets_no_energy_from_late_buoyancy():
 
     assert per_cycle_j(PROMPT) < 0.2e-3  # its force is held for a tick
     assert per_cycle_j(ForceLink(delay_s=0.08)) < 0.5e-3  # 16 mJ where the observer left late buoyancy out
+
+
+def balance(hand, places):
+    """Return the lowest energy [J] that hand and liquid owe each other, the strongest force and the longest step."""
+    energy_j = lowest_j = strongest_n = longest_m = 0.0
+    before_m, force_n = places[0], np.zeros(3)
+    for place in places:
+        energy_j = min(energy_j - force_n @ (place - before_m), hand.safety[0].passivity.reserve_j)
+        lowest_j = min(lowest_j, energy_j)
+        longest_m = max(longest_m, np.linalg.norm(place - before_m))
+        before_m, force_n = place, np.array(hand.tick(place).device_force_n)
+        strongest_n = max(strongest_n, np.linalg.norm(force_n))
+    return lowest_j, strongest_n, longest_m
+
+
+@pytest.mark.parametrize("link", [{"delay_s": 0.1}, {"delay_s": 0.2, "jitter_s": 0.05, "loss": 0.3}])
+def test_a_late_force_gives_no_more_than_the_allowance_however_long_it_lasts(link):
+    """A debt of 1 mJ that is forgiven at 1 mW would grow by 15 mJ."""
+    t_s = np.arange(15_000) / 1000
+    places = np.outer(0.02 * np.sin(2 * np.pi * 2.5 * t_s), (1.0, 0.0, 0.0))
+    lowest_j, strongest_n, longest_m = balance(Hand(damper(8.0, **link)), places)
+    assert strongest_n > 0.1
+    assert -1e-3 - 2 * strongest_n * longest_m <= lowest_j < -0.5e-3
+
+
+def test_the_gain_comes_back_with_the_next_scene_alone():
+    t_s = np.arange(3000) / 1000
+    hand = Hand(damper(8.0, delay_s=0.1))
+    for place in np.outer(0.02 * np.sin(2 * np.pi * 2.5 * t_s), (1.0, 0.0, 0.0)):
+        hand.tick(place)
+    gain = hand.safety[0].passivity.gain
+    assert gain < 0.8
+    for _ in range(3000):
+        hand.tick((0.0, 0.0, 0.0))
+    assert hand.safety[0].passivity.gain <= gain
+    begin_scene(hand.safety[0])
+    assert hand.safety[0].passivity.gain == 1
 
 
 def test_a_link_survives_a_change_of_numbers_and_is_no_number_of_the_scene():

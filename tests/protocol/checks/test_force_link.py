@@ -146,8 +146,8 @@ def test_the_keys_belong_to_format_2() -> None:
 def test_a_condition_beyond_the_stored_table_is_warned_of_in_newtons_and_percent() -> None:
     assert not [*delay_warnings(study())]
     (water,) = delay_warnings(study(("force_delay_ms = 10", "force_delay_ms = 50")))
-    assert water.startswith("conditions.water.force_delay_ms: with 50 ms the passivity controller withholds about 64 %")
-    assert water.endswith("N at 0.2 m/s): choose at most 20 ms, or delay the picture")
+    assert water.startswith("conditions.water.force_delay_ms: with 50 ms the passivity controller withholds about 76 %")
+    assert water.endswith("N at 0.2 m/s): choose at most 10 ms, or delay the picture")
     assert "of 3.4 N" in water
     longer = study(('liquid = "damper"\n', 'liquid = "damper"\nforce_delay_ms = 0\n'), ("force_delay_ms = 10\n", ""))
     assert not [*delay_warnings(longer)]

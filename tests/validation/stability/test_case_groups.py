@@ -12,6 +12,7 @@ from study_app.validation.stability.case_groups import (
     FIRST_RELEASE_S,
     HANDLES_KG,
     KALMAN_CASES,
+    LINKS,
     MASSES,
     PHASES,
     groups,
@@ -19,7 +20,7 @@ from study_app.validation.stability.case_groups import (
 )
 from study_app.validation.stability.closed_loop import SLOWER_S, begin, play
 from study_app.validation.stability.device_bench import new_bench, new_trace, trace_of
-from study_app.validation.stability.stability_cases import PLANTS, Case, liquids, materials, parse
+from study_app.validation.stability.stability_cases import DAMPER, GRIPS, PLANTS, Case, liquids, materials, parse
 from study_app.validation.stability.verdict import MISJUDGED_ALLOWANCE_J, judge, windows
 from tests.haptics.scenes import COMPILED
 
@@ -69,6 +70,19 @@ def test_groups_have_disturbed_samples_and_misjudged_delays(all_groups):
     for name, cases in all_groups.items():
         misjudged = "tick" in name
         assert {case.misjudged for case in cases} == {misjudged}, name
+
+
+def test_late_forces_have_delay_jitter_loss_and_the_strongest_damper(all_groups):
+    cases = all_groups["late forces"]
+    assert len(cases) == 1000
+    assert sum(case.liquid == DAMPER for case in cases) > 450
+    assert {case.hand for case in cases} == set(GRIPS)
+    for name in ("force_delay_ms", "force_jitter_ms", "force_loss"):
+        assert {getattr(case, name) for case in cases} == set(LINKS[name])
+    assert max(case.force_delay_ms for case in cases) == 200
+    assert sum(case.estimator == "kalman" for case in cases) > 400
+    for case in cases:
+        assert parse(str(case)) == case
 
 
 def test_groups_have_misjudged_and_changing_masses(all_groups):

@@ -101,7 +101,8 @@ def test_the_shipped_table_has_every_line():
 
 
 def test_the_longest_delay_is_the_last_one_before_too_much_is_withheld():
-    assert longest_ms("water", "kalman") == 20
+    assert longest_ms("water", "kalman") == 10
+    assert longest_ms("water", "kalman", "middle") == 50
     assert longest_ms("physical2_honey", "ewma") == 0
     assert longest_ms("physical2_honey", "kalman") == 5
     assert longest_ms("physical2_water", "kalman", "middle") == 200
