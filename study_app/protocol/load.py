@@ -21,7 +21,7 @@ from study_app.protocol.checks.pace import paced
 from study_app.protocol.checks.returned_energy import returned
 from study_app.protocol.instruments.instrument import with_instruments
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults
-from study_app.protocol.source.document import Path, entries
+from study_app.protocol.source.document import Path, entries, frozen
 from study_app.protocol.source.files import at_hand, protocol_hash, shipped, source_bytes
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.line_numbers import Places
@@ -31,12 +31,15 @@ from study_app.protocol.table import Table
 
 __all__ = [
     "at_hand",
+    "examined",
     "is_scene_file",
     "load",
     "load_scene",
     "load_scenes",
+    "located",
     "parse",
     "protocol_hash",
+    "read_document",
     "shipped",
     "source_bytes",
 ]
@@ -96,7 +99,17 @@ def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Pro
     ProtocolError
         Every problem of the text, with line and hint.
     """
-    document, places = _document(source, name)
+    document, places = read_document(source, name)
+    protocol, faults = examined(document, delay_ticks=delay_ticks)
+    if protocol is None:
+        raise ProtocolError(name, located(faults, places))
+    return protocol
+
+
+def examined(
+    document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS
+) -> tuple[Protocol | None, list[Fault]]:
+    """Return the protocol of a document that `read_document` read, None where it has faults, and these."""
     document, faults = _with_liquids_of_files(document)
     if formats.is_second(document):
         document, missing = with_instruments(formats.completed(document))
@@ -110,10 +123,11 @@ def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Pro
     if not formats.is_later(document):
         unfilled = [path for path in broken if path[0] == "questionnaires" or path[-1] in {"method", "design"}]
         faults += _outside(unfilled, check(document, [fault.path for fault in faults]))
-    _raise(name, faults, places)
+    if faults:
+        return None, faults
     protocol = Protocol.model_validate(document, strict=True)
-    _raise(name, list(designs(protocol)) or [*paced(protocol, delay_ticks), *returned(protocol)], places)
-    return protocol
+    faults = list(designs(protocol)) or [*paced(protocol, delay_ticks), *returned(protocol)]
+    return None if faults else protocol, faults
 
 
 def _outside(broken: Iterable[Path], faults: Iterable[Fault]) -> list[Fault]:
@@ -134,7 +148,7 @@ def load_scene(name_or_path: str | File, liquid_id: str) -> Scene:
     if liquid_id not in scenes:
         fault = Fault(("liquids",), f'there is no liquid "{liquid_id}"', did_you_mean(liquid_id, scenes))
         name = str(name_or_path)
-        _raise(name, [fault], _document(source_bytes(name_or_path), name)[1])
+        _raise(name, [fault], read_document(source_bytes(name_or_path), name)[1])
     return scenes[liquid_id]
 
 
@@ -148,7 +162,7 @@ def load_scenes(name_or_path: str | File) -> dict[str, Scene]:
     """
     name = str(name_or_path)
     source = source_bytes(name_or_path)
-    document, places = _document(source, name)
+    document, places = read_document(source, name)
     if _holds_study(document):
         protocol = parse(source, name)
         return {liquid: protocol.scene_of(liquid) for liquid in protocol.liquids}
@@ -177,7 +191,7 @@ def is_scene_file(name_or_path: str | File) -> bool:
     ProtocolError
         The file is not there, or no TOML.
     """
-    document, _ = _document(source_bytes(name_or_path), str(name_or_path))
+    document, _ = read_document(source_bytes(name_or_path), str(name_or_path))
     return "liquids" in document and not _holds_study(document)
 
 
@@ -222,7 +236,7 @@ def _liquid_of_file(file: Any, texts: Mapping[str, str]) -> dict[str, Any]:
             f'there is no UTF-8 text file "{file}" in this folder', "give the path of the liquid file"
         )
     try:
-        document, places = _document(texts[file].encode(), file)
+        document, places = read_document(texts[file].encode(), file)
         document = _sound_scene(document, file, places)
     except ProtocolError as error:
         raise _LiquidFileFault(f"{file}: {error.problems[0]}", f"liquid-study check {file}") from error
@@ -237,15 +251,21 @@ def _holds_study(document: Mapping[str, Any]) -> bool:
     return bool(document.keys() & (Protocol.model_fields.keys() - SceneFile.model_fields.keys()))
 
 
-def _document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
-    """Return the text's tables, arrays as tuples, and the lines they stand on."""
+def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
+    """Return the tables of a text, arrays as tuples, and the lines they stand on.
+
+    Raises
+    ------
+    ProtocolError
+        It is not UTF-8 text or not TOML.
+    """
     try:
         text = source.decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
         raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, "save it as UTF-8"),)) from error
     try:
-        document = {key: _frozen(value) for key, value in tomllib.loads(text).items()}
+        document = frozen(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise ProtocolError(name, (_broken(str(error), text),)) from error
     except RecursionError as error:
@@ -260,16 +280,6 @@ def _broken(message: str, text: str) -> Problem:
     sentence, place = re.sub(r" \(at .*\)$", "", message), re.search(r"\(at line (\d+), column (\d+)\)", message)
     line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
     return Problem("file", f"not TOML at column {column}: {sentence}", line, "see toml.io for the notation")
-
-
-def _frozen(value: Any) -> Any:
-    if isinstance(value, list):
-        return tuple(_frozen(entry) for entry in value)
-    if isinstance(value, dict):
-        return {key: _frozen(entry) for key, entry in value.items()}
-    if isinstance(value, int) and not -(2**63) <= value < 2**63:
-        raise ValueError("TOML has whole numbers of 64 bits")
-    return value
 
 
 def _shortened(words: str) -> str:
@@ -290,15 +300,20 @@ def _faults(model: type[M], document: Mapping[str, Any]) -> list[Fault]:
     return faults
 
 
+def located(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:
+    """Return faults as problems with their lines, in the order of the lines."""
+    problems = [
+        replace(
+            problem,
+            place=_shortened(problem.place),
+            message=_shortened(problem.message),
+            hint=_shortened(problem.hint),
+        )
+        for problem in (fault.located(places) for fault in faults)
+    ]
+    return tuple(sorted(problems, key=lambda problem: problem.line or 0))
+
+
 def _raise(name: str, faults: list[Fault], places: Places) -> None:
     if faults:
-        problems = [
-            replace(
-                problem,
-                place=_shortened(problem.place),
-                message=_shortened(problem.message),
-                hint=_shortened(problem.hint),
-            )
-            for problem in (fault.located(places) for fault in faults)
-        ]
-        raise ProtocolError(name, tuple(sorted(problems, key=lambda problem: problem.line or 0)))
+        raise ProtocolError(name, located(faults, places))

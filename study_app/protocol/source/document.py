@@ -37,3 +37,20 @@ def _entries(path: Path, node: Any, steps: tuple[str, ...]) -> Iterator[tuple[Pa
 def names(document: Any, section: str) -> tuple[str, ...]:
     """Return the names of the tables of a section, sound or not."""
     return tuple(str(path[1]) for path, _ in entries(document, f"{section}.*") if isinstance(path[1], str))
+
+
+def frozen(value: Any) -> Any:
+    """Return what ``tomllib`` read with its arrays as tuples.
+
+    Raises
+    ------
+    ValueError
+        It holds a whole number beyond 64 bits, which TOML does not have.
+    """
+    if isinstance(value, list):
+        return tuple(frozen(entry) for entry in value)
+    if isinstance(value, dict):
+        return {key: frozen(entry) for key, entry in value.items()}
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise ValueError("TOML has whole numbers of 64 bits")
+    return value
