@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 from study_app.authoring import arrays, keys
 from study_app.authoring.refused import Refused
-from study_app.authoring.spans import Spans
+from study_app.authoring.spans import Spans, spans_of
 from study_app.authoring.splices import Editor, Splices, applied
 from study_app.authoring.values import written
 from study_app.protocol.source.document import Path
@@ -94,7 +94,7 @@ def apply(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
     parts = list(_parts(document, edit))
     while parts:
         part = parts.pop(0)
-        spans, editor = Spans(text), Editor(text)
+        spans, editor = spans_of(text), Editor(text)
         if isinstance(part, Set) and _written_apart(spans, part.path):
             parts = [Unset(part.path), part, *parts]
             continue

@@ -14,6 +14,8 @@ from study_app.protocol.source.document import Path
 from study_app.protocol.source.notation import Node
 
 _PADDING: Final = re.compile(r"([ \t]+)#")
+_COMMA: Final = re.compile(r"[ \t]*,[ \t]*")
+_BLANK_LINE: Final = re.compile(r"[ \t]*(?:\r?\n|\Z)")
 
 
 def replace(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
@@ -92,9 +94,8 @@ def insert_block(spans: Spans, edit: Editor, at: int, body: str) -> None:
     opening = "" if not before.strip() else newline if before.endswith("\n") else newline * 2
     if before.endswith(newline * 2):
         opening = ""
-    following = text[at:]
-    closing = newline if following and not re.match(r"[ \t]*(\r?\n|\Z)", following) else ""
-    if not following and before and not before.endswith("\n"):
+    closing = "" if _BLANK_LINE.match(text, at) else newline
+    if at == len(text) and before and not before.endswith("\n"):
         body = body.removesuffix(newline)
     edit.insert(at, opening + body + closing)
 
@@ -164,20 +165,20 @@ def remove(spans: Spans, edit: Editor, path: Path) -> None:
 def blank_before(text: str, piece: Piece) -> int:
     """Return where to begin a deletion: before the blank lines above, if a blank line or the end follows."""
     start = piece.start
-    if re.match(r"[ \t]*(\r?\n|\Z)", text[piece.end :]):
-        above = text[:start]
-        kept = re.search(r"(?:(?<=\n)|\A)(?:[ \t]*\r?\n)+\Z", above)
-        return kept.start() if kept else start
+    if not _BLANK_LINE.match(text, piece.end):
+        return start
+    while start and not text[(above := text.rfind("\n", 0, start - 1) + 1) : start].strip():
+        start = above
     return start
 
 
 def _remove_pair(spans: Spans, edit: Editor, piece: Piece) -> None:
-    comma = re.compile(r"[ \t]*,[ \t]*").match(spans.text, piece.end)
+    comma = _COMMA.match(spans.text, piece.end)
     if comma:
         edit.delete(piece.start, comma.end())
         return
-    before = re.search(r"[ \t]*,[ \t]*\Z", spans.text[: piece.start])
-    edit.delete(before.start() if before else piece.start, piece.end)
+    before = spans.text[: piece.start].rstrip(" \t")
+    edit.delete(len(before[:-1].rstrip(" \t")) if before.endswith(",") else piece.start, piece.end)
 
 
 def copy(spans: Spans, edit: Editor, path: Path, name: str) -> None:

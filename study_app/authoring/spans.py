@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 from study_app.protocol.source.document import Path
@@ -42,6 +43,12 @@ class Slot(NamedTuple):
     tail: int
     tail_end: int
     own_line: bool
+
+
+@lru_cache(maxsize=4)
+def spans_of(text: str) -> Spans:
+    """Return where everything of a TOML text is written."""
+    return Spans(text)
 
 
 class Spans:

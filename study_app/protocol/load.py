@@ -106,9 +106,7 @@ def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Pro
     return protocol
 
 
-def examined(
-    document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS
-) -> tuple[Protocol | None, list[Fault]]:
+def examined(document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS) -> tuple[Protocol | None, list[Fault]]:
     """Return the protocol of a document that `read_document` read, None where it has faults, and these."""
     document, faults = _with_liquids_of_files(document)
     if formats.is_second(document):

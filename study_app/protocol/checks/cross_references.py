@@ -9,7 +9,7 @@ import unicodedata
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from study_app.protocol.groups.group import sequences_in
+from study_app.protocol.groups.group import SEQUENCES, sequences_in
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, did_you_mean
 from study_app.protocol.wording.languages import LANGUAGES
@@ -28,6 +28,29 @@ REFERENCES = {
     "stimuli.*.condition": "conditions",
     "designs.*.scale": "scales",
 }
+
+CHOICES = {
+    **{pattern: (section,) for pattern, section in REFERENCES.items()},
+    **{f"{pattern}.*": ("pages", "blocks", "questionnaires") for pattern in SEQUENCES},
+    "blocks.*.design": ("designs",),
+    "blocks.*.method": ("methods",),
+    "analysis.published.*.block": ("blocks",),
+}
+"""Every place that names a table, with the sections whose tables it may name; a design or method may be a kind, too."""
+
+ITEM_REFERENCES = (
+    "conditions.*.label",
+    "analysis.primary.*",
+    "analysis.names.*",
+    "analysis.rising.*",
+    "analysis.falling.*",
+    "analysis.noticed",
+    "questionnaires.*.items.*.show_if.item",
+    "questionnaires.*.scores.*.items.*",
+    "questionnaires.*.scores.*.reverse.*",
+    "questionnaires.*.scores.*.weights_from.*",
+)
+"""Every place that names an item; within a questionnaire one of its own items."""
 
 TEXTS = (
     "study.title",

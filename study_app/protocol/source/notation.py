@@ -13,6 +13,7 @@ from study_app.protocol.source.document import Path
 
 _BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_PLAIN_KEY = re.compile(r"([A-Za-z0-9_-]+)[ \t]*=[ \t]*")
 _STRING = re.compile(
     r'"""(?:\\.|[^\\])*?"""(?!")'
     r"|'''.*?'''(?!')"
@@ -93,10 +94,15 @@ class _Scan:
     def _assignment(self, table: Path, kind: Kind) -> Path:
         """Read a key and its value; return the table that they belong to."""
         start = self._at
-        keys, parts = self._key()
-        self._skip_blank()
-        self._take("=")
-        self._skip_blank()
+        keys: Path
+        parts: tuple[tuple[int, int], ...]
+        if plain := _PLAIN_KEY.match(self._text, start):
+            keys, parts, self._at = (plain[1],), (plain.span(1),), plain.end()
+        else:
+            keys, parts = self._key()
+            self._skip_blank()
+            self._take("=")
+            self._skip_blank()
         value, path = self._at, table + keys
         self._value(path)
         self.nodes.append(Node(kind, path, parts, start, value, self._at))

@@ -1,0 +1,173 @@
+"""What names what in a study, both ways; and the edits that rename, replace or delete a thing with what names it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import count
+from typing import Any
+
+from study_app.authoring.edits import Edit, Rename, Set, Unset
+from study_app.authoring.refused import Refused
+from study_app.haptics.model.liquid import MAX_ID
+from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
+from study_app.protocol.source.document import Path, entries, has, names
+
+Document = Mapping[str, Any]
+ITEMS = "items"
+
+
+def named_at(document: Document, place: Path) -> Path | None:
+    """Return the path of what the text at ``place`` names; None where it names nothing that is there."""
+    return next((thing for found, thing in _references(document) if found == place), None)
+
+
+def references_to(document: Document, thing: Path) -> tuple[Path, ...]:
+    """Return the places of the texts that name a table, as ``("liquids", "water")``, or an item."""
+    return tuple(place for place, named in _references(document) if named == thing)
+
+
+def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
+    """Return the names that a text at ``place`` may have; None where it is not a reference."""
+    for pattern, sections in CHOICES.items():
+        if _matches(place, pattern):
+            return tuple(name for section in sections for name in names(document, section))
+    if any(_matches(place, pattern) for pattern in ITEM_REFERENCES):
+        found = (item for path, item in _items(document) if _in_reach(place, path))
+        return tuple(dict.fromkeys(str(item["id"]) for item in found))
+    return None
+
+
+def renamed(document: Document, thing: Path, name: str) -> tuple[Edit, ...]:
+    """Return the edits that rename a table or item, and every text that names it.
+
+    Raises
+    ------
+    Refused
+        The name is taken, or is not an id.
+    """
+    check_id(name)
+    item = _item_id(document, thing)
+    if item is None:
+        if name in _siblings(document, thing):
+            raise Refused(f'the name "{name}" is taken: choose another one')
+        return (Rename(thing, name, references_to(document, thing)),)
+    if any(_in_same(thing, path) and other["id"] == name for path, other in _items(document) if path != thing):
+        raise Refused(f'the name "{name}" is taken by another item of this questionnaire: choose another one')
+    return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
+
+
+def replaced(document: Document, thing: Path, other: str) -> tuple[Edit, ...]:
+    """Return the edits that delete a thing and let everything that named it name another one."""
+    return (*(Set(place, other) for place in references_to(document, thing)), Unset(thing))
+
+
+def with_references(document: Document, thing: Path, needs: Callable[[Path], bool]) -> tuple[Path, ...]:
+    """Return the paths of all that must go with a thing, itself last: list entries, keys and whole tables.
+
+    Parameters
+    ----------
+    document : mapping
+        The study.
+    thing : tuple of str or int
+        What is deleted.
+    needs : callable
+        Returns whether the table around a key would be incomplete without it (`Study.needs`); then it goes, too.
+    """
+    named: dict[Path, list[Path]] = {}
+    for place, target in _references(document):
+        named.setdefault(place, []).append(target)
+    gone = [thing]
+    for inner in gone:  # grows while it is read
+        for place, targets in named.items():
+            touched = any(_within(target, inner) for target in targets)
+            if touched and not _covered(place, gone) and all(_covered(target, gone) for target in targets):
+                gone.append(place if isinstance(place[-1], int) or not needs(place) else place[:2])
+    return (*gone[:0:-1], thing)
+
+
+def deletions(paths: Iterable[Path]) -> tuple[Edit, ...]:
+    """Return the edits that remove all of these paths: later entries of an array first, nothing twice."""
+    every = set(paths)
+    outer = [path for path in every if not any(path[:length] in every for length in range(1, len(path)))]
+    return tuple(Unset(path) for path in sorted(outer, key=_sortable, reverse=True))
+
+
+def free_name(taken: Iterable[str], name: str) -> str:
+    """Return ``name``, or with the first number from 2 on that is free."""
+    used = set(taken)
+    if name not in used:
+        return name
+    numbers = (f"_{number}" for number in count(2))
+    return next(new for end in numbers if (new := f"{name[: MAX_ID - len(end)]}{end}") not in used)
+
+
+def check_id(name: str) -> None:
+    """Refuse what is not an id.
+
+    Raises
+    ------
+    Refused
+        It is not small letters, digits and underscores with a letter first.
+    """
+    plain = name.isascii() and name.replace("_", "a").isalnum() and name == name.lower()
+    if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
+        rule = f"at most {MAX_ID} small letters, digits and underscores, a letter first"
+        raise Refused(f'"{name}" is not an id: write {rule}')
+
+
+def _within(path: Path, outer: Path) -> bool:
+    return path[: len(outer)] == outer
+
+
+def _covered(path: Path, outer: Iterable[Path]) -> bool:
+    return any(_within(path, one) for one in outer)
+
+
+def _references(document: Document) -> Iterator[tuple[Path, Path]]:
+    """Yield every place of a text that names something, with what it names."""
+    for pattern, sections in CHOICES.items():
+        for place, name in entries(document, pattern):
+            for section in sections:
+                if isinstance(name, str) and has(document.get(section), name):
+                    yield place, (section, name)
+    items = list(_items(document))
+    for pattern in ITEM_REFERENCES:
+        for place, name in entries(document, pattern):
+            for path, item in items:
+                if item["id"] == name and _in_reach(place, path):
+                    yield place, path
+
+
+def _items(document: Document) -> Iterator[tuple[Path, Mapping[str, Any]]]:
+    for path, item in entries(document, f"questionnaires.*.{ITEMS}.*"):
+        if isinstance(item, Mapping) and isinstance(item.get("id"), str):
+            yield path, item
+
+
+def _item_id(document: Document, thing: Path) -> str | None:
+    return next((item["id"] for path, item in _items(document) if path == thing), None)
+
+
+def _in_reach(place: Path, item: Path) -> bool:
+    """Return whether a text can name an item: within a questionnaire only those of the same one."""
+    return place[0] != item[0] or place[1] == item[1]
+
+
+def _in_same(one: Path, other: Path) -> bool:
+    return one[:2] == other[:2]
+
+
+def _siblings(document: Document, thing: Path) -> Iterable[str]:
+    node: Any = document
+    for step in thing[:-1]:
+        node = node[step] if has(node, step) else {}
+    return tuple(node) if isinstance(node, Mapping) else ()
+
+
+def _matches(place: Path, pattern: str) -> bool:
+    steps = pattern.split(".")
+    return len(steps) == len(place) and all(step in {"*", str(one)} for step, one in zip(steps, place, strict=True))
+
+
+def _sortable(path: Path) -> tuple[tuple[str, int], ...]:
+    return tuple((step, 0) if isinstance(step, str) else ("", step) for step in path)

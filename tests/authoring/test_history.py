@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+import pytest
+
+from study_app.authoring.edits import Set, Unset
+from study_app.authoring.history import MOST_STEPS, History
+from study_app.authoring.refused import Refused
+from study_app.authoring.study import read
+from study_app.errors import ProtocolError
+from study_app.protocol.load import load, parse, shipped
+from tests.authoring.grown import PROTOCOLS
+
+DEMO = read((PROTOCOLS / "demo.toml").read_bytes())
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_study_is_what_check_reads(name: str) -> None:
+    study = read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
+    assert study.protocol == load(name)
+    assert study.problems == ()
+
+
+@pytest.mark.parametrize(("old", "new"), [('liquid = "thin"', 'liquid = "thn"'), ("format = 1", "format = ")])
+def test_problems_are_those_of_check(old: str, new: str) -> None:
+    source = DEMO.text.replace(old, new).encode()
+    with pytest.raises(ProtocolError) as raised:
+        parse(source, "demo")
+    assert read(source).problems == raised.value.problems
+
+
+def test_undo_and_redo_restore_text_and_selection() -> None:
+    first = History(DEMO, ("liquids", "thin"))
+    title = first.edited("Change the title", Set(("study", "title"), "New"), select=("study",))
+    both = title.edited("Remove the limits", Unset(("limits",)), select=())
+    assert both.undo() == title.__class__(title.study, title.selected, title.done, (both.done[-1],))
+    assert both.undo().undo().study.text == DEMO.text
+    assert both.undo().undo().selected == ("liquids", "thin")
+    assert both.undo().undo().redo().redo() == both
+    assert both.undo().edited("Other", Set(("study", "title"), "Other")).undone == ()
+    assert first.undo() == first.redo() == first
+
+
+def test_letters_of_one_text_are_one_step() -> None:
+    history = History(DEMO)
+    for end in range(1, 6):
+        history = history.edited("Type", Set(("study", "title"), "Title"[:end]), joins=end > 1)
+    assert len(history.done) == 1
+    assert history.study.document["study"]["title"] == "Title"
+    assert history.undo().study.text == DEMO.text
+
+
+def test_a_step_that_changes_nothing_is_none() -> None:
+    same = History(DEMO).edited("Same", Set(("format",), 1), select=("study",))
+    assert (same.done, same.selected) == ((), ("study",))
+
+
+def test_the_oldest_of_too_many_steps_is_forgotten() -> None:
+    history = History(read(b"a = 0\n"))
+    for number in range(MOST_STEPS + 3):
+        history = history.edited("Count", Set(("a",), number + 1))
+    assert len(history.done) == MOST_STEPS
+
+
+def test_a_text_that_is_not_toml_keeps_its_last_document_and_is_typed_on() -> None:
+    broken = History(DEMO).typed("Type", DEMO.text.replace("format = 1", "format = "))
+    assert not broken.study.is_toml
+    assert broken.study.document == DEMO.document
+    assert "not TOML" in broken.study.problems[0].message
+    with pytest.raises(Refused, match="correct its text first"):
+        broken.edited("Change", Set(("format",), 2))
+    assert broken.typed("Type", DEMO.text).study.protocol == DEMO.protocol
+    assert broken.undo().study.text == DEMO.text
+
+
+def test_read_refuses_what_is_not_utf_8() -> None:
+    with pytest.raises(Refused, match="line 2 is not UTF-8 text"):
+        read(b"a = 1\nb = '\xff'\n")

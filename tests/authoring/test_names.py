@@ -1,0 +1,133 @@
+"""Renaming and deleting with everything that names the thing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from study_app.authoring.names import (
+    check_id,
+    choices_at,
+    deletions,
+    free_name,
+    named_at,
+    references_to,
+    renamed,
+    replaced,
+    with_references,
+)
+from study_app.authoring.refused import Refused
+from study_app.authoring.study import Study, read
+from study_app.haptics.model.liquid import MAX_ID
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.source.document import Path, entries
+from tests.authoring.grown import PROTOCOLS
+
+NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))
+
+
+def study_of(name: str) -> Study:
+    return read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
+
+
+def things(document: Any) -> list[Path]:
+    sections = [path for path, _ in entries(document, "*.*") if path[0] not in {"study", "device", "scene", "limits"}]
+    tables = [path for path in sections if isinstance(path[1], str) and path[0] != "analysis"]
+    return [*tables, *(path for path, _ in entries(document, "questionnaires.*.items.*"))]
+
+
+def other_names(value: Any, old: str, new: str) -> Any:
+    """Return a dumped schedule with a name replaced where it stands alone."""
+    if isinstance(value, dict):
+        return {other_names(key, old, new): other_names(inner, old, new) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [other_names(inner, old, new) for inner in value]
+    return new if value == old else value
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_renamed_leaves_no_reference_and_no_session_changed(name: str) -> None:
+    study = study_of(name)
+    for thing in things(study.document)[::4]:
+        if thing[0] in {"designs", "methods"} or (len(thing) == 4 and "instrument" in str(study.document[thing[0]])):
+            continue
+        changed, _ = study.edited(*renamed(study.document, thing, "quite_other"))
+        assert changed.protocol is not None, (thing, changed.problems)
+        assert study.protocol is not None
+        before, after = (build_schedule(one.protocol, "P001", 1).steps for one in (study, changed))
+        assert [type(step) for step in before] == [type(step) for step in after]
+        back, _ = changed.edited(*renamed(changed.document, _renamed(thing), str(_name(study.document, thing))))
+        assert back.text == study.text
+
+
+def _renamed(thing: Path) -> Path:
+    return thing if isinstance(thing[-1], int) else (*thing[:-1], "quite_other")
+
+
+def _name(document: Any, thing: Path) -> Any:
+    for step in thing:
+        document = document[step]
+    return document["id"] if isinstance(thing[-1], int) else thing[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "thing", [("liquids", "water"), ("scales", "agreement"), ("tasks", "explore"), ("pages", "rest")]
+)
+def test_with_references_leaves_none_that_dangles(thing: Path) -> None:
+    study = study_of("rek2024")
+    paths = with_references(study.document, thing, study.needs)
+    assert paths[-1] == thing
+    changed, _ = study.edited(*deletions(paths))
+    assert not [fault for fault in changed.faults if "there is no" in fault.message and '"' in fault.message], thing
+
+
+def test_with_references_lists_what_goes_with_a_liquid() -> None:
+    study = study_of("demo")
+    assert with_references(study.document, ("liquids", "thick"), study.needs) == (
+        ("blocks", "liquids", "conditions", 1),
+        ("conditions", "thick"),
+        ("liquids", "thick"),
+    )
+
+
+def test_replaced_lets_everything_name_the_other() -> None:
+    study = study_of("demo")
+    changed, _ = study.edited(*replaced(study.document, ("liquids", "thick"), "thin"))
+    assert changed.document["conditions"]["thick"]["liquid"] == "thin"
+    assert "thick" not in changed.document["liquids"]
+
+
+def test_names_lead_both_ways() -> None:
+    document = study_of("demo").document
+    place = ("blocks", "liquids", "conditions", 1)
+    assert named_at(document, place) == ("conditions", "thick")
+    assert place in references_to(document, ("conditions", "thick"))
+    assert choices_at(document, place) == ("thin", "thick", "prompt", "late")
+    assert choices_at(document, ("sequence", 0)) == (
+        "welcome", "reaching", "thanks", "liquids", "delays", "liquid", "delay",
+    )  # fmt: skip
+    assert choices_at(document, ("study", "title")) is None
+
+
+@pytest.mark.parametrize("name", ["", "Water", "2nd", "with blank", "é", "a" * (MAX_ID + 1)])
+def test_check_id_refuses_what_is_no_id(name: str) -> None:
+    with pytest.raises(Refused, match="is not an id: write at most"):
+        check_id(name)
+
+
+def test_renamed_refuses_a_taken_name() -> None:
+    document = study_of("demo").document
+    with pytest.raises(Refused, match='the name "thin" is taken'):
+        renamed(document, ("liquids", "thick"), "thin")
+    with pytest.raises(Refused, match="taken by another item"):
+        renamed(document, ("questionnaires", "liquid", "items", 1), "feels_liquid")
+
+
+def test_free_name_counts_from_2() -> None:
+    assert free_name(["a", "a_2"], "a") == "a_3"
+    assert free_name(["b"], "a") == "a"
+    long = "x" * MAX_ID
+    assert len(free_name([long], long)) <= len(long)
