@@ -78,8 +78,8 @@ _Text: TypeAlias = Annotated[
 ]
 Localised: TypeAlias = Annotated[_Text, _not_longer(MAX_TEXT)]
 """A title, a statement, a label: what fits on a page with others."""
-Body: TypeAlias = Annotated[_Text, _not_longer(MAX_BODY)]
-"""What fills a page or several."""
+Body: TypeAlias = Annotated[_Text, _not_longer(MAX_BODY), Field(json_schema_extra={"lines": "several"})]
+"""What fills a page or several; its schema says so to the study designer."""
 
 
 def text_in(value: str | dict[str, str], language: str) -> str:

@@ -71,6 +71,11 @@ def shown(value: Any) -> str:
     return "a table" if isinstance(value, Mapping) else "an array" if isinstance(value, Sequence) else str(value)
 
 
+def rule_of(pattern: str) -> str:
+    """Return in words which texts a pattern permits."""
+    return _PATTERNS.get(pattern, f"text that matches {pattern}")
+
+
 def did_you_mean(word: str, permitted: Iterable[str]) -> str:
     """Return "did you mean …?" for the nearest permitted word, or the list of them if none is near."""
     words = sorted(permitted)
@@ -127,8 +132,7 @@ def _sentence(kind: str, value: Any, context: Mapping[str, Any], message: str) -
         near = difflib.get_close_matches(str(value), permitted.replace('"', "").replace(" or ", ", ").split(", "), n=1)
         return f"{shown(value)} is not {permitted}", f'did you mean "{near[0]}"?' if near else ""
     if kind == "string_pattern_mismatch":
-        rule = _PATTERNS.get(str(context["pattern"]), f"text that matches {context['pattern']}")
-        return f"{shown(value)} is not permitted: {rule}", ""
+        return f"{shown(value)} is not permitted: {rule_of(str(context['pattern']))}", ""
     if kind == "too_short":
         return f"has {context['actual_length']} entries, needs at least {context['min_length']}", ""
     if kind == "too_long":

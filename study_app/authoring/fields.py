@@ -1,0 +1,237 @@
+"""Forms: the rows of a table of the study, made from the models of the file format; no form is written by hand."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal, TypeAlias
+
+from study_app.authoring.names import choices_at
+from study_app.authoring.schema_nodes import OWN, Node, alternatives, node_at, table_of, tags
+from study_app.haptics.model.ranges import REASON
+from study_app.protocol.source.document import Path, has
+from study_app.protocol.source.problems import rule_of, shown
+
+Kind: TypeAlias = Literal[
+    "number", "whole number", "text", "paragraphs", "localised", "switch", "choice", "kind", "reference",
+    "numbers", "vector", "points", "texts", "choices", "references", "list", "table", "tables", "either", "unknown",
+]  # fmt: skip
+"""How a value is edited: "localised" has a text per language, "switch" is true or false, "choice" one of some words,
+"kind" a choice that decides the other rows, "vector" numbers of one point, "list" tables in an array, "tables" tables
+by name, "either" one of several other kinds; an "unknown" key does not belong to the table."""
+
+UNITS: Final = {
+    "mm": "mm", "m": "m", "s": "s", "ms": "ms", "n": "N", "hz": "Hz", "deg": "°", "percent": "%", "mps": "m/s",
+    "mps2": "m/s²", "m2ps": "m²/s", "nspm": "N·s/m", "pa": "Pa", "pa_s": "Pa·s", "pa_sn": "Pa·sⁿ", "kg_m3": "kg/m³",
+    "per_s": "1/s",
+}  # fmt: skip
+"""The unit of each ending of a key."""
+
+_OF_NUMBERS: Final = {
+    "minimum": "at least {}",
+    "exclusiveMinimum": "more than {}",
+    "maximum": "at most {}",
+    "exclusiveMaximum": "less than {}",
+}
+_OF_LENGTHS: Final = {
+    "minItems": "at least {} entries",
+    "maxItems": "at most {} entries",
+    "maxLength": "at most {} characters",
+}
+_SENTENCES: Final = re.compile(r"((?:[a-z_0-9]+, )*[a-z_0-9]+): ([^;]+?)(?:; |\.?\Z)")
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One value that can be chosen, with its sentence ("" where the model has none); None leaves the key out."""
+
+    value: str | None
+    sentence: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One row of a form.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        The place in the document that it edits.
+    kind : str
+        How it is edited, see `Kind`.
+    label, unit, help : str
+        Its words, "" where there are none.
+    value : object
+        What the file holds, None where the key is left out.
+    default : object
+        What counts where the key is left out; None where nothing does.
+    required : bool
+        Whether the key cannot be left out.
+    bounds : tuple of str
+        What is permitted, as messages say it: "at least 0", "at most 8".
+    reason : str
+        Why, "" where the model does not say.
+    choices : tuple of Choice
+        What can be chosen, or named.
+    either : tuple of Row
+        Its alternatives, of kind "either" alone.
+    """
+
+    path: Path
+    kind: Kind
+    label: str
+    unit: str = ""
+    help: str = ""
+    value: Any = None
+    default: Any = None
+    required: bool = False
+    bounds: tuple[str, ...] = ()
+    reason: str = ""
+    choices: tuple[Choice, ...] = ()
+    either: tuple[Row, ...] = ()
+
+
+def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
+    """Return the rows of the table or array at ``path``: its keys in the order of its model, then unknown ones."""
+    nodes, value = node_at(document, path), _at(document, path)
+    node = table_of(nodes, value)
+    if node is None:
+        return ()
+    if node.get("type") == "array":
+        length = len(node["prefixItems"]) if "prefixItems" in node else len(value) if isinstance(value, tuple) else 0
+        return tuple(row for index in range(length) for row in (row_at(document, (*path, index)),) if row)
+    properties = node.get("properties", {})
+    written = tuple(value) if isinstance(value, Mapping) else ()
+    keys = list(dict.fromkeys((*filter(None, [tags(nodes)[0]]), *properties, *written)))
+    found = (row_at(document, (*path, key)) for key in keys)
+    return tuple(row for row in found if row is not None)
+
+
+def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
+    """Return the row of one place; None where it is in nothing that a model knows."""
+    siblings, value = node_at(document, path[:-1]), _at(document, path)
+    around = table_of(siblings, _at(document, path[:-1]))
+    if around is None:
+        return None
+    key, named = tags(siblings)
+    if key and key == path[-1]:
+        options = tuple(Choice(tag, _first_sentence(node)) for tag, node in named.items())
+        part = around.get("properties", {}).get(key, {})
+        default = part.get("default", None if None in named else part.get("const"))
+        required = key in around.get("required", ())
+        return Row(path, "kind", label_of(key), value=value, default=default, required=required, choices=options)
+    nodes = node_at(document, path)
+    if not nodes:
+        return None if value is None else Row(path, "unknown", label_of(path[-1]), value=value)
+    return _row(document, path, nodes, value, required=path[-1] in around.get("required", ()))
+
+
+def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value: Any, *, required: bool) -> Row:
+    first = nodes[0]
+    common: dict[str, Any] = {
+        "label": label_of(path[-1]),
+        "unit": unit_of(_last_key(path)),
+        "help": first.get("description", ""),
+        "value": value,
+        "default": first.get("default", first.get("const")),
+        "required": required,
+    }
+    if _is_localised(nodes):
+        return Row(path, "paragraphs" if first.get("lines") == "several" else "localised", **common)
+    if len(nodes) > 1 and not tags(nodes)[0]:
+        either = tuple(_row(document, path, (node,), value, required=required) for node in nodes)
+        return Row(path, "either", **common, either=either)
+    references = choices_at(document, (*path, 0) if first.get("type") == "array" else path)
+    kind = _kind(first, isinstance(references, tuple))
+    words = first.get("items", first) if kind == "choices" else first
+    names = references if kind in {"reference", "references"} and references is not None else _enum(words)
+    sentences = _sentences(first.get("description", ""))
+    options = tuple(Choice(name, sentences.get(name, "")) for name in names)
+    limits = _numbers_in(first) if kind in {"vector", "numbers", "points"} else first
+    return Row(path, kind, **common, choices=options, bounds=_bounds(first, limits), reason=limits.get(REASON, ""))
+
+
+def _kind(node: Node, references: bool) -> Kind:
+    kind = node.get("type")
+    if kind == "array":
+        if references:
+            return "references"
+        inner = next(alternatives(node["items"])) if "items" in node else node["prefixItems"][0]
+        if "prefixItems" in node:
+            return "vector"
+        if inner.get("type") == "object":
+            return "list"
+        if inner.get("type") == "array":
+            return "points" if "prefixItems" in inner else "list"
+        return "choices" if "enum" in inner else "texts" if inner.get("type") == "string" else "numbers"
+    if kind == "object":
+        return "table" if "properties" in node else "tables"
+    if kind == "string":
+        return "reference" if references else "choice" if _enum(node) else "text"
+    if "enum" in node or "const" in node:
+        return "choice"
+    return "switch" if kind == "boolean" else "whole number" if kind == "integer" else "number"
+
+
+def _enum(node: Node) -> tuple[Any, ...]:
+    return (node["const"],) if "const" in node else tuple(node.get("enum", ()))
+
+
+def _is_localised(nodes: tuple[Node, ...]) -> bool:
+    if len(nodes) != 2 or nodes[0].get("type") != "string":
+        return False
+    return nodes[1].get("additionalProperties") == {"type": "string"}
+
+
+def _numbers_in(node: Node) -> Node:
+    """Return the schema of the numbers in an array."""
+    while node.get("type") == "array":
+        node = node["prefixItems"][0] if "prefixItems" in node else next(alternatives(node["items"]))
+    return node
+
+
+def _bounds(node: Node, numbers: Node) -> tuple[str, ...]:
+    words = [phrase.format(shown(numbers[key])) for key, phrase in _OF_NUMBERS.items() if key in numbers]
+    if "prefixItems" not in node:
+        words += [phrase.format(node[key]) for key, phrase in _OF_LENGTHS.items() if key in node]
+    return (*words, rule_of(node["pattern"])) if "pattern" in node else tuple(words)
+
+
+def label_of(step: str | int) -> str:
+    """Return a key in words, without its unit: "Force limit" of ``force_limit_n``; of an entry its number."""
+    if isinstance(step, int):
+        return str(step + 1)
+    unit = _suffix(step)
+    plain = step.removesuffix(f"_{unit}") if unit else step
+    return plain.replace("_", " ").strip().capitalize()
+
+
+def unit_of(key: str) -> str:
+    """Return the unit that a key ends in, "" where it ends in none."""
+    return UNITS.get(_suffix(key), "")
+
+
+def _suffix(key: str) -> str:
+    return max((suffix for suffix in UNITS if key.endswith(f"_{suffix}")), key=len, default="")
+
+
+def _last_key(path: Path) -> str:
+    return next((step for step in reversed(path) if isinstance(step, str)), "")
+
+
+def _first_sentence(node: Node) -> str:
+    return " ".join(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0].split())
+
+
+def _sentences(description: str) -> dict[str, str]:
+    """Return the sentence of each value in a description such as "fixed: as written; shuffled: anew in every trial"."""
+    return {value: match[2].strip() for match in _SENTENCES.finditer(description) for value in match[1].split(", ")}
+
+
+def _at(document: Any, path: Path) -> Any:
+    for step in path:
+        if not has(document, step):
+            return None
+        document = document[step]
+    return document

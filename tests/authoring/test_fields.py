@@ -1,0 +1,181 @@
+"""Forms from the models of the file format: every key of every model has a row."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import pytest
+
+from study_app.authoring.fields import UNITS, Row, label_of, row_at, rows, unit_of
+from study_app.authoring.study import read
+from study_app.protocol.load import shipped
+from study_app.protocol.source.document import Path, entries
+from study_app.protocol.source.json_schema import schema
+from study_app.protocol.source.problems import shown
+from tests.authoring.grown import PROTOCOLS
+from tests.protocol.cases import CASES, Case
+
+DEFS = schema()["$defs"]
+STUDIES = {name: read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS).document for name in shipped()}
+
+
+def tables(value: Any, path: Path = ()) -> Iterator[Path]:
+    if isinstance(value, Mapping):
+        yield path
+        for key, inner in value.items():
+            yield from tables(inner, (*path, key))
+    elif isinstance(value, tuple):
+        for index, inner in enumerate(value):
+            yield from tables(inner, (*path, index))
+
+
+def with_value(document: Any, path: Path, value: Any) -> Any:
+    """Return a document with a value at ``path``, with the tables and entries that it needs."""
+    if not path:
+        return value
+    step, *rest = path
+    if isinstance(step, int):
+        inner = document[step] if isinstance(document, tuple) and step < len(document) else {}
+        return (with_value(inner, tuple(rest), value),)
+    table = document if isinstance(document, Mapping) else {}
+    return {**table, step: with_value(table.get(step), tuple(rest), value)}
+
+
+def every_row(document: Any, path: Path = ()) -> Iterator[Row]:
+    """Yield the rows of a form and of all within it: of each kind, of an entry, of a table of any name."""
+    for row in rows(document, path):
+        yield row
+        if row.kind == "kind" and row.value is None:
+            for choice in row.choices:
+                if choice.value is not None:
+                    yield from every_row(with_value(document, row.path, choice.value), path)
+        for one in (row, *row.either):
+            if one.kind == "table":
+                yield from every_row(document, row.path)
+            elif one.kind == "tables":
+                yield from every_row(with_value(document, (*row.path, "any"), {}), (*row.path, "any"))
+            elif one.kind in {"list", "points"}:
+                yield from every_row(with_value(document, (*row.path, 0), {}), (*row.path, 0))
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_every_value_of_a_study_has_a_row_that_shows_it(name: str) -> None:
+    document = STUDIES[name]
+    for path in tables(document):
+        if path and path[-1] not in {"en", "nl"} and isinstance(row_at(document, path[:1]), Row):
+            around = row_at(document, path)
+            assert around is not None, path
+            assert around.kind != "unknown", path
+            if around.kind in {"localised", "paragraphs"}:
+                continue
+        shown_here = {row.path[-1]: row.value for row in rows(document, path)}
+        at: Any = document
+        for step in path:
+            at = at[step]
+        for key, value in at.items():
+            assert shown_here[key] == value, (path, key)
+        assert not [row for row in rows(document, path) if row.kind == "unknown"]
+
+
+def described(node: Any) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Yield key, description and bounds of everything in the schema that has a description."""
+    for definition in (node, *node["$defs"].values()):
+        for key, part in definition.get("properties", {}).items():
+            bounds = [
+                one[name] for one in (part, *part.get("anyOf", ())) for name in ("minimum", "maximum") if name in one
+            ]
+            if "description" in part:
+                yield key, part["description"], tuple(map(shown, bounds))
+
+
+def test_every_key_of_every_model_reaches_a_form_with_its_words_and_bounds() -> None:
+    found: dict[tuple[str | int, str], str] = {}
+    for row in every_row({}):
+        bounds = [*row.bounds, *(text for one in row.either for text in one.bounds)]
+        found[row.path[-1], row.help] = " ".join(bounds)
+        assert row.label
+    for key, words, bounds in described(schema()):
+        assert (key, words) in found
+        assert all(bound in found[key, words] for bound in bounds), key
+
+
+@pytest.mark.parametrize("title", sorted(DEFS))
+def test_every_unit_of_the_models_is_known(title: str) -> None:
+    for key, part in DEFS[title].get("properties", {}).items():
+        for unit in re.findall(r"\[([^\[\]]+)\]", part.get("description", "")):
+            if (plain := unit.split(",")[0]) not in {"designs", "methods", "decades"} and " " not in plain:
+                assert unit_of(key) == plain, (key, unit)
+
+
+def test_endings_of_keys_are_units() -> None:
+    keys = {key for definition in DEFS.values() for key in definition.get("properties", {})}
+    numbers = {key for key in keys if re.search(r"_(m|n|s|k|h|p|d)[a-z0-9]{0,2}(_[a-z0-9]+)?$", key)}
+    assert {key for key in numbers if not unit_of(key)} <= {
+        "max_repeats", "min_distance", "noise_share", "item_order", "code_prefix", "break_page", "drag_coefficient",
+    }  # fmt: skip
+    assert set(UNITS.values()) >= {"mm", "kg/m³", "Pa·s", "N·s/m"}
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_every_fault_that_check_knows_is_at_a_row(case: Case) -> None:
+    study = read(case.text.encode())
+    for fault in study.faults:
+        if fault.path:
+            assert any(row_at(study.document, fault.path[:length]) for length in range(len(fault.path), 0, -1)), fault
+            section = row_at(study.document, fault.path[:1])
+            assert section is not None
+
+
+def test_rows_say_label_unit_bounds_and_reason() -> None:
+    document = STUDIES["rek2024"]
+    row = row_at(document, ("device", "force_limit_n"))
+    assert row is not None
+    assert (row.label, row.unit, row.kind, row.value, row.default) == ("Force limit", "N", "number", 8, 8)
+    assert row.bounds == ("at least 0.1", "at most 8")
+    assert "8 N is the most" in row.reason
+    assert label_of("density_kg_m3") == "Density"
+
+
+def test_choices_have_their_sentences() -> None:
+    row = row_at(STUDIES["rek2024"], ("blocks", "liquids", "order"))
+    assert row is not None
+    sentences = {choice.value: choice.sentence for choice in row.choices}
+    assert sentences["shuffled"] == "anew in each repetition"
+    assert sentences["williams"] == sentences["latin"] != ""
+
+
+def test_a_kind_decides_the_other_rows() -> None:
+    document = STUDIES["viscosityjnd"]
+    kind, *others = rows(document, ("tasks", "stir"))
+    assert (kind.kind, {choice.value for choice in kind.choices}) == ("kind", {"explore", "reach", "follow"})
+    assert "cycles" in {row.path[-1] for row in others}
+    items = [path for path, _ in entries(document, "questionnaires.about_you.items.*")]
+    assert [row.kind for row in rows(document, items[0]) if row.path[-1] == "kind"] == ["kind"]
+    assert "options" in {row.path[-1] for row in rows(document, items[1])}
+    assert "from" not in {row.path[-1] for row in rows(document, items[1])}
+
+
+@pytest.mark.parametrize(
+    ("study", "path", "kind"),
+    [
+        ("rek2024", ("study", "title"), "localised"),
+        ("rek2024", ("pages", "consent", "body"), "paragraphs"),
+        ("rek2024", ("blocks", "liquids", "task"), "reference"),
+        ("rek2024", ("blocks", "liquids", "conditions"), "references"),
+        ("rek2024", ("tasks", "reach", "targets_mm"), "points"),
+        ("rek2024", ("device", "workspace_mm"), "vector"),
+        ("rek2024", ("questionnaires", "liquid", "items"), "list"),
+        ("rek2024", ("liquids",), "tables"),
+        ("rek2024", ("liquids", "water", "wake"), "table"),
+        ("rek2024", ("liquids", "water", "effects"), "either"),
+        ("rek2024", ("blocks", "liquids", "replicates"), "switch"),
+        ("viscosityjnd", ("stimuli", "damping", "standards"), "numbers"),
+        ("viscosityjnd", ("stimuli", "damping", "steps"), "whole number"),
+    ],
+)
+def test_kinds_of_rows(study: str, path: Path, kind: str) -> None:
+    row = row_at(STUDIES[study], path)
+    assert row is not None
+    assert row.kind == kind
