@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import count
 from typing import Any
 
-from study_app.authoring.edits import Edit, Rename, Set, Unset
-from study_app.authoring.refused import Refused
+from study_app.authoring.writer.edits import Edit, Rename, Set, Unset
+from study_app.authoring.writer.refused import Refused
 from study_app.haptics.model.liquid import MAX_ID
 from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
 from study_app.protocol.source.document import Path, entries, has, names

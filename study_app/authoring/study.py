@@ -8,9 +8,9 @@ from functools import cached_property
 from pathlib import Path as File
 from typing import Any
 
-from study_app.authoring.edits import Edit, Unset, WriterError, apply
-from study_app.authoring.refused import Refused
-from study_app.authoring.splices import Splice, Splices, applied
+from study_app.authoring.writer.edits import Edit, Unset, WriterError, apply
+from study_app.authoring.writer.refused import Refused
+from study_app.authoring.writer.splices import Splice, Splices, applied
 from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import examined, located, read_document
 from study_app.protocol.model import Protocol

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.authoring.edits import Set, Unset
 from study_app.authoring.history import MOST_STEPS, History
-from study_app.authoring.refused import Refused
 from study_app.authoring.study import read
+from study_app.authoring.writer.edits import Set, Unset
+from study_app.authoring.writer.refused import Refused
 from study_app.errors import ProtocolError
 from study_app.protocol.load import load, parse, shipped
 from tests.authoring.grown import PROTOCOLS

@@ -17,8 +17,8 @@ from study_app.authoring.names import (
     replaced,
     with_references,
 )
-from study_app.authoring.refused import Refused
 from study_app.authoring.study import Study, read
+from study_app.authoring.writer.refused import Refused
 from study_app.haptics.model.liquid import MAX_ID
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.source.document import Path, entries

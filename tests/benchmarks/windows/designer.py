@@ -14,7 +14,7 @@ from random import Random
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from tests.authoring import test_edits
+from tests.authoring.writer import test_edits
 
 
 def main(wanted: int) -> None:

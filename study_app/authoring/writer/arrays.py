@@ -6,11 +6,11 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
-from study_app.authoring.keys import blank_before, insert_block
-from study_app.authoring.refused import Refused
-from study_app.authoring.spans import Piece, Slot, Spans
-from study_app.authoring.splices import Editor
-from study_app.authoring.values import INDENT, WIDTH, inline, tables
+from study_app.authoring.writer.keys import blank_before, insert_block
+from study_app.authoring.writer.refused import Refused
+from study_app.authoring.writer.spans import Piece, Slot, Spans
+from study_app.authoring.writer.splices import Editor
+from study_app.authoring.writer.values import INDENT, WIDTH, inline, tables
 from study_app.protocol.source.document import Path
 
 _TO_COMMA: Final = re.compile(r"(?:[ \t\r\n]|#[^\n]*+)*+,")

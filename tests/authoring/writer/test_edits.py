@@ -11,9 +11,9 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from study_app.authoring.edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, apply, meaning, same
-from study_app.authoring.refused import Refused
-from study_app.authoring.splices import Splices, applied, reverted
+from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, apply, meaning, same
+from study_app.authoring.writer.refused import Refused
+from study_app.authoring.writer.splices import Splices, applied, reverted
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.notation import scan
 from tests.authoring.comments import FREE, owners

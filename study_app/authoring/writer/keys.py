@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from study_app.authoring.refused import Refused
-from study_app.authoring.spans import Piece, Spans
-from study_app.authoring.splices import Editor
-from study_app.authoring.values import WIDTH, inline, key_text, tables, written
+from study_app.authoring.writer.refused import Refused
+from study_app.authoring.writer.spans import Piece, Spans
+from study_app.authoring.writer.splices import Editor
+from study_app.authoring.writer.values import WIDTH, inline, key_text, tables, written
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.notation import Node
 

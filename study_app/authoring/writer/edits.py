@@ -12,11 +12,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from study_app.authoring import arrays, keys
-from study_app.authoring.refused import Refused
-from study_app.authoring.spans import Spans, spans_of
-from study_app.authoring.splices import Editor, Splices, applied
-from study_app.authoring.values import written
+from study_app.authoring.writer import arrays, keys
+from study_app.authoring.writer.refused import Refused
+from study_app.authoring.writer.spans import Spans, spans_of
+from study_app.authoring.writer.splices import Editor, Splices, applied
+from study_app.authoring.writer.values import written
 from study_app.protocol.source.document import Path
 
 Document: TypeAlias = dict[str, Any]

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.authoring.edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, WriterError, apply
-from study_app.authoring.refused import Refused
-from study_app.authoring.values import tables, wrapped, written
+from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, WriterError, apply
+from study_app.authoring.writer.refused import Refused
+from study_app.authoring.writer.values import tables, wrapped, written
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]))
 VALUES = st.recursive(
@@ -123,6 +123,6 @@ def test_apply_refuses_what_makes_no_sense(edit: Edit, sentence: str) -> None:
 
 
 def test_apply_refuses_its_own_mistakes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("study_app.authoring.keys.written", lambda *_: "7")
+    monkeypatch.setattr("study_app.authoring.writer.keys.written", lambda *_: "7")
     with pytest.raises(WriterError, match="another document than the one meant"):
         apply("a = 1\n", Set(("a",), 2))

@@ -1,0 +1,137 @@
+"""Repairs: edits that remove a fault, each with the words of its button; only those are offered that do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from study_app.authoring.study import Study
+from study_app.authoring.writer.edits import Edit, Insert, Rename, Set, Unset
+from study_app.authoring.writer.refused import Refused
+from study_app.protocol.source.document import has
+from study_app.protocol.source.problems import Fault, shown
+
+_MEANT: Final = re.compile(r'did you mean "([^"]+)"\?')
+_BOUND: Final = re.compile(r"must be (?:at least|at most) (\S+)$")
+_LANGUAGE: Final = re.compile(r'is missing in "([a-z]{2})"$')
+_HALVINGS: Final = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """What a button says, and the edits that it makes as one step."""
+
+    words: str
+    edits: tuple[Edit, ...]
+
+
+def repairs(study: Study, fault: Fault) -> tuple[Repair, ...]:
+    """Return the repairs of a fault: after each of them it is gone."""
+    offered = (repair for kind in _KINDS for repair in kind(study, fault))
+    return tuple(repair for repair in offered if _removes(study, fault, repair))
+
+
+def _removes(study: Study, fault: Fault, repair: Repair) -> bool:
+    try:
+        after, _ = study.edited(*repair.edits)
+    except Refused:
+        return False
+    known = {(one.path, one.message) for one in study.faults}
+    found = {(one.path, one.message) for one in after.faults}
+    return (fault.path, fault.message) not in found and len(found) <= len(known)
+
+
+def _value(study: Study, path: tuple[str | int, ...]) -> Any:
+    value: Any = study.document
+    for step in path:
+        if not has(value, step):
+            return None
+        value = value[step]
+    return value
+
+
+def _meant(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the word that was meant, for a key or a value."""
+    if found := _MEANT.search(fault.hint):
+        word = found[1]
+        edit = Rename(fault.path, word) if fault.message == "unknown key" else Set(fault.path, word)
+        yield Repair(f'Use "{word}"', (edit,))
+
+
+def _surplus(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the removal of what does not belong there."""
+    message = fault.message
+    if message == "unknown key" or message.endswith("is there twice") or "belong" in message:
+        yield Repair("Remove", (Unset(fault.path),))
+    if message == "is not a language of the study":
+        yield Repair("Remove this text", (Unset(fault.path),))
+
+
+def _within_bounds(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the nearest permitted number."""
+    if found := _BOUND.search(fault.message):
+        number = float(found[1])
+        value = int(number) if number.is_integer() else number
+        yield Repair(f"Use {found[1]}", (Set(fault.path, value),))
+
+
+def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield a copy of the text in the first language, for languages that lack it."""
+    languages = _value(study, ("study", "languages"))
+    text = _value(study, fault.path)
+    if (found := _LANGUAGE.match(fault.message)) and isinstance(text, Mapping) and text:
+        first = next(iter(text))
+        yield Repair(f'Copy the text in "{first}"', (Set((*fault.path, found[1]), text[first]),))
+    elif fault.message.startswith("is in one language") and isinstance(text, str) and languages:
+        copies = dict.fromkeys(languages, text)
+        yield Repair("Use this text in every language", (Set(fault.path, copies),))
+
+
+def _steps(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the place in the session that a page or block lacks."""
+    sequence = _value(study, ("sequence",))
+    if fault.message == "comes nowhere in sequence" and isinstance(sequence, tuple):
+        at = max(len(sequence) - 1, 0)
+        yield Repair("Add to the session", (Insert(("sequence", at), fault.path[-1]),))
+
+
+def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the highest level that is not beyond a limit."""
+    levels = _value(study, fault.path)
+    if fault.path[:1] != ("stimuli",) or fault.path[-1:] != ("levels",) or not isinstance(levels, tuple):
+        return
+    if len(levels) == 2 and all(isinstance(level, int | float) for level in levels):
+        highest = highest_level(study, fault, *levels)
+        if highest is not None:
+            yield Repair(f"Highest level {shown(highest)}", (Set((*fault.path, 1), highest),))
+
+
+def highest_level(study: Study, fault: Fault, low: float, high: float) -> float | None:
+    """Return the highest level, in three digits, without this kind of fault; None where not even ``low`` is."""
+
+    def passes(level: float) -> bool:
+        after, _ = study.edited(Set((*fault.path, 1), level))
+        return not any(one.path == fault.path for one in after.faults)
+
+    least, most = low, high
+    for _ in range(_HALVINGS):
+        middle = (least + most) / 2
+        least, most = (middle, most) if passes(middle) else (least, middle)
+    for digits in (3, 4):
+        step = 10.0 ** _exponent(least, digits)
+        rounded = round(step * int(least / step + 1e-9), 12)
+        if low < rounded and passes(rounded):
+            return int(rounded) if rounded.is_integer() else rounded
+    return None
+
+
+def _exponent(value: float, digits: int) -> int:
+    """Return the power of ten of the last of so many digits."""
+    return int(f"{value:e}".split("e")[1]) - digits + 1
+
+
+_KINDS: Final[tuple[Callable[[Study, Fault], Iterator[Repair]], ...]] = (
+    _meant, _within_bounds, _levels, _texts, _steps, _surplus,
+)  # fmt: skip

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import pytest
+
+from study_app.authoring.repairs import repairs
+from study_app.authoring.study import Study, read
+from tests.authoring.grown import PROTOCOLS
+from tests.protocol.cases import CASES, Case
+
+
+def study_of(name: str, *changes: tuple[str, str]) -> Study:
+    text = (PROTOCOLS / f"{name}.toml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return read(text.encode(), PROTOCOLS)
+
+
+@pytest.mark.slow
+def test_each_repair_of_the_known_faults_removes_its_fault() -> None:
+    repaired = {case.name for case in CASES if _repaired(case)}
+    assert len(repaired) >= 30, sorted(repaired)
+
+
+def _repaired(case: Case) -> int:
+    study = read(case.text.encode())
+    count = 0
+    for fault in study.faults:
+        for repair in repairs(study, fault):
+            after, _ = study.edited(*repair.edits)
+            assert (fault.path, fault.message) not in {(one.path, one.message) for one in after.faults}
+            count += 1
+    return count
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("demo", ('liquid = "thick"', 'liquid = "thik"'), 'Use "thick"'),
+        ("demo", ("force_limit_n = 6", "force_limit_n = 60"), "Use 8"),
+        ("demo", ("blinding =", "blindin ="), 'Use "blinding"'),
+        ("demo", ('sequence = ["welcome", ', "sequence = ["), "Add to the session"),
+        (
+            "rek2024",
+            ('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'),
+            'Copy the text in "en"',
+        ),
+        ("rek2024", ('title = { en = "Welcome", nl = "Welkom" }', 'title = "Hi"'), "Use this text in every language"),
+    ],
+)
+def test_repairs_make_a_study_sound_again(name: str, change: tuple[str, str], words: str) -> None:
+    study = study_of(name, change)
+    (fault, *others) = study.faults
+    assert not others
+    (repair, *_) = repairs(study, fault)
+    assert repair.words == words
+    assert study.edited(*repair.edits)[0].protocol is not None
+
+
+def test_a_level_beyond_the_slope_limit_is_repaired_by_the_highest_that_passes() -> None:
+    study = study_of("viscosityjnd", ("levels = [0.02, 0.6]", "levels = [0.02, 3]"))
+    (fault,) = study.faults
+    (repair,) = repairs(study, fault)
+    assert repair.words.startswith("Highest level ")
+    after, _ = study.edited(*repair.edits)
+    assert after.protocol is not None
+    highest = after.document["stimuli"]["damping"]["levels"][1]
+    above = study.text.replace("levels = [0.02, 3]", f"levels = [0.02, {highest * 1.01}]")
+    assert read(above.encode()).protocol is None
