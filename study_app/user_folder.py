@@ -6,10 +6,11 @@ import os
 from pathlib import Path
 from typing import Final
 
-from platformdirs import user_cache_path, user_config_path
+from platformdirs import user_cache_path, user_config_path, user_data_path
 
 FOLDER_VARIABLE: Final = "LIQUID_STUDY_CONFIG"
 CACHE_VARIABLE: Final = "LIQUID_STUDY_CACHE"
+DATA_VARIABLE: Final = "LIQUID_STUDY_DATA"
 SETTINGS_NAME: Final = "machine.json"
 
 
@@ -25,6 +26,13 @@ def cache_folder() -> Path:
     if own := os.environ.get(CACHE_VARIABLE):
         return Path(own)
     return user_cache_path("liquid-study", appauthor=False, opinion=False)
+
+
+def data_folder() -> Path:
+    """Return where the program keeps drafts and earlier contents of studies; it need not exist yet."""
+    if own := os.environ.get(DATA_VARIABLE):
+        return Path(own)
+    return user_data_path("liquid-study", appauthor=False)
 
 
 def settings_file() -> Path:

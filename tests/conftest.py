@@ -23,6 +23,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 # Set here because fixtures of modules and sessions begin before those of a test.
 os.environ["LIQUID_STUDY_CONFIG"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "settings"))
 os.environ["LIQUID_STUDY_CACHE"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "cache"))
+os.environ["LIQUID_STUDY_DATA"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "data"))
 os.environ["LIQUID_STUDY_WORKSPACE"] = "."
 
 try:
@@ -67,6 +68,7 @@ def settings_of_nobody(tmp_path_factory: pytest.TempPathFactory, monkeypatch: py
     settings = tmp_path_factory.getbasetemp() / f"settings-{next(_settings)}"
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(settings))
     monkeypatch.setenv("LIQUID_STUDY_CACHE", str(settings.with_name(f"{settings.name}-cache")))
+    monkeypatch.setenv("LIQUID_STUDY_DATA", str(settings.with_name(f"{settings.name}-data")))
 
 
 @pytest.fixture(scope="session")

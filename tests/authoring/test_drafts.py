@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+import itertools
+import os
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from study_app.authoring.drafts import (
+    REST_S,
+    ChangedOutsideError,
+    Draft,
+    Keeper,
+    content_hash,
+    discard,
+    draft_of,
+    keep,
+    kept_content,
+    save,
+)
+from study_app.errors import StoreError
+
+KILLS = 50
+AT_ONCE = 10
+
+
+def test_a_draft_is_found_again_until_it_is_discarded(tmp_path: Path) -> None:
+    file = tmp_path / "new.toml"
+    assert draft_of(file) is None
+    keep(file, Draft("a = 'é'\r\n", "abc", ("blocks", "a", 1)))
+    found = draft_of(file)
+    assert found is not None
+    assert (found.text, found.base, found.selected) == ("a = 'é'\r\n", "abc", ("blocks", "a", 1))
+    assert found.kept_at
+    assert draft_of(tmp_path / "other.toml") is None
+    discard(file)
+    discard(file)
+    assert draft_of(file) is None
+
+
+def test_keeper_writes_within_its_rest_however_fast_edits_follow(tmp_path: Path) -> None:
+    keeper = Keeper(tmp_path / "a.toml", "")
+    written = []
+    for tick in range(300):
+        now = tick / 100
+        keeper.edited("x" * tick, (), now)
+        if keeper.write_if_due(now):
+            written.append(now)
+    assert written[0] == REST_S
+    assert max(later - earlier for earlier, later in itertools.pairwise(written)) <= REST_S + 0.02
+    assert keeper.write()
+    assert not keeper.write()
+    assert not keeper.write_if_due(99)
+    found = draft_of(tmp_path / "a.toml")
+    assert found is not None
+    assert found.text == "x" * 299
+    keeper.saved("hash")
+    assert draft_of(tmp_path / "a.toml") is None
+
+
+def test_save_replaces_the_file_keeps_its_permissions_and_its_previous_content(tmp_path: Path) -> None:
+    file, link = tmp_path / "study.toml", tmp_path / "link.toml"
+    file.write_bytes(b"a = 1\r\n")
+    file.chmod(0o640)
+    link.symlink_to(file)
+    base = content_hash(b"a = 1\r\n")
+    after = save(link, "a = 2\r\n", base)
+    assert file.read_bytes() == b"a = 2\r\n"
+    assert link.is_symlink()
+    assert file.stat().st_mode & 0o777 == 0o640
+    assert kept_content(base) == b"a = 1\r\n"
+    assert kept_content(after) == b"a = 2\r\n"
+    assert kept_content("0" * 64) is None
+
+
+def test_save_refuses_a_file_that_another_program_changed(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    base = save(file, "a = 1\n", "")
+    with pytest.raises(ChangedOutsideError, match="changed by another program"):
+        save(file, "a = 2\n", "")
+    file.write_text("b = 1\n")
+    with pytest.raises(ChangedOutsideError, match="changed by another program"):
+        save(file, "a = 2\n", base)
+    assert file.read_text() == "b = 1\n"
+    file.unlink()
+    with pytest.raises(ChangedOutsideError, match="deleted or moved"):
+        save(file, "a = 2\n", base)
+
+
+def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keeper = Keeper(tmp_path / "a.toml", "")
+    keeper.edited("x", (), 0.0)
+    monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "file"))
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(StoreError, match="cannot be made"):
+        keeper.write()
+    (tmp_path / "file").unlink()
+    assert keeper.write()
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"text": 1, "base": "", "selected": [], "kept_at": ""}'])
+def test_a_broken_draft_is_none(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "a.toml"
+    keep(file, Draft("x", ""))
+    (path,) = Path(os.environ["LIQUID_STUDY_DATA"], "drafts").glob("*.json")
+    path.write_bytes(content)
+    assert draft_of(file) is None
+
+
+TYPING = """
+import sys, time
+from pathlib import Path
+from study_app.authoring.drafts import Keeper
+keeper, letters = Keeper(Path(sys.argv[1]), "base"), 0
+while True:
+    letters += 1
+    keeper.edited("x" * letters, ("study", "title"), time.monotonic())
+    print(letters, time.time(), flush=True)
+    keeper.write_if_due(time.monotonic())
+    time.sleep(0.005)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="needs SIGKILL")
+def test_a_kill_while_typing_loses_at_most_the_last_second(tmp_path: Path) -> None:
+    draw = random.Random(1)  # noqa: S311
+    drafts = 0
+    for start in range(0, KILLS, AT_ONCE):
+        files = [tmp_path / f"study_{number}.toml" for number in range(start, start + AT_ONCE)]
+        for file in files:
+            file.write_text("a = 1\n")
+        outs = [file.with_suffix(".out") for file in files]
+        typing = []
+        for file, out in zip(files, outs, strict=True):
+            with out.open("wb") as stdout:
+                typing.append(subprocess.Popen([sys.executable, "-c", TYPING, str(file)], stdout=stdout))
+        while not all(out.stat().st_size for out in outs):
+            time.sleep(0.01)
+        for process in typing:
+            time.sleep(draw.uniform(0.0, 0.3))
+            process.kill()
+            process.wait()
+        drafts += sum(_kept(file, out) for file, out in zip(files, outs, strict=True))
+    assert drafts >= KILLS // 2
+
+
+def _kept(file: Path, out: Path) -> bool:
+    """Check what is left of a study whose typing was killed; return whether there is a draft."""
+    assert file.read_text() == "a = 1\n"
+    times = [float(line.split()[1]) for line in out.read_text().splitlines() if len(line.split()) == 2]
+    draft = draft_of(file)
+    letters = 0 if draft is None else len(draft.text)
+    assert draft is None or draft.text == "x" * letters
+    lost = times[letters:]
+    assert not lost or lost[-1] - lost[0] <= 1.0, (letters, len(times))
+    return draft is not None
