@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from study_app.authoring.templates import templates
 from study_app.cli.device_options import DeviceName, TakesDeviceOptions, given
 from study_app.cli.options import FILE, RESULTS, Target, keep_offered_workspace, takes_session
 from study_app.devices.names import DEFAULT_DEVICE
@@ -45,6 +46,21 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
         click.echo(describe.describe_scenes(load.load_scenes(protocol)))
     else:
         click.echo(describe.describe(load.load(protocol, delay_ticks=delay_ticks)))
+
+
+@click.command()
+@click.argument("name", metavar="NAME")
+@click.option(
+    "--template", metavar="T", default="empty", show_default=True, help=f"What it begins as: {', '.join(templates())}."
+)
+def new(name: str, template: str) -> None:
+    """Make a study of your own from a template, in the workspace's protocols."""
+    from study_app.authoring import new_study
+
+    study = new_study.template(template)
+    keep_offered_workspace()
+    file = new_study.write_new(study, name)
+    click.echo(f"{file}: edit it, then see all of it by liquid-study check {name}")
 
 
 @click.command()

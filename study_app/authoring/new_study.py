@@ -1,0 +1,68 @@
+"""New studies: a copy of a template or of another study, with a name of its own."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Final
+
+from study_app.authoring.drafts import ChangedOutsideError, save
+from study_app.authoring.study import Study, read
+from study_app.authoring.templates import FOLDER, templates
+from study_app.authoring.writer.edits import Set
+from study_app.authoring.writer.refused import Refused
+from study_app.protocol.source.files import shipped
+from study_app.protocol.source.problems import did_you_mean
+from study_app.workspace import workspace
+
+FIRST_VERSION: Final = "0.1"
+_NAME: Final = re.compile(r"[a-z][a-z0-9]{0,39}")
+_SELF: Final = "liquid-study check NAME"
+
+
+def template(name: str) -> Study:
+    """Return a template.
+
+    Raises
+    ------
+    Refused
+        There is none of this name.
+    """
+    if name not in templates():
+        raise Refused(f'there is no template "{name}": {did_you_mean(name, templates())}')
+    return read((FOLDER / f"{name}.toml").read_bytes())
+
+
+def copy_of(study: Study, name: str) -> Study:
+    """Return a copy of a study under another name, comments included, as version 0.1.
+
+    Raises
+    ------
+    Refused
+        The name is not permitted, or the study cannot be read.
+    """
+    if not _NAME.fullmatch(name):
+        raise Refused(f'"{name}" is not a name of a study: write at most 40 small letters and digits, a letter first')
+    if name in shipped():
+        raise Refused(f'"{name}" is a study that ships with the program: choose another name')
+    named = Study(study.text.replace(_SELF, f"liquid-study check {name}"), study.folder)
+    return named.edited(Set(("study", "name"), name), Set(("study", "version"), FIRST_VERSION))[0]
+
+
+def write_new(study: Study, name: str) -> Path:
+    """Write a copy of a study into the workspace's protocols and return its file.
+
+    Raises
+    ------
+    Refused
+        The name is not permitted, or taken.
+    StoreError
+        It cannot be written.
+    """
+    file = workspace().protocols / f"{name}.toml"
+    text = copy_of(study, name).text
+    try:
+        save(file, text, "")
+    except ChangedOutsideError as error:
+        raise Refused(f"{file} is already there: choose another name") from error
+    return file

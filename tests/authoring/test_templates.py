@@ -1,0 +1,104 @@
+"""Templates: each is a study that works, and ``liquid-study new`` makes a study of one's own of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from study_app.authoring.new_study import copy_of, template
+from study_app.authoring.study import read
+from study_app.authoring.templates import FOLDER, templates
+from study_app.authoring.writer.refused import Refused
+from study_app.cli import commands
+from study_app.errors import StudyError
+from study_app.protocol.checks.level_warnings import level_warnings
+from study_app.protocol.describe import describe
+from study_app.protocol.load import load
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.folders import StudyFolder
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+
+WANTED = {"compare-liquids", "viscosity-jnd", "delay-detection", "rate-realism", "questionnaire-only", "empty"}
+
+
+def test_the_templates_are_these() -> None:
+    assert set(templates()) == WANTED
+
+
+@pytest.mark.parametrize("name", templates())
+def test_each_template_passes_check_and_warns_of_nothing_but_practice_at_the_same_liquid(name: str) -> None:
+    protocol = load(FOLDER / f"{name}.toml")
+    assert protocol == template(name).protocol
+    warnings = describe(protocol).partition("\nWarnings\n")[2].splitlines()
+    assert len(warnings) <= bool(protocol.stimuli), warnings
+    assert all("participants know it from the practice" in warning for warning in warnings)
+    assert not list(level_warnings(protocol))
+    assert protocol.study.version == "0.1"
+
+
+@pytest.mark.slow
+@needs_servo
+@pytest.mark.parametrize("name", templates())
+def test_each_template_is_rehearsed(name: str, tmp_path: Path) -> None:
+    folder = rehearse(str(FOLDER / f"{name}.toml"), participants=1, seed=1, results=tmp_path / name, recordings=False)
+    assert len(StudyFolder(folder).sessions()) == 1
+    assert not verify(folder).violations
+
+
+def new(*words: str) -> Result:
+    return CliRunner().invoke(commands, ["new", *words])
+
+
+@pytest.fixture
+def protocols(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    return tmp_path / "protocols"
+
+
+@pytest.mark.parametrize("name", templates())
+def test_new_writes_a_sound_copy_with_its_comments_into_the_workspace(name: str, protocols: Path) -> None:
+    assert new("mine", "--template", name).exit_code == 0
+    text = (protocols / "mine.toml").read_text(encoding="utf-8")
+    assert text.count("#") == (FOLDER / f"{name}.toml").read_text(encoding="utf-8").count("#")
+    assert "liquid-study check mine" in text
+    protocol = load("mine")
+    assert (protocol.study.name, protocol.study.version) == ("mine", "0.1")
+
+
+def test_new_refuses_to_overwrite(protocols: Path) -> None:
+    assert new("mine").exit_code == 0
+    before = (protocols / "mine.toml").read_bytes()
+    again = new("mine", "--template", "rate-realism")
+    assert isinstance(again.exception, Refused)
+    assert "is already there: choose another name" in str(again.exception)
+    assert (protocols / "mine.toml").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("My study",), "at most 40 small letters and digits"),
+        (("../mine",), "at most 40 small letters and digits"),
+        (("demo",), "ships with the program"),
+        (("mine", "--template", "viscosity-jd"), 'did you mean "viscosity-jnd"'),
+    ],
+)
+def test_new_refuses_what_it_cannot_make(words: tuple[str, ...], sentence: str, protocols: Path) -> None:
+    refused = new(*words)
+    assert isinstance(refused.exception, StudyError)
+    assert sentence in str(refused.exception)
+    assert "\n" not in str(refused.exception)
+    assert not list(protocols.glob("*"))
+
+
+def test_copy_of_a_shipped_study_keeps_its_comments() -> None:
+    original = load("rek2024")
+    text = (FOLDER.parents[2] / "protocols" / "rek2024.toml").read_text(encoding="utf-8")
+    copied = copy_of(read(text.encode()), "ours")
+    assert copied.protocol is not None
+    assert copied.protocol.liquids == original.liquids
+    lines = [pair for pair in zip(text.splitlines(), copied.text.splitlines(), strict=True) if pair[0] != pair[1]]
+    assert [new.split("#")[0].strip() for _, new in lines] == ['name = "ours"', 'version = "0.1"']
