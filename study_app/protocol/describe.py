@@ -72,10 +72,11 @@ def describe_scenes(scenes: Mapping[str, Scene]) -> str:
 def expected_duration_s(protocol: Protocol) -> float:
     """Return how long a session will take [s], between the shortest and the longest it can be."""
     language = protocol.study.languages[0]
-    return sum(_step_s(protocol, step, language) for step in protocol.steps)
+    return sum(step_duration_s(protocol, step, language) for step in protocol.steps)
 
 
-def _step_s(protocol: Protocol, step: str, language: str) -> float:
+def step_duration_s(protocol: Protocol, step: str, language: str) -> float:
+    """Return how long a page, form or block will take [s], read in one of the study's languages."""
     if step in protocol.pages:
         return _reading_s(protocol, step, language)
     if step in protocol.forms:
@@ -332,14 +333,19 @@ def _analysis(protocol: Protocol) -> list[tuple[str, str]]:
 
 def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:
     """Yield what to think over, if there is anything."""
-    if warnings := (
+    if sentences := warnings(protocol):
+        yield "Warnings", *(f"  {sentence}" for sentence in sentences)
+
+
+def warnings(protocol: Protocol) -> tuple[str, ...]:
+    """Return what is permitted and may still be a mistake, a sentence each."""
+    return (
         *liquid_summary.warnings(protocol),
         *level_warnings(protocol),
         *delay_warnings(protocol),
         *_incomplete(protocol),
         *from_memory(protocol),
-    ):
-        yield "Warnings", *(f"  {warning}" for warning in warnings)
+    )
 
 
 def _incomplete(protocol: Protocol) -> Iterator[str]:

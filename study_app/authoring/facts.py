@@ -1,0 +1,98 @@
+"""Facts of a study that follow every edit: its length, trials, forces, balance, missing texts and warnings."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Final
+
+from study_app.authoring.study import Study
+from study_app.errors import StudyError
+from study_app.haptics.model.steady_state import HAND_MPS, steady
+from study_app.protocol.describe import expected_duration_s, step_duration_s, warnings
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.balance import balances, numbered
+from study_app.protocol.orders.block_orders import orders_of
+
+MOST_PARTICIPANTS: Final = 200
+_MISSING: Final = re.compile(r'is missing in "([a-z]{2})"$')
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a study is, in numbers; of a study with faults only the texts that are missing are known.
+
+    Attributes
+    ----------
+    expected_s : float or None
+        How long a session will take [s].
+    steps_s : dict of str to float
+        How long each page, form and block will take [s], by its id.
+    trials, answers, breaks : int or None
+        How many a complete session has at most, practice included.
+    forces_n : dict of str to float
+        Force of each liquid [N] against a hand at 0.1 m/s.
+    missing : dict of str to int
+        How many texts each language lacks; none where it lacks none.
+    warnings : tuple of str
+        The warnings of ``check``.
+    """
+
+    expected_s: float | None = None
+    steps_s: dict[str, float] = field(default_factory=dict)
+    trials: int | None = None
+    answers: int | None = None
+    breaks: int | None = None
+    forces_n: dict[str, float] = field(default_factory=dict)
+    missing: dict[str, int] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+def facts(study: Study) -> Facts:
+    """Return the facts of a study."""
+    missing: dict[str, int] = {}
+    for fault in study.faults:
+        if found := _MISSING.match(fault.message):
+            missing[found[1]] = missing.get(found[1], 0) + 1
+    if (protocol := study.protocol) is None:
+        return Facts(missing=missing)
+    orders, language = orders_of(protocol), protocol.study.languages[0]
+    return Facts(
+        expected_s=expected_duration_s(protocol),
+        steps_s={step: step_duration_s(protocol, step, language) for step in protocol.steps},
+        trials=sum(block.trials for block in orders.blocks),
+        answers=orders.answers,
+        breaks=sum(block.breaks for block in orders.blocks),
+        forces_n={name: steady(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids},
+        missing=missing,
+        warnings=warnings(protocol),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Evenness:
+    """Whether the orders of so many participants are balanced in position and carry-over, and of how many they are.
+
+    ``next_even`` is the smallest number from ``participants`` on; None where none up to 200 is, as with random orders.
+    """
+
+    participants: int
+    balanced: bool
+    next_even: int | None
+
+
+def balance_of(protocol: Protocol, participants: int, seed: int = 1) -> Evenness:
+    """Return how balanced the orders of a number of participants are."""
+    counts = range(participants, max(participants, MOST_PARTICIPANTS if protocol.deals_rows else 0) + 1)
+    return Evenness(
+        participants,
+        _balanced(protocol, participants, seed),
+        next((count for count in counts if _balanced(protocol, count, seed)), None),
+    )
+
+
+def _balanced(protocol: Protocol, participants: int, seed: int) -> bool:
+    try:
+        return all(one.balanced for one in balances(protocol, numbered(participants), seed))
+    except StudyError:
+        return False
