@@ -14,7 +14,7 @@ from study_app.protocol.source.document import has
 from study_app.protocol.source.problems import Fault, shown
 
 _MEANT: Final = re.compile(r'did you mean "([^"]+)"\?')
-_BOUND: Final = re.compile(r"must be (?:at least|at most) (\S+)$")
+_BOUND: Final = re.compile(r"must be (?:at least |at most )?([\d.e+-]+)(?: |$)")
 _LANGUAGE: Final = re.compile(r'is missing in "([a-z]{2})"$')
 _HALVINGS: Final = 12
 

@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import pytest
+
+from study_app.authoring.additions import added
+from study_app.authoring.fields import row_at
+from study_app.authoring.study import read
+from study_app.authoring.writer.refused import Refused
+from study_app.protocol.source.document import Path
+from tests.authoring.grown import PROTOCOLS
+
+SECTIONS: tuple[Path, ...] = (
+    ("liquids",), ("conditions",), ("tasks",), ("scales",), ("questionnaires",), ("pages",), ("blocks",),
+    ("questionnaires", "liquid", "items"),
+)  # fmt: skip
+KINDS = ("choice", "number", "rating", "slider", "text")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("study", ["demo", "rek2024", "slime"])
+@pytest.mark.parametrize("section", SECTIONS, ids=".".join)
+def test_a_new_element_passes_check(study: str, section: Path) -> None:
+    before = read((PROTOCOLS / f"{study}.toml").read_bytes(), PROTOCOLS)
+    edits, path = added(before, section)
+    after, _ = before.edited(*edits)
+    assert row_at(after.document, path) is not None
+    assert after.faults == (), after.faults
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_new_question_of_each_kind_passes_check(kind: str) -> None:
+    before = read((PROTOCOLS / "slime.toml").read_bytes(), PROTOCOLS)
+    edits, path = added(before, ("questionnaires", "liquid", "items"), {"kind": kind})
+    after, _ = before.edited(*edits)
+    assert after.faults == (), after.faults
+    assert after.document["questionnaires"]["liquid"]["items"][path[-1]]["kind"] == kind
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["explore", "reach", "follow"])
+def test_a_new_task_of_each_kind_passes_check(kind: str) -> None:
+    before = read((PROTOCOLS / "slime.toml").read_bytes(), PROTOCOLS)
+    edits, _ = added(before, ("tasks",), {"kind": kind})
+    assert before.edited(*edits)[0].faults == ()
+
+
+def test_nothing_is_added_to_what_holds_no_elements() -> None:
+    study = read((PROTOCOLS / "demo.toml").read_bytes())
+    with pytest.raises(Refused, match="nothing can be added to Device"):
+        added(study, ("device",))
