@@ -20,7 +20,7 @@ from numpydoc.validate import validate
 from study_app.haptics.runtime import offline
 from tests.compiled import needs_servo
 
-PACKAGES = ("haptics", "protocol", "psychophysics", "session", "store", "analysis.statistics")
+PACKAGES = ("haptics", "protocol", "psychophysics", "session", "store", "authoring", "analysis.statistics")
 NOT_ASKED = {
     "ES01": "an extended summary",
     "EX01": "an example everywhere",

@@ -26,12 +26,12 @@ def header_text(path: Iterable[str | int]) -> str:
 
 
 def written(value: Any, like: str = "", newline: str = "\n", indent: str = "", column: int = 0) -> str:
-    """Return a value as TOML.
+    """Return a value, as ``tomllib`` reads it, as TOML.
 
     Parameters
     ----------
-    value : object
-        A value as ``tomllib`` reads it.
+    value : str or bool or int or float
+        Or a date, a table or an array.
     like : str
         The text of the value that it replaces, or of a neighbour: its quotes and its lines are kept where possible.
     newline, indent : str
