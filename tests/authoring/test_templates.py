@@ -39,9 +39,15 @@ def test_each_template_passes_check_and_warns_of_nothing_but_practice_at_the_sam
     assert protocol.study.version == "0.1"
 
 
+ADAPTIVE = {"viscosity-jnd", "delay-detection"}
+"""Where answers choose levels a rehearsal takes a minute."""
+
+
 @pytest.mark.slow
 @needs_servo
-@pytest.mark.parametrize("name", templates())
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.nightly if name in ADAPTIVE else ()) for name in templates()]
+)
 def test_each_template_is_rehearsed(name: str, tmp_path: Path) -> None:
     folder = rehearse(str(FOLDER / f"{name}.toml"), participants=1, seed=1, results=tmp_path / name, recordings=False)
     assert len(StudyFolder(folder).sessions()) == 1
