@@ -10,6 +10,7 @@ import copy
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeAlias
 
 from study_app.authoring.writer import arrays, keys
@@ -88,7 +89,7 @@ def apply(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
     WriterError
         The edit was written wrongly; this is a bug.
     """
-    document = tomllib.loads(text)
+    document = _read(text)
     meant = meaning(document, edit)
     steps: list[Splices] = []
     parts = list(_parts(document, edit))
@@ -103,12 +104,18 @@ def apply(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
             steps.append(editor.splices)
             text = applied(text, editor.splices)
     try:
-        found = tomllib.loads(text)
+        found = _read(text)
     except tomllib.TOMLDecodeError as error:
         raise WriterError(f"{edit} made a text that is not TOML: {error}") from error
-    if not same(_pruned(found, edit.path), _pruned(meant, edit.path)):
+    if not same(found, meant) and not same(_pruned(copy.deepcopy(found), edit.path), _pruned(meant, edit.path)):
         raise WriterError(f"{edit} made another document than the one meant")
     return text, tuple(steps)
+
+
+@lru_cache(maxsize=4)
+def _read(text: str) -> Document:
+    """Return the document of a text, which must not be changed."""
+    return tomllib.loads(text)
 
 
 def meaning(document: Mapping[str, Any], edit: Edit) -> Document:

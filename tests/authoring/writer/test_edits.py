@@ -126,9 +126,9 @@ def unmeant_changes(before: str, after: str, edit: Edit) -> list[Path]:
 
 def check_edit(text: str, edit: Edit) -> tuple[str, list[Splices]]:
     meant = meaning(tomllib.loads(text), edit)
-    begin = time.perf_counter()
+    begin = time.thread_time()
     after, steps = apply(text, edit)
-    TIMES.append(1000 * (time.perf_counter() - begin))
+    TIMES.append(1000 * (time.thread_time() - begin))
     found = tomllib.loads(after)
     changed = text
     for step in steps:

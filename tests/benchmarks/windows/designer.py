@@ -1,4 +1,4 @@
-"""How long edits of a study take: python tests/benchmarks/windows/designer.py [EDITS] prints milliseconds.
+"""How long edits of a study take: python tests/benchmarks/windows/designer.py [EDITS] prints milliseconds of a core.
 
 Edits are random, of every kind, over every protocol and the grown studies of the tests; each is checked as the tests do
 (document, values it does not concern, comments, undo), and the first one that is written wrongly ends the run.
