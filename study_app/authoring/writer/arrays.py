@@ -69,15 +69,15 @@ def _indent(spans: Spans, slot: Slot) -> str:
     return re.match(r"[ \t]*", spans.text[spans.text.rfind("\n", 0, slot.entry) + 1 :]).group()  # type: ignore[union-attr]
 
 
-def _append(spans: Spans, edit: Editor, last: Slot, body: str) -> None:
-    """Add lines after the line on which an entry ends; a missing comma is added before them."""
+def _append(spans: Spans, edit: Editor, last: Slot, body: str, tail: str = "") -> None:
+    """Add lines after the line on which an entry ends, with a comment behind; a missing comma is added before them."""
     newline = spans.newline
     comma = _TO_COMMA.match(spans.text, last.end)
     if comma is None:
         edit.insert(last.end, ",")
-        edit.insert(last.tail_end, f"{newline}{_indent(spans, last)}{body}")
+        edit.insert(last.tail_end, f"{newline}{_indent(spans, last)}{body}{tail}")
         return
-    edit.insert(max(comma.end(), last.tail_end), f"{newline}{_indent(spans, last)}{body},")
+    edit.insert(max(comma.end(), last.tail_end), f"{newline}{_indent(spans, last)}{body},{tail}")
 
 
 def _insert_table(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
@@ -126,17 +126,13 @@ def copy(spans: Spans, edit: Editor, path: Path) -> None:
         return
     slots = spans.slots(array)
     slot = slots[index]
-    body = text[slot.entry : slot.end]
-    if not slot.own_line and slot.tail_end == slot.tail:
-        edit.insert(slot.end, f", {body}")
-        return
-    if not slot.own_line:  # the comment behind it ends the line
-        _append(spans, edit, slot, body)
-        return
-    if index == len(slots) - 1:
-        _append(spans, edit, slot, text[slot.start + len(_indent(spans, slot)) : slot.end])
-        return
-    edit.insert(slots[index + 1].start, f"{text[slot.start : slot.end]},{text[slot.tail : slot.tail_end]}{newline}")
+    tail = text[slot.tail : slot.tail_end]
+    if not slot.own_line and not tail:
+        edit.insert(slot.end, f", {text[slot.entry : slot.end]}")
+    elif slot.own_line and index < len(slots) - 1:
+        edit.insert(slots[index + 1].start, f"{text[slot.start : slot.end]},{tail}{newline}")
+    else:  # the comment behind it ends the line
+        _append(spans, edit, slot, text[slot.start : slot.end].lstrip(" \t"), tail)
 
 
 def _lines(text: str, piece: Piece, newline: str) -> str:
