@@ -83,7 +83,7 @@ class Evenness:
 
 def balance_of(protocol: Protocol, participants: int, seed: int = 1) -> Evenness:
     """Return how balanced the orders of a number of participants are."""
-    counts = range(participants, max(participants, MOST_PARTICIPANTS if protocol.deals_rows else 0) + 1)
+    counts = range(participants, max(participants, MOST_PARTICIPANTS if protocol.assigns_rows else 0) + 1)
     return Evenness(
         participants,
         _balanced(protocol, participants, seed),

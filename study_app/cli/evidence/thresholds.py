@@ -82,19 +82,14 @@ def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
 
     The forced choice does not depend on a person's criterion; the rating does.
     """
-    from study_app import figure_style as style
     from study_app.store.output_files import write_files
     from study_app.validation.thresholds.noticed_delays import compare, markdown
-    from study_app.validation.thresholds.noticed_figure import CAPTION, TITLE, draw
+    from study_app.validation.thresholds.noticed_figure import figure_files
 
     with progress() as show:
         show("simulating people")
         found = compare(people, seed)
     click.echo(markdown(found), nl=False)
     if to is not None:
-        files = {"delay-thresholds.md": markdown(found).encode(), "delay-thresholds.txt": f"{CAPTION}\n".encode()}
-        for form in style.FORMATS:
-            drawn = draw(found, style.fonts_for(form)).figure
-            files[f"delay-thresholds.{form}"] = style.file_bytes(drawn, form, TITLE)
-        for path in write_files(to, files):
+        for path in write_files(to, {"delay-thresholds.md": markdown(found).encode(), **figure_files(found)}):
             click.echo(path)

@@ -43,6 +43,15 @@ def draw(found: Compared, fonts: Sequence[str]) -> Sheet:
     return sheet
 
 
+def figure_files(found: Compared) -> dict[str, bytes]:
+    """Return the figure in each format and its caption, by file name."""
+    figures = {
+        f"delay-thresholds.{form}": style.file_bytes(draw(found, style.fonts_for(form)).figure, form, TITLE)
+        for form in style.FORMATS
+    }
+    return {"delay-thresholds.txt": f"{CAPTION}\n".encode(), **figures}
+
+
 def _heads(sheet: Sheet, left: float, right: float) -> None:
     for x, above, below in (
         (left, "Answers at each delay", "Delay, ms"),
