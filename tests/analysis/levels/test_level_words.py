@@ -24,6 +24,10 @@ from tests.compiled import needs_servo
 GOOD = ThresholdFound(
     "P001", 8.0, 100, 0.2, 0.15, 0.27, width=1.4, lapse=0.01, guess=0.5, flat_width=0.205, fit_p=0.4, drift=0.05
 )
+DEVICE = (
+    "Block: the device's own damping, friction and mass are unknown, since they were not measured; Weber fractions are "
+    "of what the motors delivered, and smaller ones of the sum with the device's own."
+)
 MOTORS = "Block: motors are audible and were not masked: participants may have used their sound."
 
 
@@ -41,8 +45,10 @@ def people(*changed: ThresholdFound) -> list[ThresholdFound]:
     return [*changed, *(replace(GOOD, participant=f"P10{number}") for number in range(3))]
 
 
-def test_good_thresholds_have_one_limit() -> None:
-    assert list(level_limits(found(*people()))) == [MOTORS]
+def test_good_thresholds_have_the_limits_of_the_device_alone() -> None:
+    good = found(*people())
+    assert list(level_limits(good)) == [DEVICE, MOTORS]
+    assert list(level_limits(replace(good, level_kind="difference"))) == [MOTORS]
 
 
 def test_findings_state_threshold_interval_n_and_exponent() -> None:
@@ -79,7 +85,7 @@ def test_each_limit_names_whose_threshold_it_is(changes: dict[str, float | str],
     first, *rest = level_limits(found(*people(replace(GOOD, **changes))))  # type: ignore[arg-type]  # any field
     assert first.startswith(f"Block: {words}")
     assert first.endswith("(P001).")
-    assert rest == [MOTORS]
+    assert rest == [DEVICE, MOTORS]
 
 
 def test_several_standards_are_named_and_many_thresholds_counted() -> None:
@@ -90,12 +96,12 @@ def test_several_standards_are_named_and_many_thresholds_counted() -> None:
 
 
 def test_two_participants_give_no_group_interval() -> None:
-    *_, few, motors = level_limits(found(GOOD, replace(GOOD, participant="P002")))
+    *_, few, device, motors = level_limits(found(GOOD, replace(GOOD, participant="P002")))
     assert (
         few
         == "Block: two participants; below 3 the group has no interval, since differences between people are not known."
     )
-    assert motors == MOTORS
+    assert (device, motors) == (DEVICE, MOTORS)
 
 
 def test_a_block_without_thresholds_has_no_such_limits() -> None:

@@ -40,6 +40,11 @@ def level_limits(found: LevelsFound) -> Iterator[str]:
             f"{found.title}: {counted(people, 'participant')}; below {FEWEST} the group has no interval, since "
             "differences between people are not known."
         )
+    if found.level_kind == "weber":
+        yield (
+            f"{found.title}: the device's own damping, friction and mass are unknown, since they were not measured; "
+            "Weber fractions are of what the motors delivered, and smaller ones of the sum with the device's own."
+        )
     yield f"{found.title}: motors are audible and were not masked: participants may have used their sound."
 
 
