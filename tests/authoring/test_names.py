@@ -37,15 +37,6 @@ def things(document: Any) -> list[Path]:
     return [*tables, *(path for path, _ in entries(document, "questionnaires.*.items.*"))]
 
 
-def other_names(value: Any, old: str, new: str) -> Any:
-    """Return a dumped schedule with a name replaced where it stands alone."""
-    if isinstance(value, dict):
-        return {other_names(key, old, new): other_names(inner, old, new) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [other_names(inner, old, new) for inner in value]
-    return new if value == old else value
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_renamed_leaves_no_reference_and_no_session_changed(name: str) -> None:
@@ -58,6 +49,9 @@ def test_renamed_leaves_no_reference_and_no_session_changed(name: str) -> None:
         assert study.protocol is not None
         before, after = (build_schedule(one.protocol, "P001", 1).steps for one in (study, changed))
         assert [type(step) for step in before] == [type(step) for step in after]
+        if thing[0] in {"liquids", "conditions", "tasks", "scales", "pages"}:  # other names are those of random streams
+            named = repr(before).replace(f"'{thing[1]}'", "'quite_other'")
+            assert repr(after) in {repr(before), named}, thing
         back, _ = changed.edited(*renamed(changed.document, _renamed(thing), str(_name(study.document, thing))))
         assert back.text == study.text
 

@@ -191,6 +191,7 @@ def walk(random: Random, text: str, count: int) -> int:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 @settings(max_examples=EDITS // 8 or 25, deadline=None, derandomize=not EDITS, database=None, phases=[Phase.generate])
 @given(st.sampled_from([*TEXTS, *["grown", "grown, \\r\\n"] * 8]), st.integers(0, 2**32))
 def test_edits_change_what_is_meant_and_undo_gives_every_byte_back(name: str, seed: int) -> None:
