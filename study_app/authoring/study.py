@@ -8,14 +8,14 @@ from functools import cached_property
 from pathlib import Path as File
 from typing import Any
 
-from study_app.authoring.writer.edits import Edit, Unset, WriterError, apply
+from study_app.authoring.writer.edits import Edit, Unset, WriterError, apply, check_encodable
 from study_app.authoring.writer.refused import Refused
 from study_app.authoring.writer.splices import Splice, Splices, applied
 from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import examined, located, read_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
-from study_app.protocol.source.liquid_files import with_liquid_files
+from study_app.protocol.source.liquid_files import TABLE, with_liquid_files
 from study_app.protocol.source.problems import Fault
 
 __all__ = ["Refused", "Study", "WriterError", "read"]
@@ -41,12 +41,16 @@ class Study:
 
     @cached_property
     def _read(self) -> tuple[Mapping[str, Any], Protocol | None, tuple[Fault, ...], tuple[Problem, ...]]:
+        own = self.text.encode()
+        source = with_liquid_files(own, self.folder)
         try:
-            document, places = read_document(with_liquid_files(self.text.encode(), self.folder), "")
+            document, places = read_document(source, "")
         except ProtocolError as error:
             faults = tuple(Fault((), problem.message, problem.hint) for problem in error.problems)
             return self.before, None, faults, error.problems
         protocol, found = examined(document)
+        if source != own:
+            document = {key: value for key, value in document.items() if key != TABLE}
         return document, protocol, tuple(found), located(found, places)
 
     @property
@@ -98,7 +102,14 @@ class Study:
         return self._with(text), tuple(steps)
 
     def typed(self, text: str) -> tuple[Study, tuple[Splices, ...]]:
-        """Return the study with another text, and the one splice that makes it."""
+        """Return the study with another text, and the one splice that makes it.
+
+        Raises
+        ------
+        Refused
+            The text cannot be written as UTF-8.
+        """
+        check_encodable(text)
         old, shortest, first, last = self.text, min(len(self.text), len(text)), 0, 0
         while first < shortest and old[first] == text[first]:
             first += 1

@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from study_app.authoring.fields import rows
 from study_app.authoring.history import MOST_STEPS, History
 from study_app.authoring.study import read
 from study_app.authoring.writer.edits import Set, Unset
@@ -70,6 +73,22 @@ def test_a_text_that_is_not_toml_keeps_its_last_document_and_is_typed_on() -> No
         broken.edited("Change", Set(("format",), 2))
     assert broken.typed("Type", DEMO.text).study.protocol == DEMO.protocol
     assert broken.undo().study.text == DEMO.text
+
+
+def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> None:
+    (tmp_path / "thick.toml").write_text("[liquids.any]\ndensity_kg_m3 = 1400\n")
+    own = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]'
+    text = DEMO.text.replace(own, '[liquids.thick]\nfile = "thick.toml"')
+    study = read(text.encode(), tmp_path)
+    assert study.protocol is not None
+    assert set(study.document) == set(DEMO.document)
+    assert study.document["liquids"]["thick"] == {"file": "thick.toml"}
+    assert not [row for row in rows(study.document, ("liquids", "thick")) if row.kind == "unknown"]
+
+
+def test_typed_refuses_half_a_character() -> None:
+    with pytest.raises(Refused, match="half a character"):
+        DEMO.typed(DEMO.text + "# \ud800")
 
 
 def test_read_refuses_what_is_not_utf_8() -> None:

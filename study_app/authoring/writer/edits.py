@@ -206,7 +206,19 @@ def _check_value(value: Any) -> None:
             _check_value(part)
     elif value is None:
         raise Refused("nothing is not a value: remove the key")
-    elif isinstance(value, str) and any("\ud800" <= letter <= "\udfff" for letter in value):
+    elif isinstance(value, str):
+        check_encodable(value)
+
+
+def check_encodable(text: str) -> None:
+    """Refuse a text that UTF-8 cannot write.
+
+    Raises
+    ------
+    Refused
+        It holds half of a character that needs two units of UTF-16.
+    """
+    if any("\ud800" <= letter <= "\udfff" for letter in text):
         raise Refused("the text holds half a character, which UTF-8 cannot write: type it again")
 
 
