@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias
 
 from study_app.authoring.names import choices_at
@@ -12,6 +12,7 @@ from study_app.authoring.schema_nodes import OWN, Node, alternatives, node_at, t
 from study_app.haptics.model.ranges import REASON
 from study_app.protocol.source.document import Path, has
 from study_app.protocol.source.problems import rule_of, shown
+from study_app.protocol.table import ALTERNATIVES
 
 Kind: TypeAlias = Literal[
     "number", "whole number", "text", "paragraphs", "localised", "switch", "choice", "kind", "reference",
@@ -76,6 +77,8 @@ class Row:
         What can be chosen, or named.
     either : tuple of Row
         Its alternatives, of kind "either" alone.
+    instead : str
+        The key that is given instead of this one, "" where there is none: exactly one of the two is.
     """
 
     path: Path
@@ -90,6 +93,7 @@ class Row:
     reason: str = ""
     choices: tuple[Choice, ...] = ()
     either: tuple[Row, ...] = ()
+    instead: str = ""
 
 
 def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
@@ -124,7 +128,9 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
     nodes = node_at(document, path)
     if not nodes:
         return None if value is None else Row(path, "unknown", label_of(path[-1]), value=value)
-    return _row(document, path, nodes, value, required=path[-1] in around.get("required", ()))
+    row = _row(document, path, nodes, value, required=path[-1] in around.get("required", ()))
+    pairs = [pair for pair in around.get(ALTERNATIVES, ()) if path[-1] in pair]
+    return replace(row, instead=next((key for pair in pairs for key in pair if key != path[-1]), ""))
 
 
 def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value: Any, *, required: bool) -> Row:

@@ -155,6 +155,8 @@ class SceneDefaults(Table):
 class Condition(Table):
     """A named combination of what is felt (one liquid, or several with regions) and how late it is seen."""
 
+    ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("liquid", "liquids"),)
+
     liquid: Id | None = Field(default=None, description="The liquid; or give liquids.")
     liquids: tuple[Id, ...] = Field(default=(), description="Several liquids; where they overlap the last one counts.")
     delay_ms: Annotated[float, within(0, MOST_DELAY_MS, "what is seen more than a second late is no feedback")] = Field(
@@ -192,12 +194,6 @@ class Condition(Table):
         return ForceLink(
             delay_s=self.force_delay_ms / 1000, jitter_s=self.force_jitter_ms / 1000, loss=self.force_loss, seed=seed
         )
-
-    @model_validator(mode="after")
-    def _liquid_one_way(self) -> Self:
-        if (self.liquid is None) == (not self.liquids):
-            raise PydanticCustomError("one_of", "give either liquid or liquids, one of the two", {"place": "liquid"})
-        return self
 
 
 def compared(conditions: Sequence[Condition]) -> Compared:

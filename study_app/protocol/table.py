@@ -2,10 +2,37 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from typing import Any, ClassVar, Final, Self
+
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError
+
+ALTERNATIVES: Final = "alternatives"
+"""Where the JSON Schema of a table keeps `Table.ONE_OF`, for forms."""
 
 
 class Table(BaseModel):
     """A table of the file: unknown keys are errors, numbers are finite, values never change."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Pairs of keys of which exactly one is given."""
+
+    @model_validator(mode="after")
+    def _gives_one_of_two(self) -> Self:
+        for one, other in self.ONE_OF:
+            given: list[Any] = [getattr(self, name) for name in (one, other)]
+            if sum(value is not None and value != () for value in given) != 1:
+                message = f"give either {one} or {other}, one of the two"
+                raise PydanticCustomError("one_of", message, {"place": one})
+        return self
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Return the schema with the pairs of which one is given."""
+        node = handler(core_schema)
+        if cls.ONE_OF:
+            handler.resolve_ref_schema(node)[ALTERNATIVES] = [list(pair) for pair in cls.ONE_OF]
+        return node

@@ -179,3 +179,18 @@ def test_kinds_of_rows(study: str, path: Path, kind: str) -> None:
     row = row_at(STUDIES[study], path)
     assert row is not None
     assert row.kind == kind
+
+
+@pytest.mark.parametrize(
+    ("path", "instead"),
+    [
+        (("tasks", "reach", "count"), "duration_s"),
+        (("tasks", "reach", "duration_s"), "count"),
+        (("conditions", "water", "liquids"), "liquid"),
+        (("tasks", "reach", "radius_mm"), ""),
+    ],
+)
+def test_rows_of_which_one_is_given_name_the_other(path: Path, instead: str) -> None:
+    row = row_at(STUDIES["rek2024"], path)
+    assert row is not None
+    assert row.instead == instead
