@@ -6,16 +6,16 @@ import string
 from collections.abc import Mapping
 from typing import Any, Final
 
-from study_app.authoring.fields import Row, label_of, row_at
+from study_app.authoring.fields import Row, label_of, row_at, rows
 from study_app.authoring.names import free_name
 from study_app.authoring.repairs import repairs
 from study_app.authoring.schema_nodes import Node, node_at, table_of
 from study_app.authoring.study import Study
-from study_app.authoring.writer.edits import Edit, Insert, Set
+from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Set
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.forms.scale import POINTS
 from study_app.protocol.source.document import Path, entries, has, names
-from study_app.protocol.source.problems import Fault
+from study_app.protocol.source.problems import Fault, rule_of
 
 SINGULAR: Final = {"items": "question", "stimuli": "stimulus"}
 """What an element of a section is called, where it is not the section without its last letter."""
@@ -70,6 +70,43 @@ def added(study: Study, section: Path, kind: Mapping[str, Any] | None = None) ->
         else:
             others += _outside(after, fault)
     return (first, *others), path
+
+
+def duplicated(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:
+    """Return the edits that copy an element right after itself, as one step, and the path of the copy.
+
+    The copy has the next free name and code letter, and a place in the session where it needs one. Its texts are those
+    of the original.
+
+    Raises
+    ------
+    Refused
+        There is no such element.
+    """
+    table = _value(study.document, path)
+    if not isinstance(table, Mapping):
+        raise Refused(f"{label_of(path[-1])} cannot be copied")
+    last = path[-1]
+    name = table.get("id", last) if isinstance(last, int) else last
+    if isinstance(last, int):
+        taken = [entry.get("id") for _, entry in entries(study.document, ".".join((*map(str, path[:2]), "*", "*")))]
+        copy: Path = (*path[:-1], last + 1)
+        edits: list[Edit] = [Duplicate(path)]
+        if isinstance(name, str):
+            edits.append(Set((*copy, "id"), free_name(filter(None, taken), name)))
+    else:
+        copy = (*path[:-1], free_name(names(study.document, str(path[0])), str(name)))
+        edits = [Duplicate(path, str(copy[-1]))]
+    after, _ = study.edited(*edits)
+    letters = [
+        row.path for row in rows(after.document, copy) if row.value is not None and rule_of(_LETTER) in row.bounds
+    ]
+    edits += [Set(place, initial(after.document, place)) for place in letters]
+    after, _ = study.edited(*edits)
+    for fault in set(after.faults) - set(study.faults):
+        if fault.path == copy:
+            edits += _outside(after, fault)
+    return tuple(edits), copy
 
 
 def _outside(study: Study, fault: Fault) -> tuple[Edit, ...]:

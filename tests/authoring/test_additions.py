@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.authoring.additions import added
+from study_app.authoring.additions import added, duplicated
 from study_app.authoring.fields import row_at
 from study_app.authoring.study import read
 from study_app.authoring.writer.refused import Refused
@@ -49,3 +49,40 @@ def test_nothing_is_added_to_what_holds_no_elements() -> None:
     study = read((PROTOCOLS / "demo.toml").read_bytes())
     with pytest.raises(Refused, match="nothing can be added to Device"):
         added(study, ("device",))
+
+
+@pytest.mark.parametrize(
+    ("path", "copy"),
+    [
+        (("liquids", "water"), ("liquids", "water_2")),
+        (("tasks", "reach"), ("tasks", "reach_2")),
+        (("pages", "rest"), ("pages", "rest_2")),
+        (("blocks", "liquids"), ("blocks", "liquids_2")),
+    ],
+)
+def test_a_copy_has_its_own_name_letter_and_place_in_the_session(path: Path, copy: Path) -> None:
+    before = read((PROTOCOLS / "rek2024.toml").read_bytes(), PROTOCOLS)
+    edits, found = duplicated(before, path)
+    assert found == copy
+    after, _ = before.edited(*edits)
+    original, copied = (after.document[where[0]][where[1]] for where in (path, copy))
+    assert {key: value for key, value in copied.items() if key != "code_prefix"} == {
+        key: value for key, value in original.items() if key != "code_prefix"
+    }
+    if path[0] == "blocks":
+        assert copied["code_prefix"] not in {"L", "D"}
+        assert copy[1] in after.document["sequence"]
+    else:
+        assert {fault.message for fault in after.faults} <= {'has the same numbers as "water"'}
+
+
+def test_a_copy_of_a_question_has_its_own_id_right_after_the_original() -> None:
+    before = read((PROTOCOLS / "demo.toml").read_bytes())
+    path = ("questionnaires", "liquid", "items", 0)
+    edits, found = duplicated(before, path)
+    after, _ = before.edited(*edits)
+    items = after.document["questionnaires"]["liquid"]["items"]
+    assert found[-1] == 1
+    assert [item["id"] for item in items] == ["feels_liquid", "feels_liquid_2", "like_honey"]
+    with pytest.raises(Refused, match="cannot be copied"):
+        duplicated(before, ("format",))

@@ -70,8 +70,8 @@ def _with_header(spans: Spans, path: Path, value: Any) -> bool:
         return False
     fits = len(key_text(str(path[-1]))) + 3 + len(inline(value)) <= WIDTH
     within = len(path) - 1
-    beside = any(len(node.path) > within and node.path[:within] == path[:-1] for node in spans.headers())
-    return not fits or len(path) == 1 or (beside and isinstance(value, Mapping))
+    neighbours = any(len(node.path) > within and node.path[:within] == path[:-1] for node in spans.headers())
+    return not fits or len(path) == 1 or (neighbours and isinstance(value, Mapping))
 
 
 def _add_table(spans: Spans, edit: Editor, path: Path, value: Any, after: str | None) -> None:
