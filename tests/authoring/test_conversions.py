@@ -15,6 +15,7 @@ def study_of(name: str) -> Study:
     return read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["reach", "follow"])
 def test_switched_keeps_what_both_kinds_have_and_gives_back_the_rest(kind: str) -> None:
     study = study_of("slime")

@@ -57,6 +57,7 @@ def test_a_step_that_changes_nothing_is_none() -> None:
     assert (same.done, same.selected) == ((), ("study",))
 
 
+@pytest.mark.slow
 def test_the_oldest_of_too_many_steps_is_forgotten() -> None:
     history = History(read(b"a = 0\n"))
     for number in range(MOST_STEPS + 3):

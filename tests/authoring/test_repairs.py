@@ -57,6 +57,7 @@ def test_repairs_make_a_study_sound_again(name: str, change: tuple[str, str], wo
     assert study.edited(*repair.edits)[0].protocol is not None
 
 
+@pytest.mark.slow
 def test_a_level_beyond_the_slope_limit_is_repaired_by_the_highest_that_passes() -> None:
     study = study_of("viscosityjnd", ("levels = [0.02, 0.6]", "levels = [0.02, 3]"))
     (fault,) = study.faults

@@ -21,6 +21,7 @@ VALUES = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(VALUES, st.sampled_from(["", "'a'", '"""\n"""', "[\n  1,\n]"]), st.sampled_from(["\n", "\r\n"]))
 def test_written_is_read_back_as_the_same_value(value: Any, like: str, newline: str) -> None:
     assert tomllib.loads(f"key = {written(value, like, newline)}{newline}")["key"] == value
