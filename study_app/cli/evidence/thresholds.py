@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import time
 from pathlib import Path
 
@@ -35,40 +34,41 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
     are rehearsed with servo, store, unblinding and analysis. Every value is printed with its limit. Ends with exit
     code 3 if one exceeds it.
     """
-    from study_app.protocol.load import load
+    from study_app.protocol.load import load, source_bytes
     from study_app.store.output_files import make_folder, write_files
     from study_app.validation.thresholds.many_studies import NAMES, methods_alone, plant
     from study_app.validation.thresholds.verdicts import Verdict, markdown, table
-    from study_app.validation.thresholds.whole_pipeline import PEOPLE, run
+    from study_app.validation.thresholds.whole_pipeline import PEOPLE, judged, rehearsed
 
     try:
-        chosen = [(name, plant(Path(name).stem, load(name))) for name in files or NAMES]
+        chosen = [(source_bytes(name), plant(Path(name).stem, load(name))) for name in files or NAMES]
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     if to is not None:
         make_folder(to)
     begun = time.monotonic()
-    judged: list[Verdict] = []
+    judgements: list[Verdict] = []
     with progress() as show, executor_for(workers) as executor:
-        for source, one in chosen:
+        rehearsals = [executor.submit(rehearsed, one, source, seed) for source, one in chosen]
+        for (_, one), rehearsal in zip(chosen, rehearsals, strict=True):
 
             def counted(done: int, name: str = one.name) -> None:
                 show(f"{name}: {done} of {studies} studies", done / studies)
 
             of_methods, spread = methods_alone(one, studies, seed, executor, counted)
-            judged += of_methods
             show(f"{one.name}: rehearsing {PEOPLE} participants")
-            with tempfile.TemporaryDirectory() as folder:
-                judged += run(one, source, Path(folder) / "study", spread, seed=seed)
+            judgements += [*of_methods, *judged(one, rehearsal.result(), spread)]
     used_s = sum(os.times()[:4])  # with the workers', which have ended
     took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
-    words = f"{studies} studies of each protocol, seed {seed}, in {took}\n\n{markdown(judged)}"
+    words = f"{studies} studies of each protocol, seed {seed}, in {took}\n\n{markdown(judgements)}"
     click.echo(words, nl=False)
     if to is not None:
-        for path in write_files(to, {"thresholds.md": words.encode(), "thresholds.csv": table(judged)}):
+        for path in write_files(to, {"thresholds.md": words.encode(), "thresholds.csv": table(judgements)}):
             click.echo(path)
-    beyond = sum(not one.holds for one in judged)
-    click.echo(f"{beyond} of {len(judged)} values exceed their limits" if beyond else "every value is within its limit")
+    beyond = sum(not one.holds for one in judgements)
+    click.echo(
+        f"{beyond} of {len(judgements)} values exceed their limits" if beyond else "every value is within its limit"
+    )
     if beyond:
         click.get_current_context().exit(EXIT_FOUND)
 

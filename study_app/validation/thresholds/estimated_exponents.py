@@ -194,29 +194,21 @@ def spread_of_exponents(studies: Sequence[ExponentsFound], people: int) -> float
     return float(np.std([found.mean_of(people) for found in studies], ddof=1))
 
 
-def recovered_exponent(one: PlantedExponent, rows: pd.DataFrame, spread: float, people: int) -> Verdict:
-    """Return whether rehearsed participants have the planted exponent.
-
-    Parameters
-    ----------
-    one : PlantedExponent
-        What is planted.
-    rows : DataFrame
-        The opened rows of `tracks`.
-    spread : float
-        From `spread_of_exponents`, of as many participants.
-    people : int
-        How many there are.
-    """
+def exponents_in(one: PlantedExponent, rows: pd.DataFrame) -> tuple[float, ...]:
+    """Return the exponent of each participant in the opened rows of `tracks`."""
     own = rows[(rows["block"] == one.block.id) & rows["analysed"] & rows["value"].notna()]
-    exponents = [
+    return tuple(
         exponent_of(of_person["level"].astype(float).tolist(), of_person["value"].astype(float).tolist())
         for _, of_person in own.groupby("participant")
-    ]
+    )
+
+
+def recovered_exponent(one: PlantedExponent, exponents: Sequence[float], spread: float) -> Verdict:
+    """Return whether rehearsed participants have the planted exponent; ``spread`` is from `spread_of_exponents`."""
     mean = float(np.mean(exponents))
     return Verdict(
         one.name,
-        f"exponent of {people} people",
+        f"exponent of {len(exponents)} people",
         f"{mean:.3f}",
         f"{EXPONENT:g} ± {SPREADS} SD ({SPREADS * spread:.3f})",
         abs(mean - EXPONENT) <= SPREADS * spread,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from study_app.analysis.designs.thresholds import thresholds
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study import Study, load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.evaluation.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
@@ -16,7 +18,11 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
-from study_app.validation.thresholds.estimated_exponents import PlantedExponent, recovered_exponent
+from study_app.validation.thresholds.estimated_exponents import (
+    PlantedExponent,
+    exponents_in,
+    recovered_exponent,
+)
 from study_app.validation.thresholds.planted import Planted
 from study_app.validation.thresholds.verdicts import Verdict
 
@@ -25,55 +31,84 @@ DELIVERED_LEAST: Final = 0.99
 SPREADS: Final = 3
 
 
-def run(
-    one: Planted | PlantedExponent,
-    source: str,
-    folder: Path,
-    spread: float,
-    *,
-    seed: int,
-    progress: Callable[[str], object] | None = None,
-) -> Iterator[Verdict]:
-    """Rehearse a study in ``folder`` and yield what it shows.
+@dataclass(frozen=True, slots=True)
+class Rehearsed:
+    """What rehearsed participants show.
+
+    Attributes
+    ----------
+    delivered : float
+        Share of intervals that were delivered as requested.
+    findings : int
+        Of ``verify``, ``reproduce`` and ``replay``.
+    recovered : tuple of float
+        Each participant's threshold at each standard, or each participant's exponent.
+    """
+
+    delivered: float
+    findings: int
+    recovered: tuple[float, ...]
+
+
+def rehearsed(one: Planted | PlantedExponent, source: bytes, seed: int) -> Rehearsed:
+    """Rehearse `PEOPLE` participants in a temporary folder and return what they show.
 
     Parameters
     ----------
-    one : Planted
+    one : Planted or PlantedExponent
         What is planted.
-    source : str
-        File or name of its protocol.
-    folder : Path
-        A study folder that is not there yet.
-    spread : float
-        Standard deviation of ln threshold, or of the exponent, over studies of `PEOPLE`.
+    source : bytes
+        The source of its protocol.
     seed : int
         Of all randomness.
-    progress : callable, optional
-        Called with a line after each session.
     """
-    rehearse(source, participants=PEOPLE, seed=seed, results=folder, progress=progress, observer=one.observer)
-    sessions = StudyFolder(folder).sessions()
-    findings = len(verify(folder, None).errors)
-    findings += sum(len(reproduced(session.path).differences) for session in sessions)
-    findings += sum(not replay(session.path).proved for session in sessions)
-    unblind(folder, "validate", "to compare with what was planted")
-    study = load_study(folder)
-    intervals = study.intervals[study.intervals["block"] == one.block.id]
-    delivered = float(intervals["invalid_reasons"].isna().mean())
+    with tempfile.TemporaryDirectory() as place:
+        file, folder = Path(place) / f"{one.name}.toml", Path(place) / "study"
+        file.write_bytes(source)
+        rehearse(str(file), participants=PEOPLE, seed=seed, results=folder, observer=one.observer)
+        sessions = StudyFolder(folder).sessions()
+        findings = len(verify(folder, None).errors)
+        findings += sum(len(reproduced(session.path).differences) for session in sessions)
+        findings += sum(not replay(session.path).proved for session in sessions)
+        unblind(folder, "validate", "to compare with what was planted")
+        study = load_study(folder)
+        intervals = study.intervals[study.intervals["block"] == one.block.id]
+        return Rehearsed(float(intervals["invalid_reasons"].isna().mean()), findings, _recovered(one, study))
+
+
+def _recovered(one: Planted | PlantedExponent, study: Study) -> tuple[float, ...]:
+    rows = tracks(study)
+    if isinstance(one, PlantedExponent):
+        return exponents_in(one, rows)
+    block = next(block for block in study.levels if block.id == one.block.id)
+    return tuple(row.threshold for row in thresholds(block, rows) if row.participant is not None)
+
+
+def judged(one: Planted | PlantedExponent, found: Rehearsed, spread: float) -> Iterator[Verdict]:
+    """Yield the verdicts on rehearsed participants.
+
+    Parameters
+    ----------
+    one : Planted or PlantedExponent
+        What is planted.
+    found : Rehearsed
+        From `rehearsed`.
+    spread : float
+        Standard deviation of ln threshold, or of the exponent, over studies of `PEOPLE`.
+    """
     yield Verdict(
         one.name,
         "intervals delivered as requested",
-        f"{100 * delivered:.2f} %",
+        f"{100 * found.delivered:.2f} %",
         "at least 99 %",
-        delivered >= DELIVERED_LEAST,
+        found.delivered >= DELIVERED_LEAST,
     )
-    yield Verdict(one.name, "findings of verify, reproduce and replay", str(findings), "0", findings == 0)
+    clean = found.findings == 0
+    yield Verdict(one.name, "findings of verify, reproduce and replay", str(found.findings), "0", clean)
     if isinstance(one, PlantedExponent):
-        yield recovered_exponent(one, tracks(study), spread, PEOPLE)
+        yield recovered_exponent(one, found.recovered, spread)
         return
-    block = next(block for block in study.levels if block.id == one.block.id)
-    values = [row.threshold for row in thresholds(block, tracks(study)) if row.participant is not None]
-    error = sum(math.log(value / one.threshold) for value in values) / len(values)
+    error = sum(math.log(value / one.threshold) for value in found.recovered) / len(found.recovered)
     yield Verdict(
         one.name,
         f"threshold of {PEOPLE} people, {_unit(one)}",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
 
@@ -22,7 +21,7 @@ from study_app.validation.thresholds.estimated_exponents import (
 )
 from study_app.validation.thresholds.many_studies import NAMES, plant
 from study_app.validation.thresholds.verdicts import markdown
-from study_app.validation.thresholds.whole_pipeline import run
+from study_app.validation.thresholds.whole_pipeline import judged, rehearsed
 from tests.compiled import needs_servo
 
 
@@ -80,7 +79,7 @@ def test_studies_without_estimation_at_a_pace_have_no_exponent() -> None:
 
 @pytest.mark.slow
 @needs_servo
-def test_the_whole_program_recovers_it(tmp_path: Path) -> None:
+def test_the_whole_program_recovers_it() -> None:
     text = source_bytes("thickness").decode()
     for old, new in (
         ("levels = 9 ", "levels = 4 "),
@@ -89,10 +88,9 @@ def test_the_whole_program_recovers_it(tmp_path: Path) -> None:
     ):
         assert old in text
         text = text.replace(old, new)
-    (tmp_path / "short.toml").write_text(text)
     short = plant("short", parse(text.encode(), "short.toml"))
     assert isinstance(short, PlantedExponent)
     spread = spread_of_exponents([simulate_estimates(short, number, seed=1) for number in range(10)], 3)
-    judged = list(run(short, str(tmp_path / "short.toml"), tmp_path / "study", spread, seed=1))
-    assert [row.holds for row in judged] == [True, True, True], markdown(judged)
-    assert judged[2].what == "exponent of 3 people"
+    rows = list(judged(short, rehearsed(short, text.encode(), seed=1), spread))
+    assert [row.holds for row in rows] == [True, True, True], markdown(rows)
+    assert rows[2].what == "exponent of 3 people"

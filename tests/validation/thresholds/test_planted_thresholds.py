@@ -5,7 +5,6 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -18,7 +17,7 @@ from study_app.session.simulated.design_observer import OBSERVER, Comparison, Ob
 from study_app.validation.thresholds.methods_alone import StudyFound, simulate, slopes
 from study_app.validation.thresholds.planted import SHIPPED, Planted, planted
 from study_app.validation.thresholds.verdicts import Verdict, markdown, spread, table, verdicts
-from study_app.validation.thresholds.whole_pipeline import run
+from study_app.validation.thresholds.whole_pipeline import judged, rehearsed
 from tests.compiled import needs_servo
 from tests.protocol.trials.studies import text_of_damper
 
@@ -129,14 +128,12 @@ def test_slopes_tell_a_constant_jnd_from_webers_law() -> None:
 
 @pytest.mark.slow
 @needs_servo
-def test_the_whole_program_recovers_it_and_another_observer_is_found(one: Planted, tmp_path: Path) -> None:
-    (tmp_path / "small.toml").write_text(SMALL)
-    source = str(tmp_path / "small.toml")
-    judged = list(run(one, source, tmp_path / "study", 0.25, seed=1))
-    assert [row.holds for row in judged] == [True, True, True], markdown(judged)
-    assert judged[0].what == "intervals delivered as requested"
+def test_the_whole_program_recovers_it_and_another_observer_is_found(one: Planted) -> None:
+    rows = list(judged(one, rehearsed(one, SMALL.encode(), seed=1), 0.25))
+    assert [row.holds for row in rows] == [True, True, True], markdown(rows)
+    assert rows[0].what == "intervals delivered as requested"
     dull = replace(one, observer=Observer(weber_fraction=2.0))
-    other = list(run(dull, source, tmp_path / "other", 0.05, seed=1))
+    other = list(judged(dull, rehearsed(dull, SMALL.encode(), seed=1), 0.05))
     assert other[2].limit.startswith("2 ± 3 SD")
     assert not other[2].holds, "the levels end at 0.6"
 
