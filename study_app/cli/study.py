@@ -45,7 +45,7 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
     if load.is_scene_file(protocol):
         click.echo(describe.describe_scenes(load.load_scenes(protocol)))
     else:
-        click.echo(describe.describe(load.load(protocol, delay_ticks=delay_ticks)))
+        click.echo(describe.describe(load.load(protocol, delay_ticks=delay_ticks), delay_ticks))
 
 
 @click.command()

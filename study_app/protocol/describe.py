@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.scene import Scene
 from study_app.protocol import liquid_summary
@@ -36,13 +37,13 @@ BLINDINGS = {
 }
 
 
-def describe(protocol: Protocol) -> str:
-    """Return the whole study in words, in its first language."""
+def describe(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> str:
+    """Return the whole study in words, in its first language; ``delay_ticks`` is how many ticks late a force acts."""
     language = protocol.study.languages[0]
     sections = (
         _head(protocol, language),
         *(_titled(_title(one), _session(one.protocol, language)) for one in variants(protocol)),
-        *(_block(protocol, block, language) for block in protocol.blocks_in_order),
+        *(_block(protocol, block, language, delay_ticks) for block in protocol.blocks_in_order),
         _titled("Liquids", _liquids(protocol)),
         ("Effects in each liquid", *(f"  {line}".rstrip() for line in liquid_summary.effects(protocol))),
         _titled("Conditions", _conditions(protocol)),
@@ -181,7 +182,7 @@ def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _block(protocol: Protocol, block: Block, language: str) -> Iterable[str]:
+def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) -> Iterable[str]:
     part = "" if block.part is None else f"Part {block.part}: "
     questionnaire, compared = protocol.questionnaire_of(block.id), protocol.compared_in(block.id)
     rows = [
@@ -194,7 +195,7 @@ def _block(protocol: Protocol, block: Block, language: str) -> Iterable[str]:
         ("Recorded as", ", ".join(block_codes(protocol, block))),
         ("Conditions", ", ".join(protocol.conditions_in(block.id))),
         *([] if block.design is not None or compared is None else [("Compared", compared)]),
-        *(design_rows(protocol, block) if block.design is not None else ()),
+        *(design_rows(protocol, block, delay_ticks) if block.design is not None else ()),
         *(
             [("Duration", f"about {_block_s(protocol, block, language) / 60:.0f} min")]
             if block.design is not None

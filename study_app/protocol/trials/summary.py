@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import product
 
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
+from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import precision_rows
+from study_app.protocol.checks.pace import FASTER, highest_damping
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.methods.adjustment import Adjustment
@@ -28,8 +31,8 @@ from study_app.protocol.trials.tracks import (
 LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
 
 
-def design_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
-    """Yield the rows that describe the design of a block."""
+def design_rows(protocol: Protocol, block: Block, delay_ticks: int = BELIEVED_TICKS) -> Iterator[tuple[str, str]]:
+    """Yield the rows that describe the design of a block; ``delay_ticks`` is how many ticks late a force acts."""
     design = design_of(protocol, block)
     kind = design.kind.upper()
     intervals = "1 interval" if design.intervals == 1 else f"{design.intervals} intervals, {design.pause_s:g} s apart"
@@ -68,5 +71,14 @@ def design_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
         values = (*standards, *compared)
         scenes = [scene] if stimulus.vary in OF_LINK else [override(scene, stimulus.vary, one) for one in values]
         felt_n = [steady(one, pace_mps).drag_n for one in scenes]
-        yield "Force at the pace", f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s"
+        fast_n = max(steady(one, FASTER * pace_mps).drag_n for one in scenes[-len(compared) :])
+        yield (
+            "Force at the pace",
+            f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s, at most {fast_n:.1f} N at {FASTER:g} "
+            "times the pace",
+        )
+    if (highest_nspm := highest_damping(protocol, block)) > 0:
+        scene = protocol.scene_for(condition_of(protocol, stimulus))
+        limit_nspm = slope_limit(1 / scene.rate_hz, delay_ticks, scene.velocity)
+        yield "Damping", f"at most {highest_nspm:.4g} N·s/m at the hand; the slope limit is {limit_nspm:.4g}"
     yield from precision_rows(protocol, block)

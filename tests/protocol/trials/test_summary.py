@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from study_app.protocol.describe import describe
-from study_app.protocol.load import parse
+from study_app.protocol.load import load, parse
 from tests.protocol.trials.studies import study
 from tests.protocol.trials.test_due import CONDITIONS
 
@@ -13,6 +13,15 @@ def test_a_block_of_levels_is_described_by_design_levels_and_comparisons() -> No
     assert rows["Levels"] == "Levels Weber fraction 0.2 to 0.8 (constant), 24 trials per standard"
     assert rows["Comparisons"] == "Comparisons viscosity_pa_s from 1.2 to 3.6 Pa·s"
     assert "None" not in describe(study())
+
+
+def test_a_paced_damper_is_described_by_its_strongest_force_and_the_slope_limit_of_the_device() -> None:
+    protocol = load("viscosityjnd")
+    assert protocol.blocks["viscosity"].stimulus == "damping"
+    said = " ".join(describe(protocol).split())
+    assert "Force at the pace 0.5 to 6.4 N at 0.126 m/s, at most 7.7 N at 1.2 times the pace" in said
+    assert "Damping at most 51.2 N·s/m at the hand; the slope limit is 53 " in said
+    assert "the slope limit is 20.6 " in " ".join(describe(protocol, delay_ticks=2).split())
 
 
 def test_compared_conditions_are_described_by_their_standard() -> None:
