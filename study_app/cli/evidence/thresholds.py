@@ -82,14 +82,13 @@ def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
 
     The forced choice does not depend on a person's criterion; the rating does.
     """
-    from study_app.store.output_files import write_files
     from study_app.validation.thresholds.noticed_delays import compare, markdown
-    from study_app.validation.thresholds.noticed_figure import figure_files
+    from study_app.validation.thresholds.noticed_figure import write
 
     with progress() as show:
         show("simulating people")
         found = compare(people, seed)
     click.echo(markdown(found), nl=False)
     if to is not None:
-        for path in write_files(to, {"delay-thresholds.md": markdown(found).encode(), **figure_files(found)}):
+        for path in write(found, to):
             click.echo(path)

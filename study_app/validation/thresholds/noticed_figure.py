@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -13,7 +14,15 @@ from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 from study_app.analysis.statistics.psychometrics.psychometric import Curve, share
 from study_app.protocol.trials.psychometric import LINEAR_OBSERVER
 from study_app.psychophysics.families import success
-from study_app.validation.thresholds.noticed_delays import FORCED_CHOICE, LIKERT, MEAN_CRITERION_S, Compared, Rated
+from study_app.store.output_files import write_files
+from study_app.validation.thresholds.noticed_delays import (
+    FORCED_CHOICE,
+    LIKERT,
+    MEAN_CRITERION_S,
+    Compared,
+    Rated,
+    markdown,
+)
 
 HEIGHT_PT: Final = 236.0
 TOP_PT: Final = 60.0
@@ -41,15 +50,6 @@ def draw(found: Compared, fonts: Sequence[str]) -> Sheet:
     _thresholds(sheet, sheet.axes(right, TOP_PT, width, height), found)
     _heads(sheet, left, right)
     return sheet
-
-
-def figure_files(found: Compared) -> dict[str, bytes]:
-    """Return the figure in each format and its caption, by file name."""
-    figures = {
-        f"delay-thresholds.{form}": style.file_bytes(draw(found, style.fonts_for(form)).figure, form, TITLE)
-        for form in style.FORMATS
-    }
-    return {"delay-thresholds.txt": f"{CAPTION}\n".encode(), **figures}
 
 
 def _heads(sheet: Sheet, left: float, right: float) -> None:
@@ -138,3 +138,18 @@ CAPTION: Final = (
     "choice does not depend on it. Diamond: people to whom a delay of 30 ms has become the usual one. A criterion of "
     f"{1000 * MEAN_CRITERION_S:.0f} ms is that of the answer model, chosen to agree with the thesis."
 )
+
+
+def write(found: Compared, to: Path) -> tuple[Path, ...]:
+    """Write the table, the figure (PNG, SVG, PDF) and its caption into the folder ``to``; return the files.
+
+    Raises
+    ------
+    AnalysisError
+        The folder cannot be written; nothing was.
+    """
+    files = {"delay-thresholds.md": markdown(found).encode(), "delay-thresholds.txt": f"{CAPTION}\n".encode()}
+    for form in style.FORMATS:
+        drawn = draw(found, style.fonts_for(form)).figure
+        files[f"delay-thresholds.{form}"] = style.file_bytes(drawn, form, TITLE)
+    return write_files(to, files)
