@@ -150,7 +150,7 @@ def undelivered(
 ) -> Iterator[str]:
     """Yield the keys of the file's limits that an interval breaks: reasons without a number.
 
-    Of an ``adjusted`` interval the share of the force that was sent is judged, whatever is varied.
+    Of an ``adjusted`` interval the share of the force that was sent is judged, for any varied number.
     """
     most = limits.level_error_percent
     if presented.vary is not None and presented.vary not in OF_CONDITION and most is not None:

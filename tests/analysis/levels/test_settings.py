@@ -125,17 +125,17 @@ def settings_in(folder: Path) -> dict[str, list[tuple[float, float]]]:
 @needs_servo
 def test_what_is_found_is_that_of_the_journals(study: Path) -> None:
     (found,) = levels_found(load_study(study))
-    told = settings_in(study)
-    assert found.people == tuple(told) == ("P001", "P002", "P003")
+    kept = settings_in(study)
+    assert found.people == tuple(kept) == ("P001", "P002", "P003")
     for one in found.own_settings:
-        starts, levels = zip(*told[str(one.participant)], strict=True)
+        starts, levels = zip(*kept[str(one.participant)], strict=True)
         assert one.levels == pytest.approx(levels)
         assert one.pse == pytest.approx(math.exp(np.mean(np.log(levels))))
         assert one.jnd == pytest.approx(np.std(np.log10(levels), ddof=1))
         assert one.started_high == tuple(start > 6 for start in starts)
         assert sorted(one.started_high) == [False, False, True, True]
         assert one.constant_error == pytest.approx(math.log10(one.pse / 6))
-    assert all(2 <= level <= 18 for own in told.values() for _, level in own)
+    assert all(2 <= level <= 18 for own in kept.values() for _, level in own)
 
 
 @pytest.mark.slow
@@ -196,8 +196,8 @@ def test_export_has_a_table_of_settings_and_the_level_of_each_track(study: Path,
     for row, one in zip(table, found.own_settings, strict=True):
         assert (row["n"], float(row["pse"]), float(row["jnd"])) == ("4", pytest.approx(one.pse), pytest.approx(one.jnd))
     tracks = read(tmp_path, "tracks")
-    told = {person: [level for _, level in own] for person, own in settings_in(study).items()}
-    for person, levels in told.items():
+    kept = {person: [level for _, level in own] for person, own in settings_in(study).items()}
+    for person, levels in kept.items():
         assert [float(row["setting"]) for row in tracks if row["participant"] == person] == pytest.approx(levels)
     assert all(float(row["value"]).is_integer() for row in tracks)
     assert {float(row["value"]) > 0 for row in tracks} == {True, False}

@@ -160,13 +160,15 @@ def test_levels_are_set_by_keys_alone(tmp_path: Path) -> None:
     )
     person.deleteLater()
     assert code == 0
-    told = events(results)
-    assert told[-1]["status"] == "completed"
-    last = {line["trial"]: line["attempt"] for line in told if line["event"] == "trial_started"}
-    counted = [line for line in told if line.get("attempt") == last.get(line.get("trial"), 0)]  # a pause may repeat one
+    journal = events(results)
+    assert journal[-1]["status"] == "completed"
+    last = {line["trial"]: line["attempt"] for line in journal if line["event"] == "trial_started"}
+    counted = [
+        line for line in journal if line.get("attempt") == last.get(line.get("trial"), 0)
+    ]  # a pause may repeat one
     made = [(line["trial"], line["steps"]) for line in counted if line["event"] == "stepped"]
     assert made == [(trial, steps) for trial in (1, 2) for steps in (1, 1, -1, 1)]
-    assert len({line["scene"] for line in told if line["event"] == "stepped"}) >= 8
+    assert len({line["scene"] for line in journal if line["event"] == "stepped"}) >= 8
     assert [row["response"] for row in rows(results, "responses")] == ["2", "2"]
     assert [line["interval"] for line in counted if line["event"] == "interval_ended"] == [1, 2, 1, 2]
     session = next((results / "data").glob("sub-*/ses-*"))

@@ -141,7 +141,7 @@ def answer_blindly(
 
 
 class BlindSetting:
-    """Steps by the draw alone, beyond the end that is near in some settings, whatever was felt."""
+    """Steps by the draw alone, beyond the end that is near in some settings, independent of the force."""
 
     def __init__(self, _attended: Any, draw: Callable[[], float]) -> None:
         self._steps = [*[1] * 7, 80, -90, -7, 3, *(round(9 * draw()) - 4 or 1 for _ in range(4)), 0]

@@ -156,18 +156,18 @@ def test_a_step_that_took_effect_at_another_scene_is_found_by_replay(session: Pa
 def test_a_session_that_was_killed_and_resumed_is_set_as_one_that_was_not(
     session: Path, protocol: Path, share: float
 ) -> None:
-    def told() -> tuple[list[Any], list[Any]]:
+    def kept() -> tuple[list[Any], list[Any]]:
         lines = lines_of(session)
         last = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
         sets = {line["trial"]: line["setting"] for line in lines if line.get("setting") is not None}
         answers = {line["trial"]: line["items"][0]["value"] for line in lines if line["event"] == "responses"}
         return [(n, line["level"], sets[n]) for n, line in sorted(last.items())], sorted(answers.items())
 
-    whole = told()
+    whole = kept()
     cut(session, round(share * (session / "journal.jsonl").stat().st_size))
     resume(session, protocol=protocol)
-    assert [row[:2] for row in told()[0]] == [row[:2] for row in whole[0]]
-    assert told() == whole
+    assert [row[:2] for row in kept()[0]] == [row[:2] for row in whole[0]]
+    assert kept() == whole
     assert reproduced(session).differences == []
     assert replay(session).differences == ()
 

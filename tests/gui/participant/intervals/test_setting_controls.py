@@ -84,7 +84,7 @@ def test_a_key_that_is_held_steps_eight_times_a_second_and_stops_with_it(opened:
     setting(opened)
     assert STEP_MS == 125
     QTest.keyPress(opened.window, Qt.Key.Key_Right)
-    for _ in range(20):  # the system's own repetition, 30 a second or whatever it is set to
+    for _ in range(20):  # the system's own repetition, 30 a second or another rate
         repeated = QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Right, Qt.KeyboardModifier.NoModifier, "", True)
         QApplication.sendEvent(opened.window, repeated)
     assert steps(opened) == [1]
