@@ -168,7 +168,7 @@ class TankWidget(QWidget):
         interval = self._page.interval
         if interval is not None:
             self.setAccessibleName(f"{interval.announced}. {self._page.said}")
-            say(self, interval.announced)
+            say(self, self.accessibleName() if self._page.adjusts else interval.announced)
 
     def prepare(self) -> None:
         """Paint the still images now, so that the first frame does not wait for them."""

@@ -110,6 +110,11 @@ def test_a_step_is_a_fortieth_of_the_span_or_a_factor_on_log_spacing() -> None:
             "methods.set.step_size",
             '"wake.length" cannot change while it is presented',
         ),
+        (
+            [(DAMPING, DAMPING.replace("damping_nspm", "force_delay_ms").replace("[2, 18]", "[1, 9]"))],
+            "methods.set.step_size",
+            '"force_delay_ms" cannot change while it is presented',
+        ),
         ([(ALONE[0], ALONE[0].replace("\n\n", '\nfeedback = "always"\n\n'))], "designs.match.feedback", "no answer"),
         ([('method = "set"', 'method = "set"\ncatch = { share = 0.2 }')], "blocks.matching.catch", "no correct answer"),
     ],
