@@ -18,7 +18,7 @@ from study_app.session.transitions.events import PauseAsked, Stepped, Submitted
 from study_app.session.transitions.state import Phase
 from tests.compiled import needs_servo
 from tests.protocol.trials.matching import ALONE, DELAY, matching
-from tests.session.bench import Bench
+from tests.session.runner.bench import Bench
 
 pytestmark = needs_servo
 
