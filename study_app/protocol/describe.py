@@ -20,6 +20,7 @@ from study_app.protocol.orders.latin_squares import row_count
 from study_app.protocol.questions.question import Context, Question
 from study_app.protocol.trials.limits import Limits
 from study_app.protocol.trials.methods.adjustment import Adjustment
+from study_app.protocol.trials.presentation import link_words
 from study_app.protocol.trials.summary import design_rows
 from study_app.protocol.trials.tracks import design_of, method_of
 
@@ -284,12 +285,7 @@ def _drawn(condition: Condition) -> Iterator[str]:
         yield f"seen {condition.delay_ms:g} ms late"
     if condition.ball == "hidden":
         yield "ball hidden"
-    if condition.force_delay_ms:
-        yield f"force {condition.force_delay_ms:g} ms late"
-    if condition.force_jitter_ms:
-        yield f"force jitter {condition.force_jitter_ms:g} ms"
-    if condition.force_loss:
-        yield f"{100 * condition.force_loss:g} % of forces lost"
+    yield from link_words(condition.force_delay_ms, condition.force_jitter_ms, condition.force_loss)
 
 
 def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
+from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.report.answers.withheld_section import withheld
+from study_app.analysis.tables.compared_blocks import setting_name
+from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.tracks import tracks
 from study_app.evaluation import replay as replay_module
 from study_app.evaluation.replay import replay
 from study_app.protocol.load import parse
@@ -13,6 +19,7 @@ from study_app.protocol.trials.answered import presented_by
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.compiled import needs_servo
@@ -101,3 +108,23 @@ def test_the_session_measures_the_delays_that_were_requested(rehearsed: Path) ->
     assert len(errors_ms) == 4
     assert max(errors_ms) - min(errors_ms) < 2  # what both share is the jitter, 2.5 ms on average
     assert sum(errors_ms) / 4 == pytest.approx(2.5, abs=1)
+
+
+def test_the_analysis_finds_delivered_delays_and_what_safety_withheld(rehearsed: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "opened"
+    shutil.copytree(rehearsed, folder)
+    unblind(folder, "AB", "to see what was delivered")
+    study = load_study(folder)
+    rows = tracks(study)
+    rows = rows[rows["block"] == "pairs"]
+    assert sorted(rows["level"]) == [20, 80]
+    assert (rows["level_delivered"] - rows["level"]).abs().max() < 1.5
+    pairs, named = levels_found(study)
+    assert [(one.low, one.n) for one in pairs.withheld] == [(20, 1), (80, 1)]
+    assert all(0 <= one.mean_percent <= one.most_percent < 5 for one in pairs.withheld)
+    assert "Force withheld by safety" in "".join(withheld(pairs))
+    assert named.withheld == ()
+    assert "".join(withheld(named)) == ""
+    (block,) = (one for one in study.levels if one.id == "named")
+    names = {one.condition: setting_name(one, block.settings) for one in block.settings}
+    assert names == {"water": "Water, force 15 ms late, 20 % of forces lost"}

@@ -9,9 +9,15 @@ from typing import Any, Final
 
 from study_app.analysis.findings import all_findings
 from study_app.analysis.results.block_results import BlockFound, Results
+from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.tables.compared_blocks import Setting
 from study_app.errors import AnalysisError
 
-OF_FORMAT_2: Final = frozenset({"questions", "scores", "levels"})
+OF_FORMAT_2: Final = {
+    Results: frozenset({"questions", "scores", "levels"}),
+    LevelsFound: frozenset({"withheld"}),
+    Setting: frozenset({"link"}),
+}
 """Results that reports of earlier versions do not have; omitted where there are none."""
 
 
@@ -27,7 +33,7 @@ def plain(value: Any) -> Any:
         return {name: plain(entry) for name, entry in _entries(value)}
     if is_dataclass(value) and not isinstance(value, type):
         held = {field.name: getattr(value, field.name) for field in fields(value)}
-        omitted = OF_FORMAT_2 if isinstance(value, Results) else frozenset()
+        omitted = OF_FORMAT_2.get(type(value), frozenset())
         return {name: plain(entry) for name, entry in held.items() if entry or name not in omitted}
     if isinstance(value, Mapping):
         return {str(key): plain(entry) for key, entry in value.items()}

@@ -12,6 +12,8 @@ from typing import Any, Final, TypeAlias
 
 from study_app.protocol.blocks import Compared
 from study_app.protocol.orders.block_orders import every_step_of
+from study_app.protocol.trials.presentation import link_words
+from study_app.protocol.trials.stimuli import OF_LINK
 from study_app.store.blinded.blinding import Key
 
 Kind: TypeAlias = Compared
@@ -33,7 +35,8 @@ class Item:
 class Setting:
     """What was presented under a code; all but the code is None until the key is opened.
 
-    ``label`` is the item that names what was felt, where one does. A track ("8/1") has neither liquid nor delay.
+    ``label`` is the item that names what was felt, where one does, ``link`` how its force was sent if not promptly. A
+    track ("8/1") has neither liquid nor delay.
     """
 
     code: str
@@ -41,6 +44,7 @@ class Setting:
     liquid: str | None = None
     delay_ms: float | None = None
     label: str | None = None
+    link: str = ""
 
     @property
     def standard(self) -> str | None:
@@ -112,7 +116,8 @@ def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
     if condition is None:
         return Setting(code, presented)
     liquids = " + ".join(key.liquids(block, code))
-    return Setting(code, presented, liquids, key.delay_ms(block, code), condition.get("label"))
+    link = ", ".join(link_words(*(condition.get(name, 0.0) for name in OF_LINK)))
+    return Setting(code, presented, liquids, key.delay_ms(block, code), condition.get("label"), link)
 
 
 def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
@@ -185,7 +190,8 @@ def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
         return setting.code if setting.standard is None else f"Standard {setting.standard}"
     liquid = setting.liquid.replace("_", " ")
     named = liquid[:1].upper() + liquid[1:]
-    return f"{named}, {setting.delay_ms:g} ms" if len({other.delay_ms for other in others}) > 1 else named
+    named = f"{named}, {setting.delay_ms:g} ms" if len({other.delay_ms for other in others}) > 1 else named
+    return f"{named}, {setting.link}" if setting.link else named
 
 
 def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tuple[tuple[Setting, ...], Kind]:

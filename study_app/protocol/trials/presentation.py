@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.blocks import Block
@@ -28,6 +30,16 @@ def presented_condition(protocol: Protocol, presented: Stimulated) -> Condition:
     condition = protocol.conditions[presented.condition]
     varied = {presented.vary: presented.value} if presented.vary in OF_LINK else {}
     return condition.model_copy(update=varied)
+
+
+def link_words(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float = 0.0) -> Iterator[str]:
+    """Yield what is unusual of how the force of a condition is sent: late [ms], with jitter [ms], with losses."""
+    if delay_ms:
+        yield f"force {delay_ms:g} ms late"
+    if jitter_ms:
+        yield f"force jitter {jitter_ms:g} ms"
+    if loss:
+        yield f"{100 * loss:g} % of forces lost"
 
 
 def delays_force(protocol: Protocol) -> bool:

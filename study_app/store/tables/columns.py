@@ -203,11 +203,13 @@ _OUTCOME = [column.name for column in TRIALS].index("outcome")
 DELIVERED: tuple[Column, ...] = (
     _signed(
         "value_delivered",
-        "The varied number as delivered, in its unit: a damping as fitted at the hand; another number of the liquid as "
-        "requested; n/a for a delay, whose error is in delay_error_mean_ms.",
+        "The varied number as delivered, in its unit: a damping as fitted at the hand; the delay of the force as its "
+        "lag behind the force model's; another number as requested; n/a for a visual delay, whose error is in "
+        "delay_error_mean_ms.",
     ),
     _signed(
-        "force_share", "Share of the force model's force that was sent to the hand, after the lead; 1 is all of it."
+        "force_share",
+        "Share of the force model's force that was sent to the hand, after the lead and any lag; 1 is all of it.",
     ),
     _signed("apparent_mass_kg", "Apparent mass of the fitted force, in addition to its damping.", "kg"),
     _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True),

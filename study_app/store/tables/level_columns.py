@@ -24,8 +24,8 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     Column(
         "level_delivered",
         "number",
-        "The level at which the hand met the comparison: from the delivered values, and for a delay from the mean "
-        "errors of the frames; n/a where it was not measured.",
+        "The level at which the hand met the comparison: from the delivered values, and for a visual delay from the "
+        "mean errors of the frames; n/a where it was not measured.",
         may_miss=True,
     ),
     Column(
