@@ -1,10 +1,15 @@
-"""The buttons of the device: which went down, and steps of an adjustment while one is held."""
+"""The buttons of the device: the events that they make, and steps of an adjustment while one is held."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import numpy as np
+
+from study_app.haptics.model.layout import BUTTON_STOP
+from study_app.session.transitions.events import Chosen, Continue, Event, ForceStopped, Stepped, Submitted
+from study_app.session.transitions.state import Phase, SessionState
 
 CONTINUE: Final = 1 << 0
 ANSWERS: Final = (1 << 1, 1 << 2)
@@ -20,22 +25,46 @@ class DeviceButtons:
         self._down = 0
         self._next_ns: dict[int, int] = {}  # by button, when it makes its next step
 
-    def pressed(self, samples: Any) -> Any:
+    def events(
+        self, samples: Any, since_ns: int, now_s: float, where: Callable[[], tuple[SessionState, bool]]
+    ) -> Iterator[Event]:
+        """Yield what buttons that went down mean; a press from before the present page is no answer to it.
+
+        Parameters
+        ----------
+        samples : (n,) structured array
+            The newest samples of telemetry, at least one.
+        since_ns : int
+            When the page was presented [ns].
+        now_s : float
+            Now, on the session's clock [s].
+        where : callable
+            Returns the session's state, after each event that was yielded, and whether an interval can be adjusted.
+        """
+        pressed = self._pressed(samples)
+        if (pressed & BUTTON_STOP).any():
+            yield ForceStopped(now_s, "device")
+        pressed = pressed[samples["time_ns"] >= since_ns]
+        continues = bool((pressed & CONTINUE).any())
+        if where()[1]:
+            if steps := self._steps(pressed, int(samples["time_ns"][-1])):
+                yield Stepped(now_s, steps)
+            if continues:
+                yield Submitted(now_s)
+            return
+        self._next_ns.clear()
+        if continues and _reads(where()[0]):
+            yield Continue(now_s)
+        yield from _answers(where()[0], pressed, now_s)
+
+    def _pressed(self, samples: Any) -> Any:
         """Return which buttons went down at each of the newest samples (n,), as bits."""
         down = np.concatenate(([self._down], samples["buttons"]))
         self._down = int(down[-1])
         return down[1:] & ~down[:-1]
 
-    def steps(self, pressed: Any, now_ns: int) -> int:
-        """Return the steps that are due: one of each press, and of a button that stays down one every `STEP_S`.
-
-        Parameters
-        ----------
-        pressed : (n,) array
-            What `pressed` returned, of the samples that count.
-        now_ns : int
-            The time of the newest sample [ns].
-        """
+    def _steps(self, pressed: Any, now_ns: int) -> int:
+        """Return the steps that are due: one of each press, and of a button that stays down one every `STEP_S`."""
         steps = 0
         for bit, way in zip(ANSWERS, (-1, 1), strict=True):
             if (pressed & bit).any():
@@ -47,6 +76,18 @@ class DeviceButtons:
                 self._next_ns.pop(bit, None)
         return steps
 
-    def forget(self) -> None:
-        """Let no button that is down make steps."""
-        self._next_ns.clear()
+
+def _reads(state: SessionState) -> bool:
+    """Return whether a button goes on from the page: from one to read, but a squeeze gives no consent."""
+    return state.phase is Phase.READING and state.plan.protocol.pages[state.page_id].kind != "consent"
+
+
+def _answers(state: SessionState, pressed: Any, now_s: float) -> Iterator[Event]:
+    """Answer where there are two answers: the device's second button is the first of them, its third the second."""
+    if state.phase is not Phase.ANSWERING or state.due is None or state.design is None:
+        return
+    answers = state.design.answers
+    down = [place for place, bit in enumerate(ANSWERS) if (pressed & bit).any()]
+    if len(answers) == len(ANSWERS) and len(down) == 1:
+        yield Chosen(now_s, state.design.name, answers[down[0]])
+        yield Submitted(now_s)

@@ -22,12 +22,11 @@ from typing import Any
 import numpy as np
 
 from study_app.errors import SessionError, StoreError, StudyError
-from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.protocol.model import Protocol as Study
 from study_app.protocol.orders.schedule import Schedule
 from study_app.protocol.trials.presentation import link_seed, scene_of
 from study_app.protocol.trials.stimuli import DELAY
-from study_app.session.device_buttons import ANSWERS, CONTINUE, DeviceButtons
+from study_app.session.device_buttons import DeviceButtons
 from study_app.session.ports import Ports
 from study_app.session.resume import FIRST, Start
 from study_app.session.tasks import Outcome, TaskView
@@ -48,15 +47,12 @@ from study_app.session.transitions.commands import (
 )
 from study_app.session.transitions.events import (
     Broke,
-    Chosen,
-    Continue,
     EndAsked,
     Event,
     ForceStopped,
     PauseAsked,
     Reconnected,
     Stepped,
-    Submitted,
     TaskDone,
     TimeUp,
     WriteCompleted,
@@ -198,7 +194,8 @@ class Runner:
         if fault is not None and self._state.phase not in {Phase.TROUBLE, *FINAL}:
             self.post(Broke(self._ports.clock(), fault, "device"))
         if len(samples) and self._state.phase is not Phase.OPENING:
-            self._hear_buttons(samples)
+            for event in self._buttons.events(samples, self._page_since_ns, self._ports.clock(), self._where):
+                self.post(event)
             self._follow(samples)
         running = self._running
         if running is not None and running.frozen:
@@ -209,6 +206,9 @@ class Runner:
             rest = self.view(self._ports.servo.now_ns())
             if rest is None or ball_is_back(rest, self._state.task):
                 self.post(TimeUp(now_s))
+
+    def _where(self) -> tuple[SessionState, bool]:
+        return self._state, self._running is not None and self._running.adjustable
 
     def view(self, now_ns: int) -> TankView | None:
         """Return what is to be drawn at ``now_ns`` (servo's clock), as late as the trial asks; None without a trial.
@@ -231,7 +231,7 @@ class Runner:
             self._fail(error)
 
     def _take(self, event: Event) -> None:
-        if isinstance(event, Stepped) and (self._running is None or not self._running.adjustable):
+        if isinstance(event, Stepped) and not self._where()[1]:
             return  # before its first frame and after its end an interval cannot be adjusted
         if isinstance(event, WriteRetried | EndAsked) and self._state.stall is not None:
             self._write_again(self._state.stall)
@@ -360,42 +360,3 @@ class Runner:
             ],
             self._ports.clock(),
         )
-
-    def _hear_buttons(self, samples: Any) -> None:
-        """Post what a button going down means; a press from before the present page is no answer to it."""
-        pressed = self._buttons.pressed(samples)
-        if (pressed & BUTTON_STOP).any():
-            self.post(ForceStopped(self._ports.clock(), "device"))
-        pressed_since = pressed[samples["time_ns"] >= self._page_since_ns]
-        if self._running is not None and self._running.adjustable:
-            self._set_by_buttons(pressed_since, int(samples["time_ns"][-1]))
-            return
-        self._buttons.forget()
-        if (pressed_since & CONTINUE).any() and self._button_goes_on:
-            self.post(Continue(self._ports.clock()))
-        self._answer_by_buttons(pressed_since)
-
-    def _set_by_buttons(self, pressed: Any, now_ns: int) -> None:
-        """Adjust with the device's second and third button, and confirm with its first."""
-        if steps := self._buttons.steps(pressed, now_ns):
-            self.post(Stepped(self._ports.clock(), steps))
-        if (pressed & CONTINUE).any():
-            self.post(Submitted(self._ports.clock()))
-
-    def _answer_by_buttons(self, pressed: Any) -> None:
-        """Answer where there are two answers: the device's second button is the first of them, its third the second."""
-        state = self._state
-        if state.phase is not Phase.ANSWERING or state.due is None or state.design is None:
-            return
-        answers = state.design.answers
-        down = [place for place, bit in enumerate(ANSWERS) if (pressed & bit).any()]
-        if len(answers) == len(ANSWERS) and len(down) == 1:
-            now_s = self._ports.clock()
-            self.post(Chosen(now_s, state.design.name, answers[down[0]]))
-            self.post(Submitted(now_s))
-
-    @property
-    def _button_goes_on(self) -> bool:
-        """Whether the device's button goes on: from a page to read, but a squeeze gives no consent."""
-        state = self._state
-        return state.phase is Phase.READING and self._protocol.pages[state.page_id].kind != "consent"

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from study_app.errors import ServoFault, SessionError
+from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.session.device_buttons import CONTINUE
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TroublePage
-from study_app.session.runner import BUTTON_STOP
 from study_app.session.transitions.events import (
     Begin,
     Chosen,

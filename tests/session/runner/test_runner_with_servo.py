@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from study_app.devices.scripted import ScriptedDevice
+from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.session.ports import Ports
-from study_app.session.runner import BUTTON_STOP, Runner
+from study_app.session.runner import Runner
 from study_app.session.transitions.events import (
     Begin,
     Continue,
