@@ -111,7 +111,7 @@ def test_a_step_is_a_fortieth_of_the_span_or_a_factor_on_log_spacing() -> None:
             '"wake.length" cannot change while it is presented',
         ),
         (
-            [(DAMPING, DAMPING.replace("damping_nspm", "force_delay_ms").replace("[2, 18]", "[1, 9]\nstandards = [5]"))],
+            [(DAMPING, 'vary = "force_delay_ms"\nlevel = "value"\nlevels = [1, 9]\nstandards = [5]')],
             "methods.set.step_size",
             '"force_delay_ms" cannot change while it is presented',
         ),
