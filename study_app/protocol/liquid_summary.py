@@ -95,7 +95,7 @@ def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator
 
 
 def _practised(protocol: Protocol) -> Iterator[str]:
-    """Yield the liquids that are practised in and judged in another block."""
+    """Yield the liquids that are practised in and judged in another block; levels are practised for their task."""
     used = {
         block.id: dict.fromkeys(
             name for it in protocol.conditions_in(block.id) for name in protocol.conditions[it].liquid_ids
@@ -104,7 +104,9 @@ def _practised(protocol: Protocol) -> Iterator[str]:
     }
     judged = {name: block.id for block in reversed(protocol.main_blocks) for name in used[block.id]}
     for block in protocol.blocks_in_order:
-        for name in used[block.id] if block.phase == "practice" else ():
+        if block.phase != "practice" or block.stimulus is not None:
+            continue
+        for name in used[block.id]:
             if name in judged:
                 yield (
                     f"practice {block.id} is in {name}, which block {judged[name]} presents too: participants know it "
