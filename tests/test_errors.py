@@ -7,21 +7,30 @@ import pickle
 import pytest
 
 from study_app import errors
+from study_app.authoring.drafts import ChangedOutsideError
+from study_app.authoring.study import Refused
+from study_app.devices.falcon.boot import BootFailure
 from study_app.devices.falcon.failures import FalconFailure, FalconLost, FalconNotFound, ProgramMissing, UsbFailure
+from study_app.devices.falcon.homing import NotHomed
 from study_app.errors import Problem, ProtocolError, StudyError
 from study_app.workers.messages import Stopped
 
 PLAIN = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, StudyError)]
-OF_A_FALCON = (FalconFailure, FalconLost, FalconNotFound, ProgramMissing, UsbFailure)
 PROTOCOL = ProtocolError(
     "a.toml", (Problem("blocks.b", "is unknown", 3, "did you mean c?"), Problem("x", "is missing"))
 )
 USB = UsbFailure("busy", "opening it", -6)
 EXAMPLES = [
-    *(kind(f"what, value, hint of {kind.__name__}") for kind in [*PLAIN, Stopped] if kind is not ProtocolError),
+    *(
+        kind(f"what, value, hint of {kind.__name__}")
+        for kind in [*PLAIN, Stopped, Refused, ChangedOutsideError]
+        if kind is not ProtocolError
+    ),
     PROTOCOL,
     *(kind(kind.__name__, USB.facts) for kind in (FalconFailure, ProgramMissing)),
     *(kind("busy", "opening it", -6) for kind in (UsbFailure, FalconNotFound, FalconLost)),
+    BootFailure("echo", 2, "nothing came back", silent=True),
+    NotHomed("limp"),
 ]
 
 
