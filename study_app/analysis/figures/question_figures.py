@@ -31,10 +31,15 @@ def question_pictures(
 ) -> Iterator[Picture]:
     """Draw the figure of every question that was answered and has one, in each of ``forms``.
 
-    A figure that fails is left out, and kept in ``failures``.
+    A figure that fails is left out, and kept in ``failures``; levels that participants set have a figure of their own.
     """
     both = zip(study.others.questions, answered, strict=True)
-    shown = [(asked, found) for asked, found in both if found.figure is not None and found.n]
+    set_by_hand = {block.id for block in study.levels if block.design.adjusts}
+    shown = [
+        (asked, found)
+        for asked, found in both
+        if found.figure is not None and found.n and found.where not in set_by_hand
+    ]
     yield from attempted(
         (
             (found.where, f"question-{found.where}-{found.item}", partial(_picture, study, asked, found, forms))

@@ -152,13 +152,21 @@ def test_simulated_observers_set_about_the_standard(study: Path) -> None:
 def test_the_report_has_table_figure_words_and_limits(reported: Path, study: Path) -> None:
     page = (reported / "report.html").read_text(encoding="utf-8")
     text = re.sub(r"<[^>]+>", " ", page)
-    for words in ("Settings", "PSE", "JND [decades]", "constant error [decades]", "hysteresis [decades]", "group of 3"):
+    for words in (
+        "Settings",
+        "PSE [N·s/m]",
+        "JND [decades]",
+        "constant error [decades]",
+        "hysteresis [decades]",
+        "group of 3",
+    ):
         assert words in text
     caption = (reported / "settings-matching.txt").read_text(encoding="utf-8")
     assert "point of subjective equality with its 95 % interval" in caption
     for form in ("png", "pdf", "svg"):
         assert (reported / f"settings-matching.{form}").stat().st_size > 2000
     assert not list(reported.glob("levels-matching*"))
+    assert not list(reported.glob("question-*")), "steps are no answers"
     methods = (reported / "methods.txt").read_text(encoding="utf-8")
     assert "set damping at the hand to the standard 6 N·s/m by the method of adjustment" in methods
     assert "Gescheider 1997" in methods

@@ -30,10 +30,13 @@ def section(where: str, study: Study, results: Results, drawn: Sequence[Picture]
     pictures = {one.name: one for one in drawn}
     asked = {(one.where.id, one.id): one for one in study.others.questions}
     yield from _scores([one for one in results.scores if one.where == where])
+    steps = {one.block for one in results.levels if one.summary == "settings"}  # each from another start
     for found in results.questions:
         if found.where == where:
             yield heading(3, "Answers" if where in {one.block for one in results.levels} else found.short)
             yield paragraph(found.text)
+            if where in steps:
+                continue
             if not found.n:
                 yield paragraph("No answers count yet.")
                 continue

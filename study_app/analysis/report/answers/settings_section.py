@@ -30,7 +30,7 @@ def _table(found: LevelsFound) -> str:
             *((f"Standard [{found.unit}]" if found.unit else "Standard",) if standards else ()),
             "Participant",
             "n",
-            "PSE",
+            f"PSE [{found.unit}]" if found.unit else "PSE",
             "95 % interval",
             f"JND [{unit}]",
             *((f"constant error [{unit}]",) if compared else ()),
