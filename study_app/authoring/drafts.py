@@ -123,6 +123,19 @@ def draft_of(file: Path) -> Draft | None:
     return draft if all(isinstance(one, str) for one in (draft.text, draft.base, draft.kept_at)) else None
 
 
+def drafted_files() -> tuple[Path, ...]:
+    """Return the files that have a draft, sorted; a draft that cannot be read has none."""
+    found: list[Path] = []
+    for kept in (data_folder() / "drafts").glob("*.json"):
+        try:
+            file = Path(json.loads(kept.read_bytes())["file"])
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+        if draft_of(file) is not None:
+            found.append(file)
+    return tuple(sorted(found))
+
+
 def discard(file: Path) -> None:
     """Delete the draft of a study's file.
 

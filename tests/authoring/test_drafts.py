@@ -18,11 +18,13 @@ from study_app.authoring.drafts import (
     content_hash,
     discard,
     draft_of,
+    drafted_files,
     keep,
     kept_content,
     save,
 )
 from study_app.errors import StoreError
+from study_app.user_folder import data_folder
 
 KILLS = 50
 AT_ONCE = 10
@@ -40,6 +42,16 @@ def test_a_draft_is_found_again_until_it_is_discarded(tmp_path: Path) -> None:
     discard(file)
     discard(file)
     assert draft_of(file) is None
+
+
+def test_files_with_a_draft_are_listed(tmp_path: Path) -> None:
+    assert drafted_files() == ()
+    for name in ("b.toml", "a.toml"):
+        keep(tmp_path / name, Draft("a = 1\n", ""))
+    (data_folder() / "drafts" / "broken.json").write_text("{")
+    assert drafted_files() == (tmp_path.resolve() / "a.toml", tmp_path.resolve() / "b.toml")
+    discard(tmp_path / "a.toml")
+    assert drafted_files() == (tmp_path.resolve() / "b.toml",)
 
 
 def test_keeper_writes_within_its_rest_however_fast_edits_follow(tmp_path: Path) -> None:
