@@ -1,0 +1,1 @@
+"""What the study designer shows, as values. No Qt here."""

@@ -1,0 +1,279 @@
+"""The form of one element of a study: its rows in sections, with their faults, places and entries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from study_app.authoring.additions import singular
+from study_app.authoring.fields import Choice, Row, label_of, row_at, rows
+from study_app.authoring.names import named_at
+from study_app.authoring.outline import title_of
+from study_app.authoring.study import Study
+from study_app.protocol.groups.group import sequences_in
+from study_app.protocol.source.document import Path, entries, has
+from study_app.protocol.source.line_numbers import Places
+from study_app.protocol.wording.languages import LANGUAGES
+from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
+
+DEEPEST: Final = 3
+"""So many tables within each other are shown in one form."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One entry of a list, or one table of a section: where it is, what it is called, and how many faults it has."""
+
+    path: Path
+    title: str
+    note: str = ""
+    faults: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class FormRow:
+    """One row of the form.
+
+    Attributes
+    ----------
+    row : Row
+        What is edited and how.
+    place : str
+        Its place in the file, such as ``blocks.liquids.order``, with its line.
+    faults : tuple of str
+        What is wrong with it, in the words of ``check``.
+    languages : tuple of (str, str)
+        Code and name of each language of the study, for texts.
+    entries : tuple of Entry
+        What a list holds, or what references name.
+    target : tuple of str or int or None
+        What a reference names.
+    number : int or None
+        Of alternatives ("either"), which one the value is.
+    """
+
+    row: Row
+    place: str
+    faults: tuple[str, ...] = ()
+    languages: tuple[tuple[str, str], ...] = ()
+    entries: tuple[Entry, ...] = ()
+    target: Path | None = None
+    number: int | None = None
+
+    @property
+    def removable(self) -> bool:
+        """Whether the file holds the key and would be complete without it."""
+        return self.row.value is not None and not self.row.required and isinstance(self.row.path[-1], str)
+
+    @property
+    def bounds(self) -> str:
+        """What is permitted, in one line."""
+        return ", ".join(self.row.bounds)
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Rows under one heading ("" for those of the element itself), and the keys that can be added to them."""
+
+    path: Path
+    title: str
+    rows: tuple[FormRow, ...]
+    absent: tuple[Row, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """The form of one element.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        The element.
+    title, icon, kind : str
+        What it is called, the name of its icon, and what it is: "Block".
+    id : str or None
+        Its name in the file, None where it has none of its own.
+    sections : tuple of Section
+        Its rows.
+    faults : tuple of str
+        What is wrong with it that belongs to no row.
+    position : tuple of int or None
+        Its place in the session or list and how many there are, from 1; None where it has no order.
+    """
+
+    path: Path
+    title: str
+    icon: str
+    kind: str
+    id: str | None = None
+    sections: tuple[Section, ...] = ()
+    faults: tuple[str, ...] = ()
+    position: tuple[int, int] | None = None
+
+    @property
+    def rows(self) -> tuple[FormRow, ...]:
+        """Every row."""
+        return tuple(row for section in self.sections for row in section.rows)
+
+
+def form(study: Study, path: Path) -> Form:
+    """Return the form of the element at ``path``."""
+    document, places = study.document, Places(study.text.replace("\r\n", "\n"))
+    sections = tuple(_sections(study, path, places, 0))
+    shown = {row.row.path for section in sections for row in section.rows}
+    own = tuple(
+        _sentence(study, fault.message, fault.hint)
+        for fault in study.faults
+        if fault.path[: len(path)] == path and not any(fault.path[: len(one)] == one for one in shown)
+    )
+    value = value_at(document, path)
+    name = value.get("id") if isinstance(value, Mapping) else None
+    if name is None and len(path) == 2 and isinstance(value, Mapping):
+        name = str(path[1])
+    return Form(
+        path, title_of(document, path), icon_of(path), _kind(path), None if name is None else str(name), sections, own,
+        position_of(document, path),
+    )  # fmt: skip
+
+
+def step_of(document: Mapping[str, Any], path: Path) -> Path | None:
+    """Return the place of an element in the list that orders it: its own entry, or the step that names it."""
+    if path and isinstance(path[-1], int):
+        return path
+    for place, steps in sequences_in(document):
+        for index in range(len(steps)):
+            if named_at(document, (*place, index)) == path:
+                return (*place, index)
+    return None
+
+
+def position_of(document: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
+    """Return the place of an element among its neighbours, from 1, and how many there are; None without an order."""
+    step = step_of(document, path) if len(path) > 1 else None
+    if step is None or not isinstance(step[-1], int):
+        return None
+    return step[-1] + 1, len(value_at(document, step[:-1]))
+
+
+def first_element(document: Mapping[str, Any]) -> Path:
+    """Return what is selected first: the first step of the session, else the study's own table."""
+    steps = ((*place, 0) for place, listed in sequences_in(document) if listed)
+    return next((named for step in steps if (named := named_at(document, step)) is not None), FIRST)
+
+
+def value_at(document: Any, path: Path) -> Any:
+    """Return the value at ``path``, None where there is none."""
+    for step in path:
+        if not has(document, step):
+            return None
+        document = document[step]
+    return document
+
+
+def _kind(path: Path) -> str:
+    if isinstance(path[-1], int):
+        return label_of(singular(path[-2]))
+    return label_of(singular(path[0])) if len(path) > 1 else "Section of the file"
+
+
+def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[Section]:
+    shown: list[FormRow] = []
+    absent: list[Row] = []
+    below: list[Path] = []
+    for row in rows(study.document, path):
+        faulty = any(fault.path[: len(row.path)] == row.path for fault in study.faults)
+        if row.kind == "table" and row.value is not None and depth < DEEPEST and isinstance(row.value, Mapping):
+            below.append(row.path)
+        elif (
+            row.kind == "tables"
+            and depth < DEEPEST
+            and len(row.path) > 1
+            and isinstance(row.value, Mapping)
+            and not any(isinstance(value, Mapping) for value in row.value.values())
+        ):
+            shown += [
+                _form_row(study, replace(inner, label=f"{row.label}, {inner.label}"), places)
+                for key in row.value
+                if (inner := row_at(study.document, (*row.path, key))) is not None
+            ]
+        elif row.value is None and _optional(row) and not (row.required or faulty):
+            absent.append(row)
+        elif row.path[-1] != "id" or len(path) < 3:
+            shown.append(_form_row(study, row, places))
+    title = "" if depth == 0 else label_of(path[-1])
+    yield Section(path, title, tuple(shown), tuple(absent))
+    for table in below:
+        yield from _sections(study, table, places, depth + 1)
+
+
+def _optional(row: Row) -> bool:
+    """Return whether a key that the file lacks is offered below its section, not shown with what counts without it."""
+    return row.kind == "table" or (row.default in (None, [], {}) and row.kind not in {"kind", "switch"})
+
+
+def _form_row(study: Study, row: Row, places: Places) -> FormRow:
+    document, path = study.document, row.path
+    line = places.line(path)
+    written = ".".join(str(step + 1) if isinstance(step, int) else step for step in path)
+    place = written if line is None else f"{written} · line {line}"
+    faults = tuple(
+        _sentence(study, fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path
+    )
+    codes = [str(code) for _, code in entries(document, "study.languages.*")] or ["en"]
+    number = None
+    if row.kind == "either":
+        number = next((index for index, one in enumerate(row.either) if _fits(one, row.value)), 0)
+    return FormRow(
+        row,
+        place,
+        faults,
+        tuple((code, _language(code)) for code in codes) if row.kind in {"localised", "paragraphs"} else (),
+        tuple(_entries(study, row)),
+        named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
+        number,
+    )
+
+
+def _entries(study: Study, row: Row) -> Iterator[Entry]:
+    if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
+        keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))
+        for key in keys:
+            path = (*row.path, key)
+            faults = sum(fault.path[: len(path)] == path for fault in study.faults)
+            if row.kind == "references":
+                named = named_at(study.document, path)
+                title = str(row.value[key]) if named is None else title_of(study.document, named)
+                yield Entry(path, title, "" if named is None else str(named[-1]), faults)
+            else:
+                inner = value_at(study.document, path)
+                note = inner.get("id", "") if isinstance(inner, Mapping) else ""
+                yield Entry(path, title_of(study.document, path), str(note), faults)
+
+
+def _fits(row: Row, value: Any) -> bool:
+    """Return whether a value is of the kind that a row edits."""
+    if row.kind in {"number", "whole number"}:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    if isinstance(value, tuple):
+        return row.kind in {"numbers", "vector", "points", "texts", "choices", "references", "list"}
+    if isinstance(value, Mapping):
+        return row.kind in {"table", "tables", "localised"}
+    return row.kind not in {"numbers", "vector", "points", "texts", "choices", "references", "list", "table", "tables"}
+
+
+def _sentence(_study: Study, message: str, hint: str) -> str:
+    sentence = f"{message[:1].upper()}{message[1:]}"
+    return f"{sentence} ({hint})" if hint else sentence
+
+
+def _language(code: str) -> str:
+    return LANGUAGES[code].name if code in LANGUAGES else code
+
+
+def choice_words(choice: Choice, default: object) -> str:
+    """Return what a choice is called: its value in words, marked where it counts without being written."""
+    if choice.value is None:
+        return "Not set"
+    words = label_of(str(choice.value)) if not str(choice.value).isdigit() else str(choice.value)
+    return f"{words} (default)" if choice.value == default else words

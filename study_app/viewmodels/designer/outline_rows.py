@@ -1,0 +1,95 @@
+"""The rows of the outline: the session in order, the parts of the study, and the study itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from study_app.authoring.outline import Element, found, outline
+from study_app.authoring.study import Study
+from study_app.protocol.source.document import Path, names
+from study_app.viewmodels.number_words import minutes
+
+ICONS: Final = {
+    "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",
+    "conditions": "columns", "scales": "scale", "stimuli": "pulse", "designs": "columns", "methods": "bars",
+    "groups": "people", "study": "file", "device": "device", "scene": "drop", "limits": "check", "analysis": "bars",
+}  # fmt: skip
+"""The icon of each section; a section that is not listed has a ring."""
+SECTIONS: Final = ("Session, in order", "Parts it is made of", "The study itself")
+FIRST: Final = ("study",)
+"""What is selected where nothing else is."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutlineRow:
+    """One row of the outline.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        The element; () for the heading of a section.
+    title, icon, note : str
+        What it is called, the name of its icon, and a word at its right: a time, or a count.
+    depth : int
+        How far it is below the heading of its section.
+    faults : int
+        How many faults are within it.
+    name : str
+        What a screen reader says of it.
+    """
+
+    path: Path
+    title: str
+    icon: str = ""
+    note: str = ""
+    depth: int = 0
+    faults: int = 0
+    name: str = ""
+
+
+def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
+    """Return the outline of a study; with words to find only the elements that hold them.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    times_s : mapping of str to float
+        How long each step takes [s], by its id; empty while the study has faults.
+    find : str
+        What an element's title, id or one of its texts must hold.
+    """
+    shown = outline(study)
+    rows: list[OutlineRow] = []
+    for heading, elements in zip(SECTIONS, (shown.session, shown.parts, shown.study), strict=True):
+        inner = [_row(study, element, times_s, in_session=heading == SECTIONS[0]) for element in elements]
+        if find.strip():
+            inner = [row for row in inner if len(row.path) > 1 or heading == SECTIONS[2]]
+            inner = [row for row in inner if found(study.document, row.path, find.strip())]
+        total = minutes(sum(times_s.values())) if times_s and heading == SECTIONS[0] else ""
+        if inner:
+            rows += [OutlineRow((), heading, note=total, name=heading), *inner]
+    return tuple(rows)
+
+
+def icon_of(path: Path) -> str:
+    """Return the icon of an element."""
+    return "list" if "items" in path else ICONS.get(str(path[0]), "ring") if path else "ring"
+
+
+def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_session: bool) -> OutlineRow:
+    path, note, kind = element.path, "", str(element.path[0])
+    if in_session:
+        note = minutes(times_s[element.id]) if element.depth == 0 and element.id in times_s else ""
+    elif element.depth == 0 and kind in SECTIONS_OF_TABLES:
+        count = len(names(study.document, kind))
+        note = str(count) if count else "none"
+    faults = f"{element.faults} problem{'s' * (element.faults > 1)}" if element.faults else ""
+    sort = kind.removesuffix("s") if len(path) == 2 else "question" if "items" in path else ""
+    name = ", ".join(filter(None, (element.title, sort, note, faults)))
+    return OutlineRow(path, element.title, icon_of(path), note, element.depth + 1, element.faults, name)
+
+
+SECTIONS_OF_TABLES: Final = frozenset(ICONS) - {"study", "device", "scene", "limits", "analysis"}

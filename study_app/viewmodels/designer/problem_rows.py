@@ -1,0 +1,74 @@
+"""The problems of a study, as ``check`` prints them, each with the element and the field that it belongs to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from study_app.authoring.fields import label_of, row_at
+from study_app.authoring.outline import title_of
+from study_app.authoring.study import Study
+from study_app.protocol.source.document import Path, has
+from study_app.protocol.source.line_numbers import Places
+from study_app.protocol.source.problems import Fault
+from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
+
+
+@dataclass(frozen=True, slots=True)
+class ProblemRow:
+    """One problem.
+
+    Attributes
+    ----------
+    fault : Fault
+        What is wrong, by path.
+    element : tuple of str or int
+        The element whose form shows it; () where the file cannot be read.
+    title, icon, field : str
+        What the element is called, the name of its icon, and the label of the field.
+    message, hint : str
+        The sentence of ``check``, and its hint.
+    line : int or None
+        The line in the file, from 1.
+    """
+
+    fault: Fault
+    element: Path
+    title: str
+    icon: str
+    field: str
+    message: str
+    hint: str
+    line: int | None
+
+
+def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
+    """Return the problems of a study, in the order of their lines."""
+    if not study.is_toml:
+        return tuple(
+            ProblemRow(fault, (), "The file", "file", "", problem.message, problem.hint, problem.line)
+            for fault, problem in zip(study.faults, study.problems, strict=True)
+        )
+    places = Places(study.text.replace("\r\n", "\n"))
+    found = [_row(study, fault, places.line(fault.path)) for fault in study.faults]
+    return tuple(sorted(found, key=lambda row: row.line or 0))
+
+
+def element_of(study: Study, path: Path) -> Path:
+    """Return the element of the outline that a place of the file belongs to."""
+    if not path or not has(study.document, path[0]):
+        return path[:1] or FIRST
+    section = row_at(study.document, path[:1])
+    tables = section is not None and section.kind == "tables"
+    if len(path) >= 4 and path[2] == "items" and isinstance(path[3], int):
+        return path[:4]
+    return path[:2] if tables and has(study.document[str(path[0])], path[1] if len(path) > 1 else "") else path[:1]
+
+
+def _row(study: Study, fault: Fault, line: int | None) -> ProblemRow:
+    element = element_of(study, fault.path)
+    inside = fault.path[len(element) :]
+    message = f"{fault.message[:1].upper()}{fault.message[1:]}"
+    field = ", ".join(label_of(step) for step in inside)
+    return ProblemRow(
+        fault, element, title_of(study.document, element), icon_of(element), field, message, fault.hint, line
+    )

@@ -1,0 +1,39 @@
+"""What the study designer asks before some steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from study_app.protocol.source.document import Path
+
+
+@dataclass(frozen=True, slots=True)
+class DeletePrompt:
+    """What refers to an element that is to be deleted.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        The element.
+    title : str
+        What it is called.
+    references : tuple of str
+        The places that name it, in words.
+    others : tuple of (str, str)
+        Id and title of what could be named in its place.
+    """
+
+    path: Path
+    title: str
+    references: tuple[str, ...]
+    others: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TemplateChoice:
+    """What a new study can begin as: its source, title and description; ``copy`` says that it is another study."""
+
+    source: str
+    title: str
+    description: str
+    copy: bool = False

@@ -1,0 +1,116 @@
+"""What is asked for in the study designer: each a step of undo."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+from study_app.protocol.source.document import Path
+
+
+@dataclass(frozen=True, slots=True)
+class SetValue:
+    """Give a key or entry a value; several while one field is typed in are one step."""
+
+    path: Path
+    value: Any
+    typing: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SetText:
+    """Give a text in one language."""
+
+    path: Path
+    language: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveKey:
+    """Remove a key or an entry of a list."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class AddKey:
+    """Write an optional key with its default or an initial value."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class AddEntry:
+    """Add an entry at the end of a list: the value, or where it is None an initial one."""
+
+    path: Path
+    value: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchKind:
+    """Give a table another kind."""
+
+    path: Path
+    kind: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class AddElement:
+    """Add an element to a section of tables or a list of tables."""
+
+    section: Path
+
+
+@dataclass(frozen=True, slots=True)
+class DuplicateElement:
+    """Copy an element right after itself."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class MoveElement:
+    """Move an element among its neighbours, by so many places."""
+
+    path: Path
+    by: int
+
+
+@dataclass(frozen=True, slots=True)
+class MoveEntry:
+    """Move an entry of a list to a place, from 0."""
+
+    path: Path
+    to: int
+
+
+@dataclass(frozen=True, slots=True)
+class DeleteElement:
+    """Delete an element: with all that needs it, with another one in its place, or leaving gaps."""
+
+    path: Path
+    how: Literal["all", "other", "gaps"] = "gaps"
+    other: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RenameElement:
+    """Give an element another id, and all that name it."""
+
+    path: Path
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class RetypeFile:
+    """Give the file another text, as the pane shows it."""
+
+    text: str
+
+
+Request: TypeAlias = (
+    SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | AddElement | DuplicateElement | MoveElement
+    | MoveEntry | DeleteElement | RenameElement | RetypeFile
+)  # fmt: skip

@@ -1,0 +1,94 @@
+"""Everything that the study designer shows at one moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal, TypeAlias
+
+from study_app.authoring.additions import singular
+from study_app.authoring.fields import label_of, rows
+from study_app.authoring.study import Study
+from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.file_text import FileText
+from study_app.viewmodels.designer.form_rows import Form
+from study_app.viewmodels.designer.problem_rows import ProblemRow
+from study_app.viewmodels.tones import Tone
+
+NO_FILE: Final = FileText()
+BannerAction: TypeAlias = Literal["copy", "keep", "take", "discard"]
+
+
+@dataclass(frozen=True, slots=True)
+class StudyChoice:
+    """A study that can be opened: what it is called, what it is opened by, and whether it ships with the program."""
+
+    title: str
+    source: str
+    shipped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Banner:
+    """One line above the form, with its buttons: what each asks for, and its words."""
+
+    words: str
+    actions: tuple[tuple[BannerAction, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class HeaderState:
+    """The header.
+
+    Attributes
+    ----------
+    studies : tuple of StudyChoice
+        What can be opened.
+    chosen : str
+        What is open, by its source; "" where nothing is.
+    problems : tuple of (str, str, str)
+        Tone, icon and words of the chip.
+    draft : str
+        What is said of the draft, "" where nothing is.
+    undo, redo : str
+        What would be undone and redone; "" where nothing is.
+    can_save : bool
+        Whether the file differs and may be written.
+    read_only : bool
+        Whether the study cannot be changed.
+    """
+
+    studies: tuple[StudyChoice, ...] = ()
+    chosen: str = ""
+    problems: tuple[Tone, str, str] = ("ok", "check", "No problems")
+    draft: str = ""
+    undo: str = ""
+    redo: str = ""
+    can_save: bool = False
+    read_only: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class DesignerView:
+    """What the place shows, but the outline, which follows a moment later; without a form no study is open."""
+
+    header: HeaderState = HeaderState()
+    form: Form | None = None
+    file: FileText = NO_FILE
+    problems: tuple[ProblemRow, ...] = ()
+    banner: Banner | None = None
+    addable: tuple[tuple[Path, str], ...] = ()
+
+
+def addable(study: Study) -> tuple[tuple[Path, str], ...]:
+    """Return the sections of tables that an element can be added to, with the word for one."""
+    sections = [row.path for row in rows(study.document, ()) if row.kind == "tables"]
+    return tuple((path, label_of(singular(path[-1]))) for path in sections)
+
+
+def problems_chip(count: int, warnings: int) -> tuple[Tone, str, str]:
+    """Return tone, icon and words of the chip of problems."""
+    if count:
+        return "bad", "warning", f"{count} problem{'s' * (count > 1)}"
+    if warnings:
+        return "warn", "warning", f"{warnings} warning{'s' * (warnings > 1)}"
+    return "ok", "check", "No problems"

@@ -1,0 +1,88 @@
+"""The form of an element: every key of it once, faults at their rows, and where everything is in the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.authoring.outline import outline
+from study_app.authoring.study import Study, read
+from study_app.authoring.templates import FOLDER, templates
+from study_app.authoring.writer.edits import Set, Unset
+from study_app.protocol.source.files import shipped, shipped_file
+from study_app.viewmodels.designer.form_rows import first_element, form, position_of, value_at
+
+FILES = [*(shipped_file(name) for name in shipped()), *(FOLDER / f"{name}.toml" for name in templates())]
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
+
+
+def leaves(value: Any, path: tuple[Any, ...] = ()) -> set[tuple[Any, ...]]:
+    """The keys of an element, those of tables within it too; entries of lists are forms of their own."""
+    if isinstance(value, dict) and (value or not path):
+        return {found for key, inner in value.items() for found in leaves(inner, (*path, key))}
+    return {path}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_every_key_of_every_element_is_in_its_form_with_its_value(file: Path) -> None:
+    study = read(file.read_bytes(), file.parent)
+    shown = outline(study)
+    for element in {one.path for one in (*shown.session, *shown.parts, *shown.study)}:
+        if len(element) == 1 and element[0] not in {"study", "device", "scene", "limits", "analysis"}:
+            continue
+        if value_at(study.document, element) is None:
+            continue
+        made = form(study, element)
+        rows = {row.row.path: row.row.value for row in made.rows}
+        for leaf in leaves(value_at(study.document, element), element):
+            if leaf[-1] == "id" and len(leaf) > 3:
+                assert made.id is not None
+                continue
+            around = next((leaf[:length] for length in range(len(leaf), 0, -1) if leaf[:length] in rows), None)
+            assert around is not None, leaf
+            assert rows[around] == value_at(study.document, around)
+
+
+def test_a_row_says_its_place_and_line(study: Study) -> None:
+    row = next(row for row in form(study, ("blocks", "liquids")).rows if row.row.path[-1] == "order")
+    place, line = row.place.split(" · line ")
+    assert place == "blocks.liquids.order"
+    assert study.text.splitlines()[int(line) - 1].startswith("order = ")
+
+
+def test_a_fault_is_at_its_row(study: Study) -> None:
+    broken, _ = study.edited(Set(("blocks", "liquids", "order"), "shufled"))
+    faulty = [row for row in form(broken, ("blocks", "liquids")).rows if row.faults]
+    assert [row.row.path[-1] for row in faulty] == ["order"]
+    assert 'did you mean "shuffled"?' in faulty[0].faults[0]
+    lacking, _ = study.edited(Unset(("conditions", "honey", "liquid")))
+    made = form(lacking, ("conditions", "honey"))
+    assert made.faults or any(row.faults for row in made.rows)
+
+
+def test_optional_keys_are_offered_not_shown(study: Study) -> None:
+    section = form(study, ("blocks", "liquids")).sections[0]
+    absent = {row.path[-1] for row in section.absent}
+    assert {"max_repeats", "break_every", "until"} <= absent
+    assert not absent & {row.row.path[-1] for row in section.rows}
+
+
+def test_texts_have_every_language_and_references_their_target(study: Study) -> None:
+    rows = {row.row.path[-1]: row for row in form(study, ("blocks", "liquids")).rows}
+    assert [code for code, _ in rows["title"].languages] == ["en", "nl"]
+    assert rows["task"].target == ("tasks", "explore")
+    assert [entry.title for entry in rows["conditions"].entries] == ["Water", "Honey", "Light oil"]
+
+
+def test_positions_are_those_of_the_session_or_the_list(study: Study) -> None:
+    assert first_element(study.document) == ("pages", "consent")
+    assert position_of(study.document, ("pages", "consent")) == (1, len(study.document["sequence"]))
+    assert position_of(study.document, ("questionnaires", "liquid", "items", 2)) == (3, 9)
+    assert position_of(study.document, ("liquids", "water")) is None
