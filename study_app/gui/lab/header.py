@@ -7,7 +7,6 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
-    QPushButton,
     QWidget,
 )
 
@@ -15,7 +14,7 @@ from study_app.gui.lab.side_switch import SideSwitch
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
+from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.stop_button import CompactStop
 from study_app.viewmodels.lab import Choices, LabView
@@ -23,24 +22,6 @@ from study_app.viewmodels.lab import Choices, LabView
 BUTTON = 44
 FREE = "Free motion"
 LETTERS = 13  # of a choice before it is cut
-
-
-class IconButton(Themed, QPushButton):
-    """A square button with an icon alone; its words are in its name and its tip."""
-
-    def __init__(self, icon: str, name: str, tip: str) -> None:
-        super().__init__()
-        self._icon = icon
-        self.setFixedSize(BUTTON, BUTTON)
-        self.setAccessibleName(name)
-        self.setToolTip(tip)
-        self.setCursor(Qt.CursorShape.PointingHandCursor)
-
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the button and its icon."""
-        super().paintEvent(event)
-        ink = self.theme.text if self.isEnabled() else self.theme.ctl
-        draw_icon(QPainter(self), self._icon, QRectF(self.rect()).adjusted(12, 12, -12, -12), ink, 2.0)
 
 
 class Picker(Choice):

@@ -108,6 +108,29 @@ class ActionButton(Themed, PressedByEnter):
         painter.drawText(cap, Qt.AlignmentFlag.AlignCenter, self._key)
 
 
+class IconButton(Themed, PressedByEnter):
+    """A square button with an icon alone; its words are in its name and its tip."""
+
+    def __init__(self, icon: str, name: str, tip: str = "", *, size: int = 44, role: str = "") -> None:
+        super().__init__()
+        self._icon, self._role = icon, role
+        self.setProperty("role", role)
+        if size < 42:
+            self.setProperty("dense", "true")
+        self.setFixedSize(size, size)
+        self.setAccessibleName(name)
+        self.setToolTip(tip or name)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the button and its icon."""
+        super().paintEvent(event)
+        ink = {"danger": self.theme.bad, "plain": self.theme.text3}.get(self._role, self.theme.text)
+        middle, half = QRectF(self.rect()).center(), 10 if self.width() >= 40 else 8
+        place = QRectF(middle.x() - half, middle.y() - half, 2 * half, 2 * half)
+        draw_icon(QPainter(self), self._icon, place, ink if self.isEnabled() else self.theme.ctl, 2.0)
+
+
 class Choice(Themed, QComboBox):
     """A list to choose one from, with its chevron; the wheel scrolls the page, never the choice.
 

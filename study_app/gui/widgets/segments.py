@@ -1,0 +1,107 @@
+"""A choice between few words, side by side: the chosen one is raised, with an accent edge."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
+
+from study_app.gui.theme.theme import RADIUS_CONTROL, font
+from study_app.gui.theme.themed import Themed, dress, take_away
+
+INSIDE = 3
+
+
+class _Segment(Themed, QAbstractButton):
+    def __init__(self, words: str, height: int) -> None:
+        super().__init__()
+        self.setText(words)
+        self.setCheckable(True)
+        self.setAccessibleName(words)
+        self._height = height - 2 * INSIDE
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
+
+    def nextCheckState(self) -> None:  # noqa: N802 - Qt's name
+        """Leave it to `Segments` which is chosen."""
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for the words."""
+        return QSize(round(QFontMetricsF(font("label", weight=600)).horizontalAdvance(self.text())) + 24, self._height)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the same room."""
+        return self.sizeHint()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the raised surface of the chosen one, and the words."""
+        t, painter = self.theme, QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        body = QRectF(self.rect()).adjusted(1, 1, -1, -1)
+        if self.isChecked() or self.hasFocus():
+            painter.setPen(QPen(QColor(t.accent if self.isEnabled() else t.ctl), 2 if self.hasFocus() else 1.2))
+            painter.setBrush(QColor(t.surface) if self.isChecked() else Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(body, RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
+        painter.setPen(QColor(t.text if self.isChecked() else t.text2))
+        painter.setFont(font("label", weight=600 if self.isChecked() else 500))
+        painter.drawText(QRectF(self.rect()), Qt.AlignmentFlag.AlignCenter, self.text())
+
+
+class Segments(Themed, QWidget):
+    """One of few values; ``chosen`` carries the value that a press or an arrow key asks for."""
+
+    chosen = Signal(object)
+
+    def __init__(self, name: str, *, height: int = 34) -> None:
+        super().__init__()
+        self.setAccessibleName(name)
+        self._name, self._height = name, height
+        self._values: tuple[object, ...] = ()
+        self.buttons: list[_Segment] = []
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(INSIDE, INSIDE, INSIDE, INSIDE)
+        self._row.setSpacing(2)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+
+    def show_values(self, values: Sequence[tuple[object, str]], chosen: object) -> None:
+        """Offer values with their words, of which one is chosen."""
+        words = [word for _, word in values]
+        if words != [button.text() for button in self.buttons]:
+            for button in self.buttons:
+                take_away(button)
+            self.buttons = []
+            for number, word in enumerate(words):
+                made = _Segment(word, self._height)
+                made.setAccessibleDescription(self._name)
+                made.clicked.connect(lambda _checked=False, at=number: self.chosen.emit(self._values[at]))
+                dress(made, self.theme)
+                self._row.addWidget(made)
+                self.buttons.append(made)
+        self._values = tuple(value for value, _ in values)
+        for button, value in zip(self.buttons, self._values, strict=True):
+            button.setChecked(value == chosen)
+            button.update()
+        current = next((button for button in self.buttons if button.isChecked()), None)
+        if self.buttons:
+            self.setFocusProxy(current or self.buttons[0])
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Choose the neighbour by the arrow keys."""
+        step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()), 0)
+        at = next((number for number, button in enumerate(self.buttons) if button.hasFocus()), None)
+        if step and at is not None and 0 <= at + step < len(self.buttons):
+            self.buttons[at + step].setFocus(Qt.FocusReason.TabFocusReason)
+            self.chosen.emit(self._values[at + step])
+        else:
+            super().keyPressEvent(event)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the sunk strip."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(self.theme.sunk))
+        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
