@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,17 +27,19 @@ from study_app.workspace import Workspace, chosen_workspace, offered_workspace, 
 LOOK_AFTER_MS = 300  # the window stands by then
 
 if TYPE_CHECKING:
+    from study_app.app.designer.controller import DesignerController
     from study_app.app.lab.controller import LabController
     from study_app.app.lab.initial_settings import InitialSettings
     from study_app.app.results import ResultsController
+    from study_app.gui.designer.view import DesignerPlace
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.results.view import ResultsPlace
 
 
-def home(results: Path | None = None) -> int:
+def home(results: Path | None = None, *, then: Callable[[MainController], None] = lambda _visit: None) -> int:
     """Open the home window on the results folder; return the exit code when it is closed.
 
-    By default the folder is the workspace's.
+    By default the folder is the workspace's. ``then`` is called once the window stands.
 
     Raises
     ------
@@ -47,6 +50,7 @@ def home(results: Path | None = None) -> int:
     visit = MainController(results)
     with collecting_here(), ended_from_outside(visit.end_by_signal):
         visit.open()
+        then(visit)
         visit.loop.exec()
     visit.end()
     application.processEvents()
@@ -76,6 +80,7 @@ class MainController(QObject):
         self.window = MainWindow(
             {
                 "home": self._home,
+                "designer": self._designer,
                 "results": self._results,
                 "lab": self._lab,
                 "devices": self.devices.make_place,
@@ -92,6 +97,7 @@ class MainController(QObject):
         self.live: LiveSession | None = None
         self._called_off: list[LiveSession] = []
         self.desk: ResultsController | None = None
+        self.designer: DesignerController | None = None
         self.lab: LabController | None = None
         self.window.closed.connect(self._leave)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
@@ -131,6 +137,8 @@ class MainController(QObject):
         made.session_asked.connect(self._start)
         made.results_asked.connect(self._show_study)
         made.protocol_opened.connect(self.machine.remember_protocol)
+        made.edit_asked.connect(self.open_designer)
+        made.new_asked.connect(self.begin_study)
         made.device.display_asked.connect(self._test_display)
         made.show_machine(self.machine.settings, self.devices.preferred)
         self._home_place = made
@@ -150,6 +158,8 @@ class MainController(QObject):
             self._home_place.show_results(self.results)
             if self.desk is not None:
                 self.desk.show_results(self.results)
+            if self.designer is not None:
+                self.designer.results = self.results
         self._show_machine()
 
     def _test_display(self) -> None:
@@ -169,6 +179,35 @@ class MainController(QObject):
 
         self.desk = ResultsController(self.results)
         return self.desk.place
+
+    def _designer(self) -> DesignerPlace:
+        from study_app.app.designer.controller import DesignerController  # noqa: PLC0415 - only once it is needed
+
+        self.designer = DesignerController(self.results)
+        self.designer.saved.connect(self._show_saved)
+        return self.designer.place
+
+    def _show_saved(self, _file: Path) -> None:
+        """Show the study that was saved on home's cards."""
+        if self._home_place is not None:
+            self._home_place.show_studies()
+            self._home_place.show_sessions()
+
+    def open_designer(self, source: str) -> None:
+        """Go to the study designer with a study."""
+        self.window.place("designer")
+        assert self.designer is not None  # noqa: S101 - made with its place
+        self.designer.open(source)
+        self.window.go("designer")
+
+    def begin_study(self, source: str = "", name: str = "") -> None:
+        """Go to the study designer with what a new study can begin from; with a name begin it at once."""
+        self.window.place("designer")
+        assert self.designer is not None  # noqa: S101 - made with its place
+        self.window.go("designer")
+        self.designer.ask_for_new(source)
+        if name:
+            self.designer.begin(source, name)
 
     def _prepare_lab(self) -> bool:
         """Load the lab in the background, from when home stands; return whether that is done."""

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Final
 
-from study_app.authoring.drafts import ChangedOutsideError, save
+from study_app.authoring.drafts import save
 from study_app.authoring.study import Study, read
 from study_app.authoring.templates import FOLDER, templates
 from study_app.authoring.writer.edits import Set
@@ -41,12 +41,24 @@ def copy_of(study: Study, name: str) -> Study:
     Refused
         The name is not permitted, or the study cannot be read.
     """
-    if not _NAME.fullmatch(name):
-        raise Refused(f'"{name}" is not a name of a study: write at most 40 small letters and digits, a letter first')
-    if name in shipped():
-        raise Refused(f'"{name}" is a study that ships with the program: choose another name')
+    _check_name(name)
     named = Study(study.text.replace(_SELF, f"liquid-study check {name}"), study.folder)
     return named.edited(Set(("study", "name"), name), Set(("study", "version"), FIRST_VERSION))[0]
+
+
+def check_free(name: str) -> Path:
+    """Return the file of a new study in the workspace's protocols.
+
+    Raises
+    ------
+    Refused
+        The name is not permitted, or taken.
+    """
+    _check_name(name)
+    file = workspace().protocols / f"{name}.toml"
+    if file.exists():
+        raise Refused(f"{file} is already there: choose another name")
+    return file
 
 
 def write_new(study: Study, name: str) -> Path:
@@ -59,10 +71,13 @@ def write_new(study: Study, name: str) -> Path:
     StoreError
         It cannot be written.
     """
-    file = workspace().protocols / f"{name}.toml"
-    text = copy_of(study, name).text
-    try:
-        save(file, text, "")
-    except ChangedOutsideError as error:
-        raise Refused(f"{file} is already there: choose another name") from error
+    file = check_free(name)
+    save(file, copy_of(study, name).text, "")
     return file
+
+
+def _check_name(name: str) -> None:
+    if not _NAME.fullmatch(name):
+        raise Refused(f'"{name}" is not a name of a study: write at most 40 small letters and digits, a letter first')
+    if name in shipped():
+        raise Refused(f'"{name}" is a study that ships with the program: choose another name')

@@ -31,6 +31,7 @@ class Destination(NamedTuple):
 
 DESTINATIONS = (
     Destination("home", "home", "Home", "Home"),
+    Destination("designer", "designer", "Study designer", "Designer"),
     Destination("results", "bars", "Results", "Results"),
     Destination("lab", "sliders", "Liquid lab", "Lab"),
     Destination("devices", "device", "Devices", "Devices"),

@@ -1,0 +1,53 @@
+"""The repairs of a study's problems: found one after the other, while the window goes on."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from study_app.authoring.repairs import Repair, repairs
+from study_app.authoring.study import Study
+from study_app.viewmodels.designer.problem_rows import ProblemRow
+
+REST_MS: Final = 500
+"""So long after the last edit the search begins: each repair is tried on the whole study."""
+
+
+class RepairSearch(QObject):
+    """Finds the repairs of problems; ``found`` carries the problem and the words of its repairs."""
+
+    found = Signal(object, object)
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self._study: Study | None = None
+        self._waiting: list[ProblemRow] = []
+        self._known: dict[ProblemRow, tuple[Repair, ...]] = {}
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self._find)
+
+    def begin(self, study: Study, problems: tuple[ProblemRow, ...]) -> None:
+        """Search for the repairs of a study's problems, anew where the study changed."""
+        if study is self._study:
+            return
+        self._study, self._known = study, {}
+        self._waiting = list(problems) if study.is_toml else []
+        if self._waiting:
+            self._timer.start(REST_MS)
+        else:
+            self._timer.stop()
+
+    def repair(self, row: ProblemRow, words: str) -> Repair | None:
+        """Return a repair that was found, by its words."""
+        return next((one for one in self._known.get(row, ()) if one.words == words), None)
+
+    def _find(self) -> None:
+        if self._study is None or not self._waiting:
+            return
+        row = self._waiting.pop(0)
+        self._known[row] = repairs(self._study, row.fault)
+        self.found.emit(row, tuple(one.words for one in self._known[row]))
+        if self._waiting:
+            self._timer.start(0)

@@ -1,0 +1,221 @@
+"""From what is asked for to the edits of a study: one step each, with its words and what is selected after it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from study_app.authoring.additions import added, initial, singular
+from study_app.authoring.conversions import left_by, switched
+from study_app.authoring.fields import label_of, row_at
+from study_app.authoring.names import deletions, free_name, references_to, renamed, replaced, with_references
+from study_app.authoring.outline import title_of
+from study_app.authoring.repairs import repairs
+from study_app.authoring.study import Study
+from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Move, Set, Unset
+from study_app.authoring.writer.refused import Refused
+from study_app.protocol.source.document import Path, entries, names
+from study_app.viewmodels.designer.form_rows import step_of, value_at
+from study_app.viewmodels.designer.problem_rows import element_of
+from study_app.viewmodels.designer.prompts import DeletePrompt
+from study_app.viewmodels.designer.requests import (
+    AddElement,
+    AddEntry,
+    AddKey,
+    DeleteElement,
+    DuplicateElement,
+    MoveElement,
+    MoveEntry,
+    RemoveKey,
+    RenameElement,
+    Request,
+    SetText,
+    SetValue,
+    SwitchKind,
+)
+
+_ROUNDS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The edits of one step: its words, what is selected after it (None: the same), and what it may continue."""
+
+    words: str
+    edits: tuple[Edit, ...]
+    select: Path | None = None
+    continues: object = None
+
+
+class Steps:
+    """Makes steps; keeps the values that a switch of kind removed, for a switch back."""
+
+    def __init__(self) -> None:
+        self._left: dict[Path, dict[str, Any]] = {}
+
+    def leave(self) -> None:
+        """Forget what switches removed: another element is selected."""
+        self._left.clear()
+
+    def step(self, study: Study, asked: Request) -> Step:
+        """Return the step that is asked for.
+
+        Raises
+        ------
+        Refused
+            It makes no sense in this study.
+        """
+        if isinstance(asked, SwitchKind):
+            return self._switch(study, asked)
+        if isinstance(asked, SetValue):
+            name = label_of(asked.path[-1])
+            return Step(f"Change {name}", (Set(asked.path, asked.value),), None, asked.path if asked.typing else None)
+        if isinstance(asked, SetText):
+            return Step(f"Type {label_of(asked.path[-1])}", _text(study, asked), None, (*asked.path, asked.language))
+        if isinstance(asked, RemoveKey):
+            return Step(f"Remove {label_of(asked.path[-1])}", (Unset(asked.path),))
+        if isinstance(asked, AddKey):
+            value = _listed(initial(study.document, asked.path))
+            return Step(f"Add {label_of(asked.path[-1])}", (Set(asked.path, value),))
+        if isinstance(asked, AddEntry):
+            return _add_entry(study, asked)
+        if isinstance(asked, AddElement):
+            edits, path = added(study, asked.section)
+            return Step(f"Add {singular(asked.section[-1])}", edits, path)
+        if isinstance(asked, DuplicateElement):
+            return _duplicate(study, asked.path)
+        if isinstance(asked, MoveElement):
+            return _move(study, asked)
+        if isinstance(asked, MoveEntry):
+            return Step(f"Move entry {_index(asked.path) + 1}", (Move(asked.path, asked.to),))
+        if isinstance(asked, RenameElement):
+            edits = renamed(study.document, asked.path, asked.name)
+            after = asked.path if isinstance(asked.path[-1], int) else (*asked.path[:-1], asked.name)
+            return Step(f"Rename to {asked.name}", edits, after)
+        if isinstance(asked, DeleteElement):
+            return _delete(study, asked)
+        raise Refused("this cannot be done to a study")
+
+    def _switch(self, study: Study, asked: SwitchKind) -> Step:
+        kept = self._left.get(asked.path, {})
+        edits = switched(study, asked.path, asked.kind, kept)
+        self._left[asked.path] = {**kept, **left_by(study, asked.path, asked.kind)}
+        return Step(f"Switch to {label_of(asked.kind or 'nothing').lower()}", edits)
+
+
+def _text(study: Study, asked: SetText) -> tuple[Edit, ...]:
+    languages = [str(code) for _, code in entries(study.document, "study.languages.*")] or [asked.language]
+    value = value_at(study.document, asked.path)
+    if isinstance(value, Mapping):
+        return (Set((*asked.path, asked.language), asked.text),)
+    if len(languages) == 1:
+        return (Set(asked.path, asked.text),)
+    before = {languages[0]: value} if isinstance(value, str) else {}
+    return (Set(asked.path, {**before, asked.language: asked.text}),)
+
+
+def _add_entry(study: Study, asked: AddEntry) -> Step:
+    row = row_at(study.document, asked.path)
+    there = row.value if row is not None and isinstance(row.value, tuple) else ()
+    value = asked.value
+    if value is None:
+        if row is None:
+            raise Refused("nothing can be added here")
+        if row.kind == "list":
+            edits, _path = added(study, asked.path)
+            return Step(f"Add {singular(asked.path[-1])}", edits)
+        first = initial({}, asked.path) if not there else there[-1]
+        value = _listed(first[0] if not there and isinstance(first, list | tuple) else first)
+    edit: Edit = Insert((*asked.path, len(there)), value) if there else Set(asked.path, [value])
+    return Step(f"Add to {label_of(asked.path[-1])}", (edit,))
+
+
+def _duplicate(study: Study, path: Path) -> Step:
+    """Return the step that copies an element, with a name and a code letter of its own, and its step in the session."""
+    document, words = study.document, f"Duplicate {title_of(study.document, path)}"
+    first: list[Edit]
+    if isinstance(path[-1], int):
+        after: Path = (*path[:-1], path[-1] + 1)
+        item = value_at(document, path)
+        first = [Duplicate(path)]
+        if isinstance(item, Mapping) and isinstance(item.get("id"), str):
+            taken = [str(name) for _, name in entries(document, ".".join((*map(str, path[:-1]), "*", "id")))]
+            first.append(Set((*after, "id"), free_name(taken, item["id"])))
+    elif len(path) == 2:
+        after = (path[0], free_name(names(document, str(path[0])), str(path[1])))
+        first = [Duplicate(path, str(after[1]))]
+        if (step := step_of(document, path)) is not None:
+            first.append(Insert((*step[:-1], _index(step) + 1), str(after[1])))
+    else:
+        raise Refused("only elements of a section or list can be duplicated")
+    known = {(fault.path, fault.message) for fault in study.faults}
+    for _ in range(_ROUNDS):
+        found = [fault for fault in study.edited(*first)[0].faults if (fault.path, fault.message) not in known]
+        if not found:
+            break
+        fault = found[0]
+        known.add((fault.path, fault.message))
+        if fault.path[-1:] == ("code_prefix",):
+            without, _ = study.edited(*first, Unset((*after, "code_prefix")))
+            first.append(Set((*after, "code_prefix"), initial(without.document, (*after, "code_prefix"))))
+        elif offered := repairs(study.edited(*first)[0], fault):
+            first += offered[0].edits
+    return Step(words, tuple(first), after)
+
+
+def _move(study: Study, asked: MoveElement) -> Step:
+    step = step_of(study.document, asked.path)
+    title = title_of(study.document, asked.path)
+    if step is None:
+        raise Refused(f"{title} has no place in an order: it is not moved")
+    to, count = _index(step) + asked.by, len(value_at(study.document, step[:-1]))
+    if not 0 <= to < count:
+        raise Refused(f"{title} is the {'first' if asked.by < 0 else 'last'} already")
+    select = (*step[:-1], to) if step == asked.path else asked.path
+    return Step(f"Move {title} {'up' if asked.by < 0 else 'down'}", (Move(step, to),), select)
+
+
+def _delete(study: Study, asked: DeleteElement) -> Step:
+    path, document = asked.path, study.document
+    words = f"Delete {title_of(document, path)}"
+    if asked.how == "other":
+        return Step(words, replaced(document, path, asked.other), (*path[:-1], asked.other))
+    if isinstance(path[-1], int):
+        select: Path = path[:2]
+    else:
+        others = [name for name in names(document, str(path[0])) if name != path[-1]]
+        select = (path[0], others[0]) if others else path[:1]
+    if asked.how == "all":
+        gone = with_references(document, path, study.needs)
+        if any(select[: len(one)] == one for one in gone):
+            select = ("study",)
+        return Step(words, deletions(gone), select)
+    return Step(words, (Unset(path),), select)
+
+
+def delete_prompt(study: Study, path: Path) -> DeletePrompt:
+    """Return what names an element, and what could be named in its place."""
+    document = study.document
+    places = references_to(document, path)
+    references = (f"{title_of(document, element_of(study, place))}: {_field(study, place)}" for place in places)
+    others = (name for name in names(document, str(path[0])) if name != path[-1] and len(path) == 2)
+    titles = tuple((name, title_of(document, (path[0], name))) for name in others)
+    return DeletePrompt(path, title_of(document, path), tuple(dict.fromkeys(references)), titles)
+
+
+def _field(study: Study, place: Path) -> str:
+    inside = [label_of(step) for step in place[len(element_of(study, place)) :]]
+    return ", ".join(inside) or f"entry {_index(place) + 1}"
+
+
+def _index(path: Path) -> int:
+    last = path[-1]
+    if not isinstance(last, int):
+        raise Refused(f"{label_of(last)} is not an entry of a list")
+    return last
+
+
+def _listed(value: Any) -> Any:
+    """Return a value with lists in place of tuples."""
+    return [_listed(part) for part in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,117 @@
+"""The studies that the designer can open, and how they are described."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from study_app.app.designer.open_study import OpenStudy, unsaved_studies
+from study_app.authoring.fields import label_of
+from study_app.authoring.names import Document
+from study_app.authoring.new_study import template
+from study_app.authoring.outline import title_of
+from study_app.authoring.study import read
+from study_app.authoring.templates import templates
+from study_app.errors import StudyError
+from study_app.protocol.source.document import Path as Place
+from study_app.protocol.source.document import has
+from study_app.protocol.source.files import find, shipped, shipped_file
+from study_app.viewmodels.designer.form_rows import value_at
+from study_app.viewmodels.designer.outline_rows import FIRST
+from study_app.viewmodels.designer.prompts import TemplateChoice
+from study_app.viewmodels.designer.view import HeaderState, StudyChoice, problems_chip
+from study_app.viewmodels.home import holds_liquids_alone, is_shipped, sources
+
+
+def studies(opened: Path | None) -> tuple[StudyChoice, ...]:
+    """Return what can be opened: the open file, drafts that were never saved, recent files, names at hand."""
+    found = dict.fromkeys([*map(str, unsaved_studies()), *sources()])
+    if opened is not None:
+        found = {source_of(opened): None, **found}
+    return tuple(
+        StudyChoice(Path(source).stem, source, is_shipped(source))
+        for source in found
+        if not (Path(source).suffix == ".toml" and Path(source).exists() and holds_liquids_alone(source))
+    )
+
+
+def header_state(opened: OpenStudy | None, choices: tuple[StudyChoice, ...], warnings: int) -> HeaderState:
+    """Return the header's state of the open study; ``warnings`` is how many it has."""
+    if opened is None:
+        return HeaderState(choices)
+    history = opened.history
+    draft = "Saved" if not opened.edited and opened.base else "Not saved yet"
+    if opened.kept is not None and (opened.edited or not opened.base):
+        draft = f"Draft kept {opened.kept:%H:%M}"
+    return HeaderState(
+        choices,
+        source_of(opened.file),
+        problems_chip(len(opened.study.faults), warnings),
+        "" if opened.read_only else draft,
+        history.done[-1].words if history.done else "",
+        history.undone[-1].words if history.undone else "",
+        not opened.read_only and (opened.edited or not opened.base),
+        bool(opened.read_only),
+    )
+
+
+def source_of(file: Path) -> str:
+    """Return what a study's file is opened by: its name at hand, else its path."""
+    found = _file(file.stem)
+    return file.stem if found is not None and found.resolve() == file.resolve() else str(file)
+
+
+def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
+    """Return what a new study can begin as: templates, the empty one last, then studies to copy.
+
+    Raises
+    ------
+    StudyError
+        The study ``source`` cannot be read.
+    """
+    choices = [
+        TemplateChoice(f"template:{name}", label_of(name.replace("-", "_")), _described(template(name).document)[1])
+        for name in templates()
+    ]
+    choices.sort(key=lambda choice: choice.source == "template:empty")
+    copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
+    for name in copied:
+        file = shipped_file(name) if name in shipped() else find(name)
+        choices.append(TemplateChoice(name, *_described(read(file.read_bytes(), file.parent).document), copy=True))
+    return tuple(choices)
+
+
+def there(document: Document, path: Place) -> Place:
+    """Return a path, or as much of it as is in the document; the study's own table where nothing is."""
+    found: Any = document
+    for length, step in enumerate(path):
+        if not has(found, step):
+            return path[:length] if length > 1 else FIRST
+        found = found[step]
+    return path or FIRST
+
+
+def time_words(moment: str) -> str:
+    """Return when a draft was kept: "today 14:02", "2026-11-20 14:02"."""
+    try:
+        kept = datetime.fromisoformat(moment).astimezone()
+    except ValueError:
+        return "an unknown time"
+    today = kept.date() == datetime.now().astimezone().date()
+    return f"today {kept:%H:%M}" if today else f"{kept:%Y-%m-%d %H:%M}"
+
+
+def _described(document: Mapping[str, Any]) -> tuple[str, str]:
+    """Return title and description of a study."""
+    description = value_at(document, ("study", "description"))
+    title = title_of({**document, "one": {"it": document.get("study", {})}}, ("one", "it"))
+    return title, " ".join(description.split()) if isinstance(description, str) else ""
+
+
+def _file(source: str) -> Path | None:
+    try:
+        return find(source)
+    except StudyError:
+        return None

@@ -1,0 +1,1 @@
+"""The study designer's place: header, outline, form, file and problems."""

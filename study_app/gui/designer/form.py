@@ -1,0 +1,260 @@
+"""The form: one element at a time, its rows in sections, with help for the focused field at its foot."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.gui.designer.form_head import LABEL_PX, FormHead
+from study_app.gui.designer.list_fields import field, structure
+from study_app.gui.designer.row_fields import add_button
+from study_app.gui.designer.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.widgets.cards import Card, Icon, Rule
+from study_app.gui.widgets.controls import IconButton
+from study_app.gui.widgets.labels import Elided, label
+from study_app.viewmodels.designer.form_rows import Form, FormRow
+from study_app.viewmodels.designer.requests import AddKey, RemoveKey
+
+ACROSS = 2
+
+
+class RowWidget(QWidget):
+    """A row: its label, its editor, its bounds, a button that removes the key, and what is wrong with it."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__()
+        self.row = row
+        self.key = structure(row)
+        self.refusal = ""
+        self.field = field(row)
+        self.words = label(row.row.label, "label", wraps=True)
+        self.words.setFixedWidth(LABEL_PX)
+        self.words.setMinimumHeight(FIELD_PX)
+        self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
+        self.words.setBuddy(self.field)
+        self.remove = IconButton("cross", f"Remove {row.row.label} from the file", size=FIELD_PX, role="plain")
+        self.remove.clicked.connect(lambda: self.field.asked.emit(RemoveKey(self.row.row.path)))
+        across = QHBoxLayout()
+        across.setSpacing(8)
+        top = Qt.AlignmentFlag.AlignTop
+        across.addWidget(self.words, 0, top)
+        across.addWidget(self.field, 1)
+        across.addWidget(self.remove, 0, top)
+        policy = self.remove.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.remove.setSizePolicy(policy)
+        self.wrong = QWidget()
+        beside = QHBoxLayout(self.wrong)
+        beside.setContentsMargins(LABEL_PX + 8, 0, 0, 0)
+        beside.setSpacing(8)
+        beside.addWidget(Icon("warning", "bad", 16), 0, top)
+        self.sentence = label("", "label", "bad", wraps=True)
+        beside.addWidget(self.sentence, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(across)
+        column.addWidget(self.wrong)
+        self.remove.setVisible(row.removable)  # in its layout by now: it would be shown as a window before
+        self.show_row(row)
+
+    def show_row(self, row: FormRow) -> None:
+        """Show the row's value and faults."""
+        if row != self.row:
+            self.refusal = ""
+            self.row = row
+            self.field.show_row(row)
+        self.say()
+
+    def say(self) -> None:
+        """Show what is wrong."""
+        found = [sentence for sentence in (self.refusal, self.field.refusal, *self.row.faults) if sentence]
+        self.sentence.setText("\n".join(found))
+        self.wrong.setVisible(bool(found))
+        row = self.row.row
+        self.field.setAccessibleDescription(". ".join(filter(None, (row.help, self.row.bounds, *found))))
+        for part in self.field.findChildren(QWidget):
+            if isinstance(part, TypedLine | TypedText):
+                part.setAccessibleDescription(self.field.accessibleDescription())
+            if isinstance(part, TypedLine) and not self.field.refusal:
+                part.show_refused(bool(self.row.faults) and part.focusPolicy() != Qt.FocusPolicy.NoFocus)
+
+    @property
+    def help(self) -> str:
+        """What the row edits: the description, or the sentence of what is chosen, and what is permitted."""
+        row = self.row.row
+        shown = row.default if row.value is None else row.value
+        sentence = next((choice.sentence for choice in row.choices if choice.value == shown), "")
+        reason = f" ({row.reason})" if row.reason else ""
+        permitted = f"Permitted: {self.row.bounds}{reason}." if self.row.bounds and not row.choices else ""
+        words = " ".join(filter(None, (sentence or row.help, permitted)))
+        return " ".join(words.split())
+
+
+class FormCard(Card):
+    """Draws a `Form`.
+
+    Signals: ``asked`` (a request), ``open_asked`` (path), ``delete_asked`` (path).
+    """
+
+    asked = Signal(object)
+    open_asked = Signal(object)
+    delete_asked = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__(padding=18, gap=8)
+        self.setAccessibleName("Form")
+        self.form: Form | None = None
+        self.read_only = False
+        self.rows: list[RowWidget] = []
+        self.adds: list[QWidget] = []
+        self._focused: RowWidget | None = None
+        self.head = FormHead()
+        self.head.asked.connect(self.asked)
+        self.head.delete_asked.connect(self.delete_asked)
+        self.own = label("", "label", "bad", wraps=True)
+        self.inside = QWidget()
+        self.sections = QVBoxLayout(self.inside)
+        self.sections.setContentsMargins(0, 2, 8, 2)
+        self.sections.setSpacing(7)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.area.setWidget(self.inside)
+        self.help_title = label("", "label")
+        self.help_place = Elided("small", "text2")
+        self.help_place.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.help_words = label("", "small", "text2", wraps=True)
+        self.help_words.setMinimumHeight(48)
+        self.help_words.setAlignment(Qt.AlignmentFlag.AlignTop)
+        for part in (self.head, Rule(), self.own):
+            self.column.addWidget(part)
+        self.column.addWidget(self.area, 1)
+        self.column.addWidget(Rule())
+        top = QHBoxLayout()
+        top.addWidget(self.help_title)
+        top.addWidget(self.help_place, 1)
+        self.column.addLayout(top)
+        self.column.addWidget(self.help_words)
+
+    def show_form(self, form: Form, *, read_only: bool) -> None:
+        """Show a form: in place where its rows stay the same, else anew."""
+        before, self.form, self.read_only = self.form, form, read_only
+        self.head.show_form(form, read_only=read_only)
+        self.own.setText("\n".join(form.faults))
+        self.own.setVisible(bool(form.faults))
+        same = before is not None and before.path == form.path and _shape(before) == _shape(form)
+        if same and [row.key for row in self.rows] == [structure(row) for row in form.rows]:
+            for widget, row in zip(self.rows, form.rows, strict=True):
+                widget.show_row(row)
+        else:
+            self._make(form, stays=before is not None and before.path == form.path)
+        self.show_help()
+
+    def _make(self, form: Form, *, stays: bool) -> None:
+        focused = (
+            self._focused.row.row.path if self._focused is not None and self.isAncestorOf(self.focusWidget()) else None
+        )
+        scrolled = self.area.verticalScrollBar().value() if stays else 0
+        self._focused = None
+        self.flush()
+        inside = QWidget()
+        sections = QVBoxLayout(inside)
+        sections.setContentsMargins(0, 2, 8, 2)
+        sections.setSpacing(7)
+        self.rows, self.adds = [], []
+        for number, section in enumerate(form.sections):
+            if number:
+                sections.addWidget(Rule())
+            if section.title:
+                heading = QHBoxLayout()
+                heading.addWidget(label(section.title, "label"))
+                heading.addStretch()
+                away = IconButton("cross", f"Remove {section.title} from the file", size=FIELD_PX, role="plain")
+                away.clicked.connect(lambda _checked=False, path=section.path: self.asked.emit(RemoveKey(path)))
+                away.setEnabled(not self.read_only)
+                heading.addWidget(away)
+                sections.addLayout(heading)
+            for row in section.rows:
+                sections.addWidget(self._row(row))
+            if section.absent and not self.read_only:
+                grid = QGridLayout()
+                grid.setSpacing(0)
+                for at, absent in enumerate(section.absent):
+                    made = add_button(f"Add {absent.label}", absent.label)
+                    made.setToolTip(absent.help)
+                    made.clicked.connect(lambda _checked=False, path=absent.path: self.asked.emit(AddKey(path)))
+                    grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
+                    self.adds.append(made)
+                sections.addLayout(grid)
+        sections.addStretch()
+        dress(inside, self.theme)
+        self.inside, self.sections = inside, sections
+        old = self.area.takeWidget()
+        self.area.setWidget(inside)
+        if old is not None:
+            take_away(old)
+        QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(scrolled))
+        if focused is not None and stays:
+            self.focus(focused)
+
+    def _row(self, row: FormRow) -> RowWidget:
+        made = RowWidget(row)
+        made.field.asked.connect(self.asked)
+        made.field.open_asked.connect(self.open_asked)
+        made.field.came.connect(lambda: self._come(made))
+        made.field.setEnabled(not self.read_only or row.row.kind in {"list", "tables", "references", "reference"})
+        made.remove.setEnabled(not self.read_only)
+        self.rows.append(made)
+        return made
+
+    def flush(self) -> None:
+        """Hand on what is being typed."""
+        for part in self.findChildren(QWidget):
+            if isinstance(part, TypedLine | TypedText):
+                part.flush()
+
+    def focus(self, path: tuple[str | int, ...]) -> bool:
+        """Give the keyboard to the row of a place, and scroll to it; return whether there is one."""
+        inner = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
+        found = max(inner, key=lambda row: len(row.row.row.path), default=None)
+        if found is None:
+            return False
+        found.field.setFocus(Qt.FocusReason.OtherFocusReason)
+        self._come(found)
+        self.area.ensureWidgetVisible(found, 0, 40)
+        return True
+
+    def focus_first(self) -> None:
+        """Give the keyboard to the first row."""
+        if self.rows:
+            self.focus(self.rows[0].row.row.path)
+
+    def refuse(self, path: tuple[str | int, ...], sentence: str) -> None:
+        """Say at the field of a place why it was not changed."""
+        inner = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
+        found = max(inner, key=lambda row: len(row.row.row.path), default=None)
+        if found is not None:
+            found.refusal = sentence
+            found.say()
+        else:
+            self.own.setText(sentence)
+            self.own.setVisible(True)
+
+    def _come(self, row: RowWidget) -> None:
+        self._focused = row
+        row.say()
+        self.show_help()
+
+    def show_help(self) -> None:
+        """Show the help of the focused field, or of the first one."""
+        row = self._focused if self._focused in self.rows else next(iter(self.rows), None)
+        self.help_title.setText("" if row is None else row.row.row.label)
+        self.help_place.show_text("" if row is None else row.row.place)
+        self.help_words.setText("" if row is None else row.help)
+
+
+def _shape(form: Form) -> object:
+    return [(section.path, section.title, tuple(row.path for row in section.absent)) for section in form.sections]

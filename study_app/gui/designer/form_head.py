@@ -1,0 +1,144 @@
+"""The head of the form: icon, title and id of the element, and the buttons that move, copy and delete it."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+
+from study_app.gui.designer.typed_fields import TypedLine
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import RADIUS_CONTROL
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.controls import IconButton
+from study_app.gui.widgets.labels import Elided, label
+from study_app.viewmodels.designer.form_rows import Form
+from study_app.viewmodels.designer.requests import DuplicateElement, MoveElement, RenameElement
+
+TILE = 40
+LABEL_PX = 124
+
+
+class Tile(Themed, QWidget):
+    """An icon on a tinted square."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.icon = "ring"
+        self.setFixedSize(TILE, TILE)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the square and the icon."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QColor(self.theme.selected))
+        painter.setBrush(QColor(self.theme.selected))
+        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+        draw_icon(painter, self.icon, QRectF(self.rect()).adjusted(10, 10, -10, -10), self.theme.accent, 2.0)
+
+
+class FormHead(QWidget):
+    """Signals: ``asked`` (a request), ``delete_asked`` (path)."""
+
+    asked = Signal(object)
+    delete_asked = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.form: Form | None = None
+        self.tile = Tile()
+        self.title = Elided("card")
+        self.kind = label("", "small", "text2")
+        self.id = TypedLine("Id")
+        self.id.setFixedWidth(230)
+        self.id.rests = False
+        self.refusal = label("", "label", "bad", wraps=True)
+        self.refusal.hide()
+        self.up = IconButton("arrow_up", "Move up", "Move up (Alt+Up)", size=34)
+        self.down = IconButton("arrow_down", "Move down", "Move down (Alt+Down)", size=34)
+        self.copy = IconButton("copy", "Duplicate", "Duplicate (Ctrl+D)", size=34)
+        self.delete = IconButton("trash", "Delete", "Delete", size=34, role="danger")
+        words = QVBoxLayout()
+        words.setSpacing(0)
+        words.addWidget(self.title)
+        below = QHBoxLayout()
+        below.setSpacing(8)
+        below.addWidget(self.kind)
+        below.addStretch()
+        words.addLayout(below)
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(8)
+        grid.addWidget(self.tile, 0, 0)
+        grid.addLayout(words, 0, 1)
+        for at, part in enumerate((self.up, self.down, self.copy, self.delete), start=2):
+            grid.addWidget(part, 0, at)
+        self.id_line = QWidget()
+        line = QHBoxLayout(self.id_line)
+        line.setContentsMargins(0, 4, 0, 0)
+        line.setSpacing(8)
+        words_of_id = label("Id", "label")
+        words_of_id.setFixedWidth(LABEL_PX)
+        line.addWidget(words_of_id)
+        line.addWidget(self.id)
+        line.addStretch()
+        grid.addWidget(self.id_line, 1, 0, 1, 6)
+        grid.addWidget(self.refusal, 2, 0, 1, 6)
+        grid.setColumnStretch(1, 1)
+        self.id.typed.connect(self._rename)
+        self.up.clicked.connect(lambda: self.move_by(-1))
+        self.down.clicked.connect(lambda: self.move_by(1))
+        self.copy.clicked.connect(self.duplicate)
+        self.delete.clicked.connect(self.ask_to_delete)
+
+    def show_form(self, form: Form, *, read_only: bool) -> None:
+        """Show which element it is."""
+        if self.form is None or self.form.path != form.path or self.form.id != form.id:
+            self.refuse("")
+        self.form = form
+        self.tile.icon = form.icon
+        self.tile.update()
+        self.title.show_text(form.title)
+        at = "" if form.position is None else f"  ·  {form.position[0]} of {form.position[1]}"
+        self.kind.setText(f"{form.kind}{at}")
+        self.id_line.setVisible(form.id is not None)
+        self.id.setReadOnly(read_only)
+        if not self.refusal.text():
+            self.id.show_text(form.id or "")
+        place, count = form.position or (0, 0)
+        for button in (self.up, self.down):
+            button.setVisible(form.position is not None and not read_only)
+        for button in (self.copy, self.delete):
+            button.setVisible(form.id is not None and not read_only)
+        self.up.setEnabled(not read_only and place > 1)
+        self.down.setEnabled(not read_only and 0 < place < count)
+        for button in (self.copy, self.delete):
+            button.setEnabled(not read_only and len(form.path) > 1 and form.id is not None)
+
+    def refuse(self, sentence: str) -> None:
+        """Say why the id cannot be changed."""
+        self.refusal.setText(sentence)
+        self.refusal.setVisible(bool(sentence))
+        self.id.show_refused(bool(sentence))
+
+    def move_by(self, by: int) -> None:
+        """Ask to move the element."""
+        if self.form is not None and (self.up if by < 0 else self.down).isEnabled():
+            self.asked.emit(MoveElement(self.form.path, by))
+
+    def duplicate(self) -> None:
+        """Ask for a copy of the element."""
+        if self.form is not None and self.copy.isEnabled():
+            self.asked.emit(DuplicateElement(self.form.path))
+
+    def ask_to_delete(self) -> None:
+        """Ask to delete the element."""
+        if self.form is not None and self.delete.isEnabled():
+            self.delete_asked.emit(self.form.path)
+
+    def _rename(self, name: str) -> None:
+        if self.form is not None and self.form.id is not None:
+            if name == self.form.id:
+                self.refuse("")
+            else:
+                self.asked.emit(RenameElement(self.form.path, name))

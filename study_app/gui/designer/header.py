@@ -1,0 +1,133 @@
+"""The header of the designer: which study, its problems, its draft, undo, redo and Save."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
+from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, PressedByEnter
+from study_app.gui.widgets.labels import label
+from study_app.viewmodels.designer.view import HeaderState
+from study_app.viewmodels.tones import Tone
+
+NEW, OPEN = "\0new", "\0open"
+
+
+class ChipButton(Themed, PressedByEnter):
+    """A chip that is pressed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setProperty("role", "plain")
+        self._state: tuple[Tone, str, str] = ("ok", "check", "")
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+
+    def show_state(self, tone: Tone, icon: str, words: str) -> None:
+        """Show another state."""
+        self._state = (tone, icon, words)
+        self.setAccessibleName(f"{words}: show the list")
+        size = chip_size(words, small=False)
+        self.setFixedSize(size.width(), 32)
+        self.update()
+
+    @property
+    def words(self) -> str:
+        """What the chip says."""
+        return self._state[2]
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the chip, and a ring where it is focused."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        body = QRectF(self.rect()).adjusted(0, 2, 0, -2)
+        paint_chip(painter, body, self.theme, *self._state, small=False)
+        if self.hasFocus():
+            painter.setPen(QPen(QColor(self.theme.accent), 2))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(body.adjusted(1, 0, -1, 0), 13, 13)
+
+
+class DesignerHeader(QWidget):
+    """Signals: ``study_asked`` (source), ``new_asked``, ``file_asked``, ``problems_asked``, undo, redo and save."""
+
+    study_asked = Signal(str)
+    new_asked = Signal()
+    file_asked = Signal()
+    problems_asked = Signal()
+    undo_asked = Signal()
+    redo_asked = Signal()
+    save_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Header")
+        self.state = HeaderState()
+        self.study = Choice()
+        self.study.setAccessibleName("Study")
+        self.study.setFont(font("body"))
+        self.study.setMinimumWidth(230)
+        self.study.setPlaceholderText("Choose a study")
+        self.problems = ChipButton()
+        self.draft = Chip("neutral", "save", "")
+        self.undo = IconButton("undo", "Undo")
+        self.redo = IconButton("redo", "Redo")
+        self.save = ActionButton("save", "Save", role="primary")
+        row = QHBoxLayout(self)
+        row.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        row.setSpacing(10)
+        row.addWidget(label("Study designer", "title"))
+        row.addSpacing(6)
+        row.addWidget(self.study)
+        row.addWidget(self.problems)
+        row.addWidget(self.draft)
+        row.addStretch()
+        for part in (self.undo, self.redo, self.save):
+            row.addWidget(part)
+        self.study.activated.connect(self._choose)
+        self.problems.clicked.connect(self.problems_asked)
+        self.undo.clicked.connect(self.undo_asked)
+        self.redo.clicked.connect(self.redo_asked)
+        self.save.clicked.connect(self.save_asked)
+        self.show_state(self.state)
+
+    def show_state(self, state: HeaderState) -> None:
+        """Show another state."""
+        before, self.state = self.state, state
+        if state.studies != before.studies or state.chosen != before.chosen or not self.study.count():
+            with QSignalBlocker(self.study):
+                self.study.clear()
+                for study in state.studies:
+                    self.study.addItem(
+                        f"{study.title}  (ships with the program)" if study.shipped else study.title, study.source
+                    )
+                self.study.addItem("New study …", NEW)
+                self.study.addItem("Open file …", OPEN)
+                self.study.setCurrentIndex(self.study.findData(state.chosen) if state.chosen else -1)
+        there = bool(state.chosen)
+        for part in (self.problems, self.undo, self.redo, self.save):
+            part.setVisible(there)
+        self.problems.show_state(*state.problems)
+        self.draft.setVisible(there and bool(state.draft))
+        self.draft.show_state("neutral", "save", state.draft)
+        for button, word, keys, what in (
+            (self.undo, "Undo", "Ctrl+Z", state.undo),
+            (self.redo, "Redo", "Ctrl+Shift+Z", state.redo),
+        ):
+            button.setEnabled(bool(what) and not state.read_only)
+            button.setAccessibleName(f"{word}: {what}" if what else word)
+            button.setToolTip(f"{word}: {what} ({keys})" if what else word)
+        self.save.setEnabled(state.can_save)
+
+    def _choose(self, at: int) -> None:
+        source = self.study.itemData(at)
+        self.study.setCurrentIndex(self.study.findData(self.state.chosen) if self.state.chosen else -1)
+        if source == NEW:
+            self.new_asked.emit()
+        elif source == OPEN:
+            self.file_asked.emit()
+        elif source != self.state.chosen:
+            self.study_asked.emit(source)

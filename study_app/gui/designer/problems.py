@@ -1,0 +1,183 @@
+"""The list of problems: where each is, the sentence of ``check``, its line, and its repairs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.gui.theme.theme import RADIUS_CONTROL, font
+from study_app.gui.theme.themed import Themed, dress
+from study_app.gui.widgets.cards import Card, Icon
+from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
+from study_app.gui.widgets.labels import Clamped, Elided, figures, label
+from study_app.gui.widgets.segments import Segments
+from study_app.viewmodels.designer.problem_rows import ProblemRow
+
+HIGHEST = 290
+
+
+class ProblemLine(Themed, QWidget):
+    """One problem; ``opened`` when it is clicked, ``repair_asked`` with the words of a repair."""
+
+    opened = Signal()
+    repair_asked = Signal(str)
+
+    def __init__(self, row: ProblemRow, repairs: tuple[str, ...], *, narrow: bool) -> None:
+        super().__init__()
+        self.row = row
+        self.here = False
+        self.go = PressedByEnter(row.title)
+        self.go.setProperty("role", "plain")
+        self.go.setProperty("dense", "true")
+        where = f"{row.title}, {row.field}" if row.field else row.title
+        self.go.setAccessibleName(f"{where}: {row.message}")
+        self.go.clicked.connect(self.opened)
+        self.go.setFixedWidth(150)
+        self.go.setStyleSheet("text-align: left;")
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        across = QHBoxLayout(self)
+        across.setContentsMargins(10, 4, 6, 4)
+        across.setSpacing(10)
+        across.addWidget(Icon("warning", "bad", 18))
+        across.addWidget(Icon(row.icon, "text2", 18))
+        across.addWidget(self.go)
+        field = Elided("label", "text2")
+        field.show_text(row.field)
+        field.setFixedWidth(90 if narrow else 130)
+        across.addWidget(field)
+        words = row.message if not row.hint else f"{row.message}  ({row.hint})"
+        said = Clamped(words, 2, "label")
+        said.setAlignment(Qt.AlignmentFlag.AlignVCenter)
+        across.addWidget(said, 1)
+        across.addWidget(figures("" if row.line is None else f"line {row.line}", "small", "text2"))
+        self._repairs = QHBoxLayout()
+        self._repairs.setSpacing(6)
+        across.addLayout(self._repairs)
+        self.repairs: list[ActionButton] = []
+        self.setMinimumHeight(44)
+        self.show_repairs(repairs)
+
+    def show_repairs(self, repairs: tuple[str, ...]) -> None:
+        """Offer repairs, two at most."""
+        for words in repairs[len(self.repairs) : 2]:
+            made = ActionButton("", words, height=32)
+            made.setProperty("dense", "true")
+            made.setFont(font("label"))
+            made.setAccessibleName(f"{words}: {self.row.title}, {self.row.field}")
+            made.clicked.connect(lambda _checked=False, words=words: self.repair_asked.emit(words))
+            dress(made, self.theme)
+            self._repairs.addWidget(made)
+            self.repairs.append(made)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        """Open the problem."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.opened.emit()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Tint the one that one is at."""
+        if self.here:
+            painter = QPainter(self)
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(self.theme.selected))
+            painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+
+
+class ProblemsCard(Card):
+    """Signals: ``opened`` (a `ProblemRow`), ``repair_asked`` (row, words), ``close_asked``."""
+
+    opened = Signal(object)
+    repair_asked = Signal(object, str)
+    close_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=16, gap=8)
+        self.setAccessibleName("Problems")
+        self.rows: tuple[ProblemRow, ...] = ()
+        self.lines: list[ProblemLine] = []
+        self._element: object = None
+        self._here_only = False
+        self._at: ProblemRow | None = None
+        self.heading = label("", "card")
+        self.limit = Segments("Problems of")
+        self.limit.chosen.connect(self._limit)
+        self.next = ActionButton("", "Next (F8)", height=36)
+        self.next.setProperty("dense", "true")
+        self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
+        top = QHBoxLayout()
+        top.setSpacing(10)
+        top.addWidget(self.heading)
+        top.addWidget(label("the same as liquid-study check prints", "small", "text2"))
+        top.addStretch()
+        for part in (self.limit, self.next, self.close_button):
+            top.addWidget(part)
+        self.column.addLayout(top)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.column.addWidget(self.area, 1)
+        self.next.clicked.connect(self.open_next)
+        self.close_button.clicked.connect(self.close_asked)
+
+    def show_problems(
+        self, rows: tuple[ProblemRow, ...], element: object, repairs: Mapping[ProblemRow, tuple[str, ...]]
+    ) -> None:
+        """Show problems; ``element`` is the selected one."""
+        unchanged = (rows, element if self._here_only else None) == (
+            self.rows,
+            self._element if self._here_only else None,
+        )
+        self.rows, self._element = rows, element
+        self.heading.setText(f"{len(rows)} problem{'s' * (len(rows) != 1)}" if rows else "No problems")
+        self.limit.show_values(((False, "All"), (True, "Here only")), self._here_only)
+        self.next.setEnabled(bool(rows))
+        self.setFixedHeight(min(HIGHEST, 92 + 48 * max(1, len(rows))))
+        if unchanged and self.lines:
+            return
+        inside = QWidget()
+        column = QVBoxLayout(inside)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(2)
+        self.lines = []
+        for row in rows:
+            if self._here_only and row.element != element:
+                continue
+            made = ProblemLine(row, repairs.get(row, ()), narrow=self.width() < 900)
+            made.opened.connect(lambda row=row: self._open(row))
+            made.repair_asked.connect(lambda words, row=row: self.repair_asked.emit(row, words))
+            made.here = row == self._at
+            column.addWidget(made)
+            self.lines.append(made)
+        column.addStretch()
+        dress(inside, self.theme)
+        self.area.setWidget(inside)
+
+    def show_repairs(self, row: ProblemRow, repairs: tuple[str, ...]) -> None:
+        """Offer the repairs of a problem."""
+        for line in self.lines:
+            if line.row == row:
+                line.show_repairs(repairs)
+
+    def open_next(self) -> None:
+        """Go to the next problem."""
+        if self.rows:
+            at = self.rows.index(self._at) + 1 if self._at in self.rows else 0
+            self._open(self.rows[at % len(self.rows)])
+
+    def _open(self, row: ProblemRow) -> None:
+        self._at = row
+        for line in self.lines:
+            line.here = line.row == row
+            line.update()
+            if line.here:
+                self.area.ensureWidgetVisible(line)
+        self.opened.emit(row)
+
+    def _limit(self, here_only: object) -> None:
+        self._here_only, self.lines = bool(here_only), []
+        self.show_problems(self.rows, self._element, {})

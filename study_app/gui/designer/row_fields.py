@@ -1,0 +1,348 @@
+"""The editors of a form's rows: one for each kind of value."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QWidget
+
+from study_app.gui.designer.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
+from study_app.gui.widgets.labels import Elided, label
+from study_app.gui.widgets.segments import Segments
+from study_app.viewmodels.designer.form_rows import FormRow, choice_words
+from study_app.viewmodels.designer.requests import AddEntry, RemoveKey, SetText, SetValue, SwitchKind
+
+MOST_SEGMENTS, SEGMENT_LETTERS = 4, 34
+NUMBER_PX = 96
+_PARTS = re.compile(r",?[;\s]+")
+
+
+class Field(QWidget):
+    """Edits the value of one row.
+
+    ``asked`` carries a request, ``open_asked`` the path of an element to select, ``came`` says that it is focused.
+    """
+
+    asked = Signal(object)
+    open_asked = Signal(object)
+    came = Signal()
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__()
+        self.row = row
+        self.refusal = ""
+        self.box: QBoxLayout = QHBoxLayout(self)
+        self.box.setContentsMargins(0, 0, 0, 0)
+        self.box.setSpacing(8)
+
+    def show_row(self, row: FormRow) -> None:
+        """Show the value of a row of the same kind and choices."""
+        self.row = row
+        self.show_value()
+
+    def show_value(self) -> None:
+        """Show the value."""
+        raise NotImplementedError
+
+    def set_value(self, value: Any, *, typing: bool = False) -> None:
+        """Ask for a value."""
+        self.asked.emit(SetValue(self.row.row.path, value, typing))
+
+    def placeholder(self) -> str:
+        """Return what counts where nothing is written."""
+        default = self.row.row.default
+        if default in (None, "", [], {}):
+            return ""
+        return f"{_written(default)} (default)"
+
+
+class LineField(Field):
+    """A plain text, one number, or numbers side by side, in one line."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.line = TypedLine(row.row.label)
+        if row.row.kind in {"number", "whole number"}:
+            self.line.setFixedWidth(NUMBER_PX + (60 if self.placeholder() else 0))
+            self.line.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.box.addWidget(self.line)
+        if row.row.unit:
+            self.box.addWidget(label(row.row.unit, "label", "text2"))
+        if row.row.kind in {"number", "whole number"}:
+            self.box.addStretch()
+        self.line.typed.connect(self._take)
+        self.line.came.connect(self.came)
+        self.setFocusProxy(self.line)
+        self.show_value()
+
+    def show_value(self) -> None:
+        """Show the value, or what counts without one in grey."""
+        value = self.row.row.value
+        self.line.setPlaceholderText(self.placeholder())
+        if not self.refusal:
+            self.line.show_text("" if value is None else _written(value))
+
+    def _take(self, text: str) -> None:
+        row, before = self.row.row, self.refusal
+        self.refusal = ""
+        value: Any = text
+        if not text.strip() and row.value is not None and not row.required and row.kind != "text":
+            self.asked.emit(RemoveKey(row.path))
+        elif row.kind in {"number", "whole number"}:
+            value = read_number(text)
+            if value is None or (row.kind == "whole number" and isinstance(value, float)):
+                wanted = "a whole number" if row.kind == "whole number" else "a number"
+                self.refusal = f"“{text}” is not {wanted}: the study keeps the last value."
+        elif row.kind in {"numbers", "vector"}:
+            parts = [read_number(part) for part in _PARTS.split(text.strip())]
+            value = parts
+            if None in parts:
+                self.refusal = f"“{text}” is not a list of numbers: write them with spaces between."
+        self.line.show_refused(bool(self.refusal))
+        if self.refusal or before:
+            self.came.emit()  # the form shows what is wrong with it, or no longer
+        if not self.refusal and (text.strip() or row.kind == "text" or row.required):
+            self.set_value(value, typing=True)
+
+
+class LanguagesField(Field):
+    """A text in each language, side by side, or below each other where there are more than two or several lines."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        several = row.row.kind == "paragraphs"
+        down = len(row.languages) > 2 or several
+        self.box.setDirection(QBoxLayout.Direction.TopToBottom if down else QBoxLayout.Direction.LeftToRight)
+        self.lines: dict[str, TypedLine | TypedText] = {}
+        for code, language in row.languages:
+            name = row.row.label if len(row.languages) == 1 else f"{row.row.label}, {language}"
+            made: TypedLine | TypedText = TypedText(name) if several else TypedLine(name)
+            if len(row.languages) > 1:
+                made.setPlaceholderText(language)
+                made.setToolTip(language)
+            if code == "ar":
+                made.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
+            made.typed.connect(lambda text, code=code: self.asked.emit(SetText(self.row.row.path, code, text)))
+            made.came.connect(self.came)
+            self.lines[code] = made
+            if down and len(row.languages) > 1:
+                self.box.addWidget(label(language, "small", "text2"))
+            self.box.addWidget(made)
+        self.setFocusProxy(next(iter(self.lines.values())))
+        self.show_value()
+
+    def show_value(self) -> None:
+        """Show each text; a plain one stands for the first language."""
+        value = self.row.row.value
+        for number, (code, line) in enumerate(self.lines.items()):
+            text = value.get(code, "") if isinstance(value, dict) else value if number == 0 else ""
+            line.show_text(text if isinstance(text, str) else "")
+
+
+class SwitchField(Field):
+    """True or false."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.toggle = Toggle()
+        self.toggle.setFont(font("label"))
+        self.toggle.setAccessibleName(row.row.label)
+        self.toggle.clicked.connect(lambda checked: self.set_value(bool(checked)))
+        self.box.addWidget(self.toggle)
+        self.box.addStretch()
+        self.setFocusProxy(self.toggle)
+        self.show_value()
+
+    def show_value(self) -> None:
+        """Show the value, or what counts without one."""
+        row = self.row.row
+        self.toggle.setChecked(bool(row.default if row.value is None else row.value))
+
+
+class ChoiceField(Field):
+    """One of some words: few and short ones side by side, others in a list; a reference has an arrow to its element."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        words = [choice_words(choice, None) for choice in row.row.choices]
+        few = 1 < len(words) <= MOST_SEGMENTS and sum(map(len, words)) <= SEGMENT_LETTERS
+        self.segments = Segments(row.row.label) if few and row.row.kind != "reference" else None
+        self.list: Choice | None = None
+        if self.segments is not None:
+            self.segments.chosen.connect(self._choose)
+            self.box.addWidget(self.segments)
+            self.box.addStretch()
+        else:
+            self.list = Choice()
+            self.list.setProperty("dense", "true")
+            self.list.setFont(font("label", weight=400))
+            self.list.setFixedHeight(FIELD_PX)
+            self.list.setAccessibleName(row.row.label)
+            self.list.setMinimumContentsLength(12)
+            self.list.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+            self.list.activated.connect(lambda at: self._choose(self._values[at]))
+            self.box.addWidget(self.list, 1)
+        self._values: list[str | None] = []
+        self.arrow = IconButton("arrow_right", f"Open what {row.row.label} names", size=FIELD_PX)
+        self.arrow.clicked.connect(lambda: self.open_asked.emit(self.row.target))
+        if row.row.kind == "reference":
+            self.box.addWidget(self.arrow)
+        self.setFocusProxy(self.segments or self.list or self.arrow)
+        self.show_value()
+
+    def show_value(self) -> None:
+        """Show what is chosen; a value that cannot be chosen is shown, too, with its fault below."""
+        row = self.row.row
+        shown = row.default if row.value is None else row.value
+        values = [(choice.value, choice_words(choice, row.default)) for choice in row.choices]
+        if row.kind == "reference":
+            values = [(choice.value, str(choice.value)) for choice in row.choices]
+        if self.segments is not None:
+            plain = [(choice.value, choice_words(choice, None)) for choice in row.choices]
+            self.segments.show_values(plain, shown)
+            return
+        assert self.list is not None  # noqa: S101 - one of the two is there
+        if shown is not None and shown not in [value for value, _ in values]:
+            values.append((shown, str(shown)))
+        if [words for _, words in values] != [self.list.itemText(at) for at in range(self.list.count())]:
+            self.list.clear()
+            self.list.addItems([words for _, words in values])
+        self._values = [value for value, _ in values]
+        self.list.setCurrentIndex(self._values.index(shown) if shown in self._values else -1)
+        self.list.setPlaceholderText("" if values else "Nothing can be named yet")
+        self.arrow.setEnabled(self.row.target is not None)
+
+    def _choose(self, value: Any) -> None:
+        row = self.row.row
+        if row.kind == "kind":
+            self.asked.emit(SwitchKind(row.path[:-1], value))
+        elif value is not None and value != row.value:
+            self.set_value(value)
+        self.came.emit()
+
+
+class ChecksField(Field):
+    """Several of some words."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
+        self.box.setSpacing(0)
+        self.checks: dict[str, Check] = {}
+        for choice in row.row.choices:
+            made = Check(choice_words(choice, None))
+            made.setFont(font("label", weight=400))
+            made.setAccessibleName(f"{row.row.label}, {made.text()}")
+            made.setToolTip(choice.sentence)
+            made.clicked.connect(self._take)
+            self.checks[str(choice.value)] = made
+            self.box.addWidget(made)
+        if self.checks:
+            self.setFocusProxy(next(iter(self.checks.values())))
+        self.show_value()
+
+    def show_value(self) -> None:
+        """Show which are chosen."""
+        row = self.row.row
+        chosen = row.value if isinstance(row.value, tuple) else row.default or ()
+        for value, check in self.checks.items():
+            check.setChecked(value in chosen)
+
+    def _take(self) -> None:
+        row = self.row.row
+        there = [value for value in row.value or () if value in self.checks and self.checks[value].isChecked()]
+        there += [value for value, check in self.checks.items() if check.isChecked() and value not in there]
+        self.set_value(there)
+
+
+class LinesField(Field):
+    """Texts, or points, one in each line, with a button that adds one."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
+        self.lines: list[TypedLine] = []
+        self.refusals: set[int] = set()
+        for at in range(len(row.row.value or ())):
+            line = TypedLine(f"{row.row.label} {at + 1}")
+            line.typed.connect(lambda text, at=at: self._take(at, text))
+            line.came.connect(self.came)
+            away = IconButton("cross", f"Remove {row.row.label} {at + 1}", size=FIELD_PX, role="plain")
+            away.clicked.connect(lambda _checked=False, at=at: self.asked.emit(RemoveKey((*self.row.row.path, at))))
+            across = QHBoxLayout()
+            across.addWidget(line)
+            across.addWidget(away)
+            self.box.addLayout(across)
+            self.lines.append(line)
+        self.add = add_button(f"Add to {row.row.label}")
+        self.add.clicked.connect(lambda: self.asked.emit(AddEntry(self.row.row.path)))
+        self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
+        self.setFocusProxy(self.lines[0] if self.lines else self.add)
+        self.show_value()
+
+    def show_value(self) -> None:
+        """Show each entry."""
+        for line, value in zip(self.lines, self.row.row.value or (), strict=False):
+            if not line.property("state"):
+                line.show_text(_written(value))
+
+    def _take(self, at: int, text: str) -> None:
+        value: Any = text
+        if self.row.row.kind != "texts":
+            value = [read_number(part) for part in _PARTS.split(text.strip())]
+        wrong = isinstance(value, list) and None in value
+        self.refusal = f"“{text}” is not a point: write its numbers with spaces between." if wrong else ""
+        self.lines[at].show_refused(wrong)
+        self.came.emit()
+        if not wrong:
+            self.asked.emit(SetValue((*self.row.row.path, at), value, typing=True))
+
+
+class UnknownField(Field):
+    """A key that does not belong to the table: its value, which can only be removed here."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.value = Elided("label", "text2")
+        self.box.addWidget(self.value, 1)
+        self.show_value()
+
+    def show_value(self) -> None:
+        """Show the value as it would be written."""
+        self.value.show_text(_written(self.row.row.value))
+
+
+def add_button(name: str, words: str = "") -> ActionButton:
+    """Return a quiet button with a plus."""
+    made = ActionButton("plus", words or name, role="plain", height=32)
+    made.setProperty("dense", "true")
+    made.setFont(font("label"))
+    made.setAccessibleName(name)
+    return made
+
+
+def read_number(text: str) -> int | float | None:
+    """Return the number that a text says, whole where it is written so; None where it says none."""
+    plain = text.strip().replace("\u2212", "-").replace(",", ".")
+    try:
+        return int(plain)
+    except ValueError:
+        pass
+    try:
+        value = float(plain)
+    except ValueError:
+        return None
+    return value if abs(value) != float("inf") and value == value else None  # noqa: PLR0124 - NaN
+
+
+def _written(value: Any) -> str:
+    """Return a value as it is typed: numbers of a list with spaces between."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, tuple | list):
+        return "  ".join(_written(part) for part in value)
+    return str(value)

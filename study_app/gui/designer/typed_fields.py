@@ -1,0 +1,184 @@
+"""Fields that are typed in: what is typed is handed on within moments, at Enter, and on leaving the field."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import QLineEdit, QPlainTextEdit
+
+from study_app.gui.theme.theme import font
+
+HAND_ON_MS = 150
+"""What is typed is handed on so long after the first key [ms]: typing without a rest is kept as well."""
+FIELD_PX = 34
+KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
+
+
+class _Typed:
+    """What a line and a field of several lines share; ``typed`` carries the text."""
+
+    typed: Any
+    rests = True
+    """Whether what is typed is handed on while typing, not only at Enter and on leaving."""
+
+    def begin(self) -> None:
+        self.pending = False
+        self._before = ""
+        assert isinstance(self, QObject)  # noqa: S101 - mixed into fields alone
+        self._rest = QTimer(self)
+        self._rest.setSingleShot(True)
+        self._rest.timeout.connect(self.flush)
+
+    def note(self) -> None:
+        """Note that something was typed."""
+        self.pending = True
+        if self.rests and not self._rest.isActive():
+            self._rest.start(HAND_ON_MS)
+
+    def flush(self) -> None:
+        """Hand on what was typed."""
+        self._rest.stop()
+        if self.pending:
+            self.pending = False
+            self.typed.emit(self.words())
+
+    def words(self) -> str:
+        """Return the text."""
+        raise NotImplementedError
+
+    def restore(self) -> None:
+        """Hand on what was there when the keyboard came."""
+        self._rest.stop()
+        self.pending = False
+        if self.words() != self._before:
+            self.show_text(self._before)
+            self.typed.emit(self._before)
+
+    def show_text(self, text: str) -> None:
+        """Show a text, unless something else is being typed."""
+        raise NotImplementedError
+
+    def leaves_to_place(self, event: QEvent) -> bool:
+        """Return whether a key is the place's, whose undo is for the whole study."""
+        if event.type() != QEvent.Type.ShortcutOverride or not isinstance(event, QKeyEvent):
+            return False
+        if not any(event.matches(key) for key in KEYS_OF_PLACE):
+            return False
+        self.flush()
+        event.ignore()
+        return True
+
+
+class TypedLine(_Typed, QLineEdit):
+    """One line."""
+
+    typed = Signal(str)
+    came = Signal()
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.begin()
+        self.setAccessibleName(name)
+        self.setProperty("dense", "true")
+        self.setFont(font("label", weight=400))
+        self.setFixedHeight(FIELD_PX)
+        self.textEdited.connect(lambda _text: self.note())
+        self.returnPressed.connect(self.flush)
+
+    def words(self) -> str:
+        """Return the text."""
+        return self.text()
+
+    def show_text(self, text: str) -> None:
+        """Show a text, unless something else is being typed."""
+        if not self.pending and text != self.text():
+            at = self.cursorPosition()
+            self.setText(text)
+            self.setCursorPosition(min(at, len(text)) if self.hasFocus() else 0)
+
+    def show_refused(self, yes: bool) -> None:
+        """Give the field the edge of one whose text is refused, or take it away."""
+        state = "refused" if yes else ""
+        if (self.property("state") or "") != state:
+            self.setProperty("state", state)
+            self.style().unpolish(self)
+            self.style().polish(self)
+
+    def event(self, event: QEvent) -> bool:
+        """Leave to the place the keys that are its own."""
+        return True if self.leaves_to_place(event) else super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Restore at Esc."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.restore()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Remember what is there."""
+        super().focusInEvent(event)
+        self._before = self.text()
+        self.came.emit()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Hand on what was typed."""
+        super().focusOutEvent(event)
+        self.flush()
+
+
+class TypedText(_Typed, QPlainTextEdit):
+    """Several lines; Tab leaves the field."""
+
+    typed = Signal(str)
+    came = Signal()
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.begin()
+        self.setAccessibleName(name)
+        self.setTabChangesFocus(True)
+        self.setUndoRedoEnabled(False)
+        self.setFont(font("label", weight=400))
+        self.setFixedHeight(118)
+        self._showing = False
+        self.textChanged.connect(lambda: None if self._showing else self.note())
+
+    def words(self) -> str:
+        """Return the text."""
+        return self.document().toRawText().replace("\u2029", "\n")
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for some lines."""
+        return QSize(120, 118)
+
+    def show_text(self, text: str) -> None:
+        """Show a text, unless something else is being typed."""
+        if not self.pending and text != self.words():
+            self._showing = True
+            self.setPlainText(text)
+            self._showing = False
+
+    def event(self, event: QEvent) -> bool:
+        """Leave to the place the keys that are its own."""
+        return True if self.leaves_to_place(event) else super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Restore at Esc."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.restore()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Remember what is there."""
+        super().focusInEvent(event)
+        self._before = self.words()
+        self.came.emit()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Hand on what was typed."""
+        super().focusOutEvent(event)
+        self.flush()

@@ -1,0 +1,256 @@
+"""The designer's controller: opening, drafts, saving, versions, and what another program does to the file."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any
+
+import pytest
+
+from study_app.authoring.drafts import draft_of
+from study_app.protocol.source.files import shipped, shipped_file
+from study_app.viewmodels.designer.requests import (
+    AddElement,
+    AddKey,
+    DeleteElement,
+    DuplicateElement,
+    MoveElement,
+    RemoveKey,
+    RenameElement,
+    RetypeFile,
+    SetText,
+    SetValue,
+    SwitchKind,
+)
+
+MOMENT = "2026-11-21T12:00:00+00:00"
+
+
+def test_opening_and_looking_at_every_form_changes_neither_file_nor_its_time(designer: Any) -> None:
+    before = (designer.file.read_bytes(), designer.file.stat().st_mtime_ns)
+    designer.controller.open("kitchen")
+    for row in designer.place.outline.rows:
+        if row.path:
+            designer.controller.select(row.path)
+    designer.window.go("home")
+    assert (designer.file.read_bytes(), designer.file.stat().st_mtime_ns) == before
+    assert draft_of(designer.file) is None
+
+
+def test_an_edit_changes_its_bytes_alone_is_undone_redone_and_saved(designer: Any) -> None:
+    before = designer.file.read_text()
+    designer.controller.open("kitchen")
+    designer.controller.ask(SetValue(("study", "version"), "0.7"))
+    assert "Change Version" in designer.place.header.undo.accessibleName()
+    changed = [line for line in designer.text.splitlines() if line not in before.splitlines()]
+    assert len(changed) == 1
+    assert changed[0].startswith('version = "0.7"')
+    designer.controller.undo()
+    assert designer.text == before
+    designer.controller.redo()
+    assert designer.file.read_text() == before
+    designer.controller.save()
+    assert designer.file.read_text() == designer.text != before
+    assert draft_of(designer.file) is None
+    assert not designer.place.header.save.isEnabled()
+
+
+def test_typing_in_one_field_is_one_step(designer: Any) -> None:
+    before = designer.file.read_text()
+    designer.controller.open("kitchen")
+    page = designer.controller.opened.history.selected
+    for text in ("H", "He", "Hel", "Hello"):
+        designer.controller.ask(SetText((*page, "title"), "en", text))
+    assert "Hello" in designer.text
+    designer.controller.undo()
+    assert designer.text == before
+
+
+def test_a_draft_is_kept_on_leaving_and_found_again_until_it_is_discarded(designer: Any) -> None:
+    before = designer.file.read_text()
+    designer.controller.open("kitchen")
+    designer.controller.ask(SetValue(("study", "version"), "0.7"))
+    designer.window.go("home")
+    draft = draft_of(designer.file)
+    assert draft is not None
+    assert 'version = "0.7"' in draft.text
+    assert designer.file.read_text() == before
+
+    again = type(designer.controller)(designer.results)
+    again.open("kitchen")
+    assert again.opened.study.text == draft.text
+    assert again.place.banner_words.text().startswith("Draft of today")
+    again.answer_banner("discard")
+    assert again.opened.study.text == before
+    assert draft_of(designer.file) is None
+    again.place.deleteLater()
+
+
+def test_a_file_changed_outside_is_taken_in_or_asked_about_and_never_overwritten(designer: Any) -> None:
+    before = designer.file.read_text()
+    designer.controller.open("kitchen")
+    designer.file.write_text(before + "# outside\n")
+    designer.controller.enter()
+    assert designer.text.endswith("# outside\n")
+
+    designer.controller.ask(SetValue(("study", "version"), "0.7"))
+    designer.file.write_text(before + "# outside again\n")
+    designer.controller.save()
+    assert designer.file.read_text() == before + "# outside again\n"
+    assert [words for _, words in designer.place.view.banner.actions] == ["Keep mine", "Take the file's"]
+    designer.controller.answer_banner("keep")
+    designer.controller.save()
+    assert designer.file.read_text() == designer.text
+    assert 'version = "0.7"' in designer.text
+
+
+def test_a_version_that_was_run_is_saved_under_another_number(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    version = designer.controller.opened.study.document["study"]["version"]
+    session = designer.results / "kitchen" / "data" / "sub-P001" / "ses-01"
+    session.mkdir(parents=True)
+    protocol = {"study": {"version": version}}
+    receipt = {"key_hash": "0" * 64, "protocol_hash": "of another content", "protocol": protocol, "started_at": MOMENT}
+    (session / "receipt.json").write_text(json.dumps(receipt))
+    before = designer.file.read_text()
+    designer.controller.ask(SetValue(("blocks", "liquids", "repetitions"), 3))
+    designer.controller.save()
+    assert designer.file.read_text() == before
+    assert designer.place.prompt is not None
+    designer.place.prompt.save.click()
+    assert designer.place.prompt is None
+    saved = designer.controller.opened.study.document["study"]["version"]
+    assert saved != version
+    assert designer.file.read_text() == designer.text
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_shipped_study_is_read_only_and_can_be_copied(designer: Any, name: str) -> None:
+    before = shipped_file(name).read_bytes()
+    designer.controller.open(name)
+    assert "ships with the program" in designer.place.banner_words.text()
+    text = designer.text
+    designer.controller.ask(SetValue(("study", "version"), "9"))
+    designer.controller.ask(RetypeFile("format = 1\n"))
+    designer.controller.save()
+    assert designer.text == text
+    assert shipped_file(name).read_bytes() == before
+    designer.controller.begin(name, "mine")
+    assert not designer.controller.opened.file.exists()
+    assert designer.controller.opened.study.faults == ()
+    designer.controller.save()
+    assert designer.controller.opened.file.read_text() == designer.text
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="everybody may write here")
+def test_a_file_that_may_not_be_written_is_read_only(designer: Any) -> None:
+    designer.file.chmod(0o444)
+    designer.controller.open("kitchen")
+    assert "may not write" in designer.place.banner_words.text()
+
+
+def test_a_new_study_that_was_never_saved_is_found_again(designer: Any) -> None:
+    designer.controller.begin("template:compare-liquids", "mine")
+    file = designer.file.parent / "mine.toml"
+    assert not file.exists()
+    assert draft_of(file) is not None
+    again = type(designer.controller)(designer.results)
+    again.enter()
+    assert "mine" in [choice.title for choice in again.place.header.state.studies]
+    again.open(str(file))
+    assert again.opened.study.document["study"]["name"] == "mine"
+    again.save()
+    assert file.exists()
+    again.place.deleteLater()
+
+
+@pytest.mark.parametrize("name", ["", "My study", "rek2024", "kitchen"])
+def test_a_name_that_cannot_be_is_refused_in_place(designer: Any, name: str) -> None:
+    designer.controller.ask_for_new()
+    designer.place.new_page.name.setText(name)
+    designer.place.new_page.make.click()
+    assert designer.place.new_page.refusal.text()
+    assert designer.controller.opened is None
+
+
+def test_a_file_that_is_not_utf_8_is_refused_with_a_message(designer: Any) -> None:
+    designer.file.write_bytes(b"format = 1\n# \xff\n")
+    designer.controller.open("kitchen")
+    assert designer.messages == [("This study cannot be opened", "line 2 is not UTF-8 text: save the file as UTF-8.")]
+
+
+def test_elements_are_added_copied_moved_renamed_and_deleted(designer: Any) -> None:
+    controller = designer.controller
+    controller.open("kitchen")
+    first = designer.text
+
+    controller.ask(AddElement(("liquids",)))
+    assert controller.opened.history.selected == ("liquids", "liquid")
+    controller.ask(RenameElement(("liquids", "liquid"), "syrup2"))
+    assert designer.place.view.form.id == "syrup2"
+
+    controller.ask(DuplicateElement(("blocks", "liquids")))
+    assert controller.opened.history.selected == ("blocks", "liquids_2")
+    assert controller.opened.study.faults == ()
+    steps = controller.opened.study.document["sequence"]
+    assert steps.index("liquids_2") == steps.index("liquids") + 1
+    controller.ask(MoveElement(("blocks", "liquids_2"), -1))
+    moved = controller.opened.study.document["sequence"]
+    assert moved.index("liquids_2") == moved.index("liquids") - 1
+
+    controller.ask_to_delete(("tasks", "explore"))
+    assert designer.place.prompt is not None
+    designer.place.prompt.all.click()
+    assert "explore" not in controller.opened.study.document["tasks"]
+
+    while controller.opened.history.done:
+        controller.undo()
+    assert designer.text == first
+
+
+def test_what_is_refused_is_said_at_its_field(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.controller.select(("liquids", "thin"))
+    designer.controller.ask(RenameElement(("liquids", "thin"), "thick"))
+    assert designer.place.form.head.refusal.text() == 'The name "thick" is taken: choose another one.'
+    assert designer.place.form.head.refusal.isVisible()
+
+
+def test_a_kind_is_switched_and_back_without_losing_values(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.controller.select(("tasks", "explore"))
+    before = designer.controller.opened.study.document["tasks"]["explore"]
+    designer.controller.ask(SwitchKind(("tasks", "explore"), "reach"))
+    assert designer.controller.opened.study.document["tasks"]["explore"]["kind"] == "reach"
+    designer.controller.ask(SwitchKind(("tasks", "explore"), "explore"))
+    assert designer.controller.opened.study.document["tasks"]["explore"] == before
+
+
+def test_an_optional_key_is_written_and_removed(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    before = designer.text
+    designer.controller.ask(AddKey(("blocks", "liquids", "break_every")))
+    assert "break_every" in designer.controller.opened.study.document["blocks"]["liquids"]
+    designer.controller.ask(RemoveKey(("blocks", "liquids", "break_every")))
+    assert designer.text == before
+
+
+def test_a_broken_file_is_repaired_by_a_button(designer: Any, qtbot: Any) -> None:
+    text = designer.file.read_text()
+    designer.file.write_text(text.replace('liquid = "thick"', 'liquid = "thik"', 1))
+    designer.controller.open("kitchen")
+    assert designer.place.header.problems.words == "1 problem"
+    designer.place.header.problems.click()
+    qtbot.waitUntil(lambda: bool(designer.place.problems.lines[0].repairs))
+    designer.place.problems.lines[0].repairs[0].click()
+    assert designer.text == text
+    assert designer.place.header.problems.words != "1 problem"
+
+
+def test_deleting_with_gaps_leaves_faults_and_undo_takes_them_back(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.controller.ask(DeleteElement(("liquids", "thick")))
+    assert designer.controller.opened.study.faults
+    designer.controller.undo()
+    assert not designer.controller.opened.study.faults
