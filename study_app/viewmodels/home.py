@@ -13,6 +13,7 @@ from study_app.errors import ProtocolError, StudyError
 from study_app.protocol.load import at_hand, is_scene_file, load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
+from study_app.protocol.source.files import find, shipped, shipped_file
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
@@ -90,6 +91,14 @@ def holds_liquids_alone(source: str) -> bool:
     """Return whether a file holds liquids and no study; a file that cannot be read does not."""
     try:
         return is_scene_file(source)
+    except ProtocolError:
+        return False
+
+
+def is_shipped(source: str) -> bool:
+    """Return whether a source is a study that ships with the program, not one of the same name in the workspace."""
+    try:
+        return source in shipped() and find(source).resolve() == shipped_file(source).resolve()
     except ProtocolError:
         return False
 

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import take_away
 from study_app.gui.widgets.cards import Card, Icon
-from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Clamped, Elided, label
 from study_app.viewmodels.home import BrokenFacts, StudyFacts
 
@@ -18,21 +18,37 @@ LEAST_HEIGHT = 252
 ABOUT_LINES = 3
 
 
+class EditButton(IconButton):
+    """The pen of a card: edits a study, or makes a copy of one that ships with the program."""
+
+    def __init__(self, title: str, *, shipped: bool = False) -> None:
+        word = "Make a copy" if shipped else "Edit"
+        super().__init__("copy" if shipped else "pen", f"{word} of {title}" if shipped else f"{word} {title}", word,
+                         size=36, role="plain")  # fmt: skip
+
+
 class StudyCard(Card):
-    """One protocol; ``new_session`` and ``rehearsal`` carry its facts."""
+    """One protocol; ``new_session``, ``rehearsal`` and ``edit`` carry its facts.
+
+    ``shipped`` says that it ships with the program: it is not edited but copied.
+    """
 
     new_session = Signal(object)
     rehearsal = Signal(object)
+    edit = Signal(object)
 
-    def __init__(self, facts: StudyFacts, *, first: bool) -> None:
+    def __init__(self, facts: StudyFacts, *, first: bool, shipped: bool = False) -> None:
         super().__init__(padding=20, gap=8)
         self.facts = facts
         title = Elided("card")
         title.setFont(font("card", scale=1.12))
         title.show_text(facts.title)
+        self.pen = EditButton(facts.title, shipped=shipped)
+        self.pen.clicked.connect(lambda: self.edit.emit(facts))
         head = QHBoxLayout()
         head.addWidget(title, 1)
         head.addWidget(label(facts.file_name, "label", "text2"))
+        head.addWidget(self.pen)
         self.column.addLayout(head)
         self.column.addWidget(Clamped(facts.description or facts.title, ABOUT_LINES, "body", "text2"))
         self.column.addStretch()
@@ -60,7 +76,9 @@ class StudyCard(Card):
 
 
 class BrokenCard(Card):
-    """A protocol file that cannot be used, and why."""
+    """A protocol file that cannot be used, and why; ``edit`` carries its facts."""
+
+    edit = Signal(object)
 
     def __init__(self, facts: BrokenFacts) -> None:
         super().__init__(padding=22, gap=10)
@@ -69,6 +87,9 @@ class BrokenCard(Card):
         row = QHBoxLayout()
         row.addWidget(Icon("warning", "warn", 20))
         row.addWidget(title, 1)
+        self.pen = EditButton(facts.source)
+        self.pen.clicked.connect(lambda: self.edit.emit(facts))
+        row.addWidget(self.pen)
         self.column.addLayout(row)
         self.column.addWidget(label("This file cannot be used.", "strong", "warn"))
         said = label(facts.problem, "label", "text2", wraps=True)

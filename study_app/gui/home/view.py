@@ -41,6 +41,7 @@ from study_app.viewmodels.home import (
     held,
     holds_liquids_alone,
     interrupted,
+    is_shipped,
     read_studies,
 )
 from study_app.viewmodels.sessions import SessionFacts, sessions
@@ -54,7 +55,8 @@ class HomePlace(Place):
     """Protocols, sessions, device, lab.
 
     ``session_asked`` carries what an operator chose, ``results_asked`` the folder of a study, ``protocol_opened`` the
-    file of a study that was opened here.
+    file of a study that was opened here, ``edit_asked`` the source of a study that is to be edited, ``new_asked`` that
+    of one that is to be copied, "" for any.
 
     Parameters
     ----------
@@ -65,6 +67,8 @@ class HomePlace(Place):
     session_asked = Signal(object)
     results_asked = Signal(object)
     protocol_opened = Signal(object)
+    edit_asked = Signal(str)
+    new_asked = Signal(str)
 
     def __init__(self, results: Path) -> None:
         super().__init__()
@@ -84,9 +88,11 @@ class HomePlace(Place):
         self.device = DeviceCard()
         self.lab = LabCard()
         self.open_protocol = ActionButton("file", "Open protocol …")
+        self.new_study = ActionButton("plus", "New study …")
         self.folder = Elided("label", "text2")
         self._lay_out()
         self.open_protocol.clicked.connect(self._open_protocol)
+        self.new_study.clicked.connect(lambda: self.new_asked.emit(""))
         self.banner.resume_asked.connect(self._resume)
         self.sessions.all_asked.connect(lambda: self.go_asked.emit("results"))
         self.sessions.open_asked.connect(self._open_session)
@@ -138,6 +144,7 @@ class HomePlace(Place):
         head.setContentsMargins(SHADOW, 0, SHADOW, 0)
         head.addLayout(titles, 1)
         head.addWidget(self.open_protocol)
+        head.addWidget(self.new_study)
         self._below = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._below.setSpacing(18)
         self._below.addWidget(self.sessions, 1)
@@ -186,9 +193,15 @@ class HomePlace(Place):
         cards: list[QWidget] = []
         for facts in self._facts:
             if isinstance(facts, BrokenFacts):
-                cards.append(BrokenCard(facts))
+                broken = BrokenCard(facts)
+                broken.edit.connect(lambda facts: self.edit_asked.emit(facts.source))
+                cards.append(broken)
                 continue
-            card = StudyCard(facts, first=not any(isinstance(other, StudyCard) for other in cards))
+            ships = is_shipped(facts.source)
+            first = not any(isinstance(other, StudyCard) for other in cards)
+            card = StudyCard(facts, first=first, shipped=ships)
+            asked = self.new_asked if ships else self.edit_asked
+            card.edit.connect(lambda facts, asked=asked: asked.emit(facts.source))
             card.new_session.connect(self.ask_for_session)
             card.rehearsal.connect(self.ask_for_rehearsal)
             cards.append(card)
@@ -200,10 +213,11 @@ class HomePlace(Place):
 
     def _order_focus(self) -> None:
         """Let Tab go through the page as it is read: cards are made anew, and Qt would put them last."""
-        cards = [card for card in self.grid.cards if isinstance(card, StudyCard)]
+        cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
         sessions, device = self.sessions, self.device
         parts: tuple[QWidget, ...] = (
-            self.open_protocol, self.banner.resume, *(button for card in cards for button in (card.new, card.rehearse)),
+            self.open_protocol, self.new_study, self.banner.resume,
+            *(button for card in cards for button in _buttons(card)),
             sessions.kind, sessions.details, sessions.all, sessions.rows.table,
             device.devices, device.display, self.lab.open,
         )  # fmt: skip
@@ -294,6 +308,10 @@ class HomePlace(Place):
         """Make room: cards go below each other."""
         super().resizeEvent(event)
         self._arrange()
+
+
+def _buttons(card: StudyCard | BrokenCard) -> tuple[QWidget, ...]:
+    return (card.pen, card.new, card.rehearse) if isinstance(card, StudyCard) else (card.pen,)
 
 
 def _read(

@@ -14,6 +14,7 @@ from study_app.gui.home.view import HomePlace
 from study_app.gui.theme.theme import DARK, font
 from study_app.gui.widgets.row_table import GAP
 from study_app.protocol.load import load, source_bytes
+from study_app.protocol.source.files import shipped_file
 from study_app.store.exclusions import exclude
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import MachineSettings
@@ -179,6 +180,24 @@ def test_new_session_opens_the_questions_and_passes_the_answers_on(home, qtbot):
         qtbot.mouseClick(home.dialog.begin, Qt.MouseButton.LeftButton)
     assert asked.args[0].source == card.facts.source
     assert asked.args[0].participant == "P001"
+
+
+def test_the_pen_edits_a_study_or_copies_one_that_ships(home, qtbot, tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    (tmp_path / "protocols").mkdir()
+    text = shipped_file("demo").read_text(encoding="utf-8").replace('name = "demo"', 'name = "mine"')
+    (tmp_path / "protocols" / "mine.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "protocols" / "broken.toml").write_text("format = 1\n", encoding="utf-8")
+    home.show_studies()
+    asked = []
+    home.edit_asked.connect(lambda source: asked.append(("edit", source)))
+    home.new_asked.connect(lambda source: asked.append(("new", source)))
+    pens = {card.facts.source: card.pen for card in home.grid.cards if isinstance(card, StudyCard)}
+    assert pens["demo"].accessibleName().startswith("Make a copy of")
+    for pen in (pens["mine"], pens["demo"], next(card.pen for card in home.grid.cards if isinstance(card, BrokenCard))):
+        qtbot.mouseClick(pen, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(home.new_study, Qt.MouseButton.LeftButton)
+    assert asked == [("edit", "mine"), ("new", "demo"), ("edit", "broken"), ("new", "")]
 
 
 def test_a_protocol_opened_from_elsewhere_gets_a_card(home, tmp_path, monkeypatch):
