@@ -53,14 +53,33 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
 @click.option(
     "--template", metavar="T", default="empty", show_default=True, help=f"What it begins as: {', '.join(templates())}."
 )
-def new(name: str, template: str) -> None:
-    """Make a study of your own from a template, in the workspace's protocols."""
+@click.option("--no-window", is_flag=True, help="Write the file at once; do not open the study designer.")
+def new(name: str, template: str, *, no_window: bool) -> None:
+    """Begin a study of your own from a template, in the study designer."""
     from study_app.authoring import new_study
 
     study = new_study.template(template)
     keep_offered_workspace()
+    if not no_window:
+        from study_app import app
+
+        new_study.check_free(name)
+        code = app.home(then=lambda visit: visit.begin_study(f"template:{template}", name))
+        click.get_current_context().exit(code)
     file = new_study.write_new(study, name)
     click.echo(f"{file}: edit it, then see all of it by liquid-study check {name}")
+
+
+@click.command()
+@FILE
+def edit(protocol: str) -> None:
+    """Open a study in the study designer."""
+    from study_app import app
+    from study_app.protocol.source.files import find
+
+    file = find(protocol)
+    named = protocol if file.name != Path(protocol).name else str(file)
+    click.get_current_context().exit(app.home(then=lambda visit: visit.open_designer(named)))
 
 
 @click.command()

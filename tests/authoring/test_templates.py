@@ -53,7 +53,7 @@ def test_each_template_is_rehearsed(name: str, tmp_path: Path) -> None:
 
 
 def new(*words: str) -> Result:
-    return CliRunner().invoke(commands, ["new", *words])
+    return CliRunner().invoke(commands, ["new", "--no-window", *words])
 
 
 @pytest.fixture
