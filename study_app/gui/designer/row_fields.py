@@ -169,7 +169,7 @@ class ChoiceField(Field):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         words = [choice_words(choice, None) for choice in row.row.choices]
-        few = 1 < len(words) <= MOST_SEGMENTS and sum(map(len, words)) <= SEGMENT_LETTERS
+        few = 1 < len(words) <= MOST_SEGMENTS and sum(len(one) + 3 for one in words) <= SEGMENT_LETTERS
         self.segments = Segments(row.row.label) if few and row.row.kind != "reference" else None
         self.list: Choice | None = None
         if self.segments is not None:

@@ -44,6 +44,12 @@ class _Typed:
             self.pending = False
             self.typed.emit(self.words())
 
+    def accept(self) -> None:
+        """Hand on what was typed; Esc restores it from now on, unless it is refused."""
+        self.flush()
+        if self.property("state") != "refused":  # type: ignore[attr-defined]
+            self._before = self.words()
+
     def words(self) -> str:
         """Return the text."""
         raise NotImplementedError
@@ -85,7 +91,7 @@ class TypedLine(_Typed, QLineEdit):
         self.setFont(font("label", weight=400))
         self.setFixedHeight(FIELD_PX)
         self.textEdited.connect(lambda _text: self.note())
-        self.returnPressed.connect(self.flush)
+        self.returnPressed.connect(self.accept)
 
     def words(self) -> str:
         """Return the text."""

@@ -152,6 +152,28 @@ def test_text_that_is_not_a_number_stays_with_its_reason(qtbot: Any, designer: A
     assert not row.wrong.isVisible()
 
 
+def test_esc_restores_what_was_accepted_last(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.controller.select(("device",))
+    line = designer.row("device", "force_limit_n").field.line
+    line.setFocus()
+    for typed, key in (("5", "Return"), ("strong", "Return"), ("", "Escape")):
+        line.selectAll()
+        qtbot.keyClicks(line, typed)
+        press(qtbot, designer, key)
+    assert line.text() == "5"
+    assert designer.controller.opened.study.document["device"]["force_limit_n"] == 5
+
+
+def test_every_form_fits_its_width(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    area = designer.place.form.area
+    for row in designer.place.outline.rows:
+        designer.controller.select(row.path)
+        QApplication.processEvents()
+        assert area.widget().minimumSizeHint().width() <= area.viewport().width(), row.path
+
+
 def test_a_file_that_is_not_toml_keeps_the_outline_and_says_its_fault(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     rows = len(designer.place.outline.rows)
