@@ -366,7 +366,7 @@ class DesignerController(QObject):
                 file_text(study, opened.file.name, selected),
                 problems,
                 self._banner,
-                addable(study),
+                addable(study, selected),
             )
         )
         self._repairs.begin(study, () if opened.read_only else problems)

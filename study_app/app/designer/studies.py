@@ -72,14 +72,15 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
         The study ``source`` cannot be read.
     """
     choices = [
-        TemplateChoice(f"template:{name}", label_of(name.replace("-", "_")), _described(template(name).document)[1])
+        TemplateChoice(f"template:{name}", _template_title(name), _described(template(name).document)[1])
         for name in templates()
     ]
     choices.sort(key=lambda choice: choice.source == "template:empty")
     copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
     for name in copied:
         file = shipped_file(name) if name in shipped() else find(name)
-        choices.append(TemplateChoice(name, *_described(read(file.read_bytes(), file.parent).document), copy=True))
+        title, description = _described(read(file.read_bytes(), file.parent).document)
+        choices.append(TemplateChoice(name, f"{title} ({file.stem})", description, copy=True))
     return tuple(choices)
 
 
@@ -101,6 +102,10 @@ def time_words(moment: str) -> str:
         return "an unknown time"
     today = kept.date() == datetime.now().astimezone().date()
     return f"today {kept:%H:%M}" if today else f"{kept:%Y-%m-%d %H:%M}"
+
+
+def _template_title(name: str) -> str:
+    return "Empty study" if name == "empty" else label_of(name.replace("-", "_")).replace(" jnd", " JND")
 
 
 def _described(document: Mapping[str, Any]) -> tuple[str, str]:

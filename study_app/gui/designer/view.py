@@ -13,6 +13,7 @@ from study_app.gui.designer.new_study import NewStudyPage
 from study_app.gui.designer.outline import OutlineCard
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt, VersionCard
+from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import SHADOW, Card
 from study_app.gui.widgets.controls import ActionButton
@@ -300,6 +301,7 @@ class DesignerPlace(Place):
         if self.view.form is None or self.view.header.read_only:
             return
         menu = QMenu(self)
+        menu.setFont(font("label"))
         for section, words in self.view.addable:
             action = menu.addAction(words)
             action.triggered.connect(lambda _checked=False, section=section: self.asked.emit(AddElement(section)))

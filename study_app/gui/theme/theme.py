@@ -183,6 +183,9 @@ QComboBox::drop-down {{ border: none; width: 28px; }}
 QComboBox QAbstractItemView {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};
   selection-background-color: {t.selected}; selection-color: {t.text}; outline: none; }}
 QComboBox QAbstractItemView::item {{ min-height: 30px; padding: 0 8px; }}
+QMenu {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl}; padding: 6px; }}
+QMenu::item {{ padding: 8px 28px 8px 14px; border-radius: 6px; }}
+QMenu::item:selected {{ background: {t.selected}; color: {t.text}; }}
 QToolTip {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl}; padding: 4px 8px; }}
 """
 

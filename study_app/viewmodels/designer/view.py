@@ -79,9 +79,10 @@ class DesignerView:
     addable: tuple[tuple[Path, str], ...] = ()
 
 
-def addable(study: Study) -> tuple[tuple[Path, str], ...]:
-    """Return the sections of tables that an element can be added to, with the word for one."""
-    sections = [row.path for row in rows(study.document, ()) if row.kind == "tables"]
+def addable(study: Study, selected: Path) -> tuple[tuple[Path, str], ...]:
+    """Return what an element can be added to, with the word for one: lists of the selected element, then sections."""
+    lists = [row.path for row in rows(study.document, selected[:2]) if row.kind == "list"] if len(selected) > 1 else []
+    sections = lists + [row.path for row in rows(study.document, ()) if row.kind == "tables"]
     return tuple((path, label_of(singular(path[-1]))) for path in sections)
 
 

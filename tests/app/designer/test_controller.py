@@ -209,6 +209,18 @@ def test_elements_are_added_copied_moved_renamed_and_deleted(designer: Any) -> N
     assert designer.text == first
 
 
+def test_what_can_be_added_begins_with_the_lists_of_the_selected_element(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    assert "Question" not in [words for _, words in designer.place.view.addable]
+    designer.controller.select(("questionnaires", "liquid", "items", 0))
+    assert designer.place.view.addable[0] == (("questionnaires", "liquid", "items"), "Question")
+    designer.place.ask_to_add()
+    designer.place.menu.actions()[0].trigger()
+    designer.place.menu.close()
+    assert designer.place.view.form.path == ("questionnaires", "liquid", "items", 2)
+    assert designer.controller.opened.study.faults == ()
+
+
 def test_what_is_refused_is_said_at_its_field(designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.controller.select(("liquids", "thin"))
