@@ -19,6 +19,7 @@ from study_app.app.designer.steps import Step, Steps, delete_prompt
 from study_app.app.designer.studies import header_state, new_choices, source_of, studies, there, time_words
 from study_app.authoring.drafts import ChangedOutsideError, draft_of
 from study_app.authoring.facts import facts
+from study_app.authoring.history import History
 from study_app.authoring.new_study import template
 from study_app.authoring.study import read
 from study_app.authoring.versions import next_version
@@ -27,6 +28,7 @@ from study_app.errors import StudyError
 from study_app.gui.designer.view import DesignerPlace
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import find
+from study_app.viewmodels.designer.fact_cards import fact_cards
 from study_app.viewmodels.designer.file_text import file_text, retyped
 from study_app.viewmodels.designer.form_rows import form, value_at
 from study_app.viewmodels.designer.outline_rows import outline_rows
@@ -36,8 +38,7 @@ from study_app.viewmodels.designer.view import Banner, DesignerView, HeaderState
 
 DRAFT_MS: Final = 50
 REST_MS: Final = 200
-JOIN_S: Final = 1.0
-"""Typing in one field is one step until the keyboard rests for so long."""
+JOIN_S: Final = 1.0  # typing in one field is one step until the keyboard rests for so long
 
 
 class DesignerController(QObject):
@@ -103,13 +104,12 @@ class DesignerController(QObject):
     def enter(self) -> None:
         """Look again at what there is; a file that another program changed is taken in where nothing was edited."""
         self._show_studies()
-        if self.opened is None:
-            return
-        if not self.opened.read_only and self.opened.changed_outside():
-            if self.opened.edited or not self.opened.file.exists():
+        opened = self.opened
+        if opened is not None and not opened.read_only and opened.changed_outside():
+            if opened.edited or not opened.file.exists():
                 self._say_changed()
             else:
-                self._try(self.opened.take_outside)
+                self._try(opened.take_outside)
         self.show()
 
     def leave(self) -> None:
@@ -261,15 +261,15 @@ class DesignerController(QObject):
 
     def undo(self) -> None:
         """Undo the last step."""
-        if self.opened is not None and not self.opened.read_only:
-            self.opened.history = self.opened.history.undo()
-            self._joins = (None, 0.0)
-            self._edited(self.opened)
+        self._travel(History.undo)
 
     def redo(self) -> None:
         """Redo the step that was undone last."""
+        self._travel(History.redo)
+
+    def _travel(self, to: Callable[[History], History]) -> None:
         if self.opened is not None and not self.opened.read_only:
-            self.opened.history = self.opened.history.redo()
+            self.opened.history = to(self.opened.history)
             self._joins = (None, 0.0)
             self._edited(self.opened)
 
@@ -318,15 +318,14 @@ class DesignerController(QObject):
         except StudyError as error:
             self.place.message.emit("The study was not saved", f"{error}.")
             return
-        if self._banner is not None:
-            self._banner = None
+        self._banner = None
         self.show()
         self.saved.emit(opened.file)
 
     def save_as_version(self, version: str) -> None:
         """Give the study another version and save it."""
-        if self.opened is not None:
-            self._try(lambda: self.opened.set_version(version) if self.opened else None)
+        if (opened := self.opened) is not None:
+            self._try(lambda: opened.set_version(version))
             self.save()
 
     def _write_draft(self, *, at_once: bool = False) -> None:
@@ -383,7 +382,8 @@ class DesignerController(QObject):
             return
         study = self.opened.study
         known = facts(study)
-        self.place.show_outline(outline_rows(study, known.steps_s, self._find), self.opened.history.selected)
+        rows = outline_rows(study, known.steps_s, self._find)
+        self.place.show_outline(rows, self.opened.history.selected, fact_cards(known, study.document))
         if known.warnings != self._warnings:
             self._warnings = known.warnings
             self.place.show_header(self._header())

@@ -69,6 +69,17 @@ class TemplateButton(Themed, QAbstractButton):
         painter.drawText(place, Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop, words)
 
 
+class NoStudyCard(Card):
+    """What is shown while no study is open; ``new`` is its button."""
+
+    def __init__(self) -> None:
+        super().__init__("No study is open", padding=28, gap=12)
+        self.column.addWidget(label("Choose a study above, or begin a new one.", "body", "text2"))
+        self.new = ActionButton("plus", "New study …", role="primary")
+        self.column.addWidget(self.new, 0, Qt.AlignmentFlag.AlignLeft)
+        self.column.addStretch()
+
+
 class NewStudyPage(Themed, QWidget):
     """Signals: ``begin_asked`` (source, name), ``given_up``."""
 

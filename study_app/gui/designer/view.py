@@ -6,10 +6,11 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QMenu, QStackedWidget, QVBoxLayout, QWidget
 
+from study_app.gui.designer.facts import FactsRow
 from study_app.gui.designer.file_editor import FileCard
 from study_app.gui.designer.form import FormCard
 from study_app.gui.designer.header import DesignerHeader
-from study_app.gui.designer.new_study import NewStudyPage
+from study_app.gui.designer.new_study import NewStudyPage, NoStudyCard
 from study_app.gui.designer.outline import OutlineCard
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt, VersionCard
@@ -20,6 +21,7 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
 from study_app.gui.widgets.segments import Segments
+from study_app.viewmodels.designer.fact_cards import FactCards
 from study_app.viewmodels.designer.outline_rows import OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.prompts import DeletePrompt, TemplateChoice
@@ -28,7 +30,7 @@ from study_app.viewmodels.designer.view import Banner, DesignerView, HeaderState
 
 OUTLINE_PX, OUTLINE_NARROW_PX, WIDE_FROM = 284, 244, 1400
 ONE_PANE_BELOW = 1130
-FORM_SHARE = 0.44
+FACTS_FROM = 860
 
 
 class DesignerPlace(Place):
@@ -77,22 +79,14 @@ class DesignerPlace(Place):
         self.problems = ProblemsCard()
         self.new_page = NewStudyPage()
         self.panes = Segments("Pane")
-        self.nothing = self._nothing()
+        self.facts = FactsRow()
+        self.nothing = NoStudyCard()
         self._lay_out()
         self._connect()
         self._take_keys()
         self.banner.hide()
         self.problems.hide()
         self.show_view(DesignerView())
-
-    def _nothing(self) -> Card:
-        made = Card(padding=28, gap=12)
-        made.column.addWidget(label("No study is open", "card"))
-        made.column.addWidget(label("Choose a study above, or begin a new one.", "body", "text2"))
-        self.new = ActionButton("plus", "New study …", role="primary")
-        made.column.addWidget(self.new, 0, Qt.AlignmentFlag.AlignLeft)
-        made.column.addStretch()
-        return made
 
     def _lay_out(self) -> None:
         self._prompts = QVBoxLayout()
@@ -101,7 +95,11 @@ class DesignerPlace(Place):
         across = QHBoxLayout()
         across.setSpacing(14 - 2 * SHADOW)
         across.addWidget(self.form, 44)
-        across.addWidget(self.file, 56)
+        pane = QVBoxLayout()
+        pane.setSpacing(12 - 2 * SHADOW)
+        pane.addWidget(self.file, 1)
+        pane.addWidget(self.facts)
+        across.addLayout(pane, 56)
         panes = QHBoxLayout()
         panes.setContentsMargins(SHADOW, 0, SHADOW, 0)
         panes.addWidget(self.panes)
@@ -141,7 +139,7 @@ class DesignerPlace(Place):
         header.undo_asked.connect(self._undo)
         header.redo_asked.connect(self._redo)
         header.save_asked.connect(self._save)
-        self.new.clicked.connect(self.new_asked)
+        self.nothing.new.clicked.connect(self.new_asked)
         outline.chosen.connect(self._select)
         outline.find_changed.connect(self.find_changed)
         outline.add_asked.connect(self.ask_to_add)
@@ -201,9 +199,10 @@ class DesignerPlace(Place):
         """Show the header's state."""
         self.header.show_state(state)
 
-    def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
-        """Show the rows of the outline."""
+    def show_outline(self, rows: tuple[OutlineRow, ...], selected: object, facts: FactCards) -> None:
+        """Show the rows of the outline, and the facts of the study."""
         self.outline.show_outline(rows, selected)
+        self.facts.show_facts(facts)
 
     def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
         """Offer the repairs of a problem."""
@@ -379,6 +378,7 @@ class DesignerPlace(Place):
         self.panes.show_values((("form", "Form"), ("file", "File")), self._pane)
         self.form.setVisible(not one or self._pane == "form")
         self.file.setVisible(not one or self._pane == "file")
+        self.facts.setVisible(self.file.isVisibleTo(self._editing) and self.height() >= FACTS_FROM)
 
     def enter(self) -> None:
         """Look again at what there is."""
