@@ -8,7 +8,7 @@ from typing import Any
 
 from study_app.authoring.additions import added, initial, singular
 from study_app.authoring.conversions import left_by, switched
-from study_app.authoring.fields import label_of, row_at
+from study_app.authoring.fields import label_of, row_at, rows
 from study_app.authoring.names import deletions, free_name, references_to, renamed, replaced, with_references
 from study_app.authoring.outline import title_of
 from study_app.authoring.repairs import repairs
@@ -76,8 +76,7 @@ class Steps:
         if isinstance(asked, RemoveKey):
             return Step(f"Remove {label_of(asked.path[-1])}", (Unset(asked.path),))
         if isinstance(asked, AddKey):
-            value = _listed(initial(study.document, asked.path))
-            return Step(f"Add {label_of(asked.path[-1])}", (Set(asked.path, value),))
+            return Step(f"Add {label_of(asked.path[-1])}", (Set(asked.path, _first_value(study, asked.path)),))
         if isinstance(asked, AddEntry):
             return _add_entry(study, asked)
         if isinstance(asked, AddElement):
@@ -113,6 +112,16 @@ def _text(study: Study, asked: SetText) -> tuple[Edit, ...]:
         return (Set(asked.path, asked.text),)
     before = {languages[0]: value} if isinstance(value, str) else {}
     return (Set(asked.path, {**before, asked.language: asked.text}),)
+
+
+def _first_value(study: Study, path: Path) -> Any:
+    """Return the default of a key, or an initial value; of a table with the keys that it needs."""
+    value = _listed(initial(study.document, path))
+    if value != {}:
+        return value
+    after, _ = study.edited(Set(path, {}))
+    needed = (row for row in rows(after.document, path) if row.required)
+    return {str(row.path[-1]): _listed(initial(after.document, row.path)) for row in needed}
 
 
 def _add_entry(study: Study, asked: AddEntry) -> Step:
@@ -217,5 +226,7 @@ def _index(path: Path) -> int:
 
 
 def _listed(value: Any) -> Any:
-    """Return a value with lists in place of tuples."""
+    """Return a value as it is written: lists in place of tuples, and no keys of tables that are left out."""
+    if isinstance(value, Mapping):
+        return {key: _listed(part) for key, part in value.items() if part is not None}
     return [_listed(part) for part in value] if isinstance(value, list | tuple) else value

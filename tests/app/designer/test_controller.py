@@ -248,6 +248,19 @@ def test_an_optional_key_is_written_and_removed(designer: Any) -> None:
     assert designer.text == before
 
 
+def test_every_optional_key_of_a_liquid_can_be_added_and_undone(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.controller.select(("liquids", "thick"))
+    before = designer.text
+    absent = [row.path for section in designer.place.view.form.sections for row in section.absent]
+    assert len(absent) > 5
+    for path in absent:
+        designer.controller.ask(AddKey(path))
+        assert path[-1] in designer.controller.opened.study.document["liquids"]["thick"], path
+        designer.controller.undo()
+        assert designer.text == before
+
+
 def test_a_broken_file_is_repaired_by_a_button(designer: Any, qtbot: Any) -> None:
     text = designer.file.read_text()
     designer.file.write_text(text.replace('liquid = "thick"', 'liquid = "thik"', 1))
