@@ -89,7 +89,8 @@ def duplicated(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:
     last = path[-1]
     name = table.get("id", last) if isinstance(last, int) else last
     if isinstance(last, int):
-        taken = [entry.get("id") for _, entry in entries(study.document, ".".join((*map(str, path[:2]), "*", "*")))]
+        pattern = ".".join((*map(str, path[:2]), "*", "*"))
+        taken = [entry.get("id") for _, entry in entries(study.document, pattern) if isinstance(entry, Mapping)]
         copy: Path = (*path[:-1], last + 1)
         edits: list[Edit] = [Duplicate(path)]
         if isinstance(name, str):
