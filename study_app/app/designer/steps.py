@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from study_app.authoring.additions import added, initial, singular
+from study_app.authoring.additions import added, duplicated, initial, singular
 from study_app.authoring.conversions import left_by, switched
 from study_app.authoring.fields import label_of, row_at, rows
-from study_app.authoring.names import deletions, free_name, references_to, renamed, replaced, with_references
+from study_app.authoring.names import deletions, references_to, renamed, replaced, with_references
 from study_app.authoring.outline import title_of
-from study_app.authoring.repairs import repairs
 from study_app.authoring.study import Study
-from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Move, Set, Unset
+from study_app.authoring.writer.edits import Edit, Insert, Move, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path, entries, names
 from study_app.viewmodels.designer.form_rows import step_of, value_at
@@ -34,8 +33,6 @@ from study_app.viewmodels.designer.requests import (
     SetValue,
     SwitchKind,
 )
-
-_ROUNDS = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,36 +138,14 @@ def _add_entry(study: Study, asked: AddEntry) -> Step:
 
 
 def _duplicate(study: Study, path: Path) -> Step:
-    """Return the step that copies an element, with a name and a code letter of its own, and its step in the session."""
-    document, words = study.document, f"Duplicate {title_of(study.document, path)}"
-    first: list[Edit]
-    if isinstance(path[-1], int):
-        after: Path = (*path[:-1], path[-1] + 1)
-        item = value_at(document, path)
-        first = [Duplicate(path)]
-        if isinstance(item, Mapping) and isinstance(item.get("id"), str):
-            taken = [str(name) for _, name in entries(document, ".".join((*map(str, path[:-1]), "*", "id")))]
-            first.append(Set((*after, "id"), free_name(taken, item["id"])))
-    elif len(path) == 2:
-        after = (path[0], free_name(names(document, str(path[0])), str(path[1])))
-        first = [Duplicate(path, str(after[1]))]
-        if (step := step_of(document, path)) is not None:
-            first.append(Insert((*step[:-1], _index(step) + 1), str(after[1])))
-    else:
-        raise Refused("only elements of a section or list can be duplicated")
-    known = {(fault.path, fault.message) for fault in study.faults}
-    for _ in range(_ROUNDS):
-        found = [fault for fault in study.edited(*first)[0].faults if (fault.path, fault.message) not in known]
-        if not found:
-            break
-        fault = found[0]
-        known.add((fault.path, fault.message))
-        if fault.path[-1:] == ("code_prefix",):
-            without, _ = study.edited(*first, Unset((*after, "code_prefix")))
-            first.append(Set((*after, "code_prefix"), initial(without.document, (*after, "code_prefix"))))
-        elif offered := repairs(study.edited(*first)[0], fault):
-            first += offered[0].edits
-    return Step(words, tuple(first), after)
+    """Return the step that copies an element; its step in the session comes right after that of the original."""
+    edits, copy = duplicated(study, path)
+    after, _ = study.edited(*edits)
+    original, step = step_of(after.document, path), step_of(after.document, copy)
+    if original is not None and step is not None and step != copy and step[:-1] == original[:-1]:
+        to = _index(original) + (_index(step) > _index(original))
+        edits = edits if _index(step) == to else (*edits, Move(step, to))
+    return Step(f"Duplicate {title_of(study.document, path)}", edits, copy)
 
 
 def _move(study: Study, asked: MoveElement) -> Step:

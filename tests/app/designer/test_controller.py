@@ -10,6 +10,7 @@ import pytest
 
 from study_app.authoring.drafts import draft_of
 from study_app.protocol.source.files import shipped, shipped_file
+from study_app.viewmodels.designer.form_rows import position_of
 from study_app.viewmodels.designer.requests import (
     AddElement,
     AddKey,
@@ -207,6 +208,20 @@ def test_elements_are_added_copied_moved_renamed_and_deleted(designer: Any) -> N
     while controller.opened.history.done:
         controller.undo()
     assert designer.text == first
+
+
+@pytest.mark.parametrize("path", [("questionnaires", "liquid", "items", 0), ("pages", "thanks"), ("pages", "welcome")])
+def test_a_copy_comes_right_after_its_original(designer: Any, path: tuple[str | int, ...]) -> None:
+    text = designer.file.read_text()
+    designer.file.write_text(text.replace('\nintro = "', '\nintro.en = "'))
+    designer.controller.open("kitchen")
+    at = position_of(designer.controller.opened.study.document, path)
+    designer.controller.select(path)
+    designer.place.form.head.copy.click()
+    study = designer.controller.opened.study
+    assert {fault.message for fault in study.faults} <= {"reads as an earlier item does"}
+    assert at is not None
+    assert position_of(study.document, designer.controller.opened.history.selected) == (at[0] + 1, at[1] + 1)
 
 
 def test_what_can_be_added_begins_with_the_lists_of_the_selected_element(designer: Any) -> None:
