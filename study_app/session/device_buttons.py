@@ -32,8 +32,8 @@ class DeviceButtons:
 
         Parameters
         ----------
-        samples : (n,) structured array
-            The newest samples of telemetry, at least one.
+        samples : (n,) array
+            The newest samples of telemetry, with named fields, at least one.
         since_ns : int
             When the page was presented [ns].
         now_s : float
