@@ -15,7 +15,11 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(autouse=True)
 def automatic_collection() -> Iterator[None]:
-    """Collect as the interpreter does; the other tests collect between tests alone."""
+    """Collect as the interpreter does; the other tests collect between tests alone.
+
+    What those left goes first: while another thread frees it, nobody else can collect.
+    """
+    gc.collect()
     gc.enable()
     yield
     gc.disable()
