@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
@@ -368,6 +369,7 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
 def test_a_process_that_ends_by_itself_is_told_and_begun_again(qtbot: QtBot, results: Path) -> None:
     opened = Opened(qtbot, results, start_analysis_worker)
     reader: Any = opened.desk.reader
+    psutil.Process(reader.process.pid).suspend()  # or it may answer before it is killed
     opened.desk.look()
     reader.process.kill()
     qtbot.waitUntil(lambda: "bug in the program" in opened.place.figures.trouble.title.text(), timeout=SOON_MS)
