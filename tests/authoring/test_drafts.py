@@ -26,7 +26,7 @@ from study_app.authoring.drafts import (
 from study_app.errors import StoreError
 from study_app.user_folder import data_folder
 
-KILLS = 50
+KILLS = int(os.environ.get("LIQUID_STUDY_DRAFT_KILLS", "10"))
 AT_ONCE = 10
 
 

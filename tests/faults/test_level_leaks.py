@@ -59,7 +59,12 @@ KNOWN = {0.2371, 2.1193, 1.3717 + 1.3717 * 0.2371}
     ("edits", "known"),
     [
         pytest.param((), KNOWN, id="constant"),
-        pytest.param((STAIRCASE, CATCH), {0.6917, 2.1193, 1.3717 + 1.3717 * 0.6917}, id="staircase"),
+        pytest.param(
+            (STAIRCASE, CATCH),
+            {0.6917, 2.1193, 1.3717 + 1.3717 * 0.6917},
+            id="staircase",
+            marks=pytest.mark.nightly,
+        ),
     ],
 )
 def test_nothing_seen_written_or_logged_tells_a_level(

@@ -145,7 +145,7 @@ def run(folder: Path, *words: str) -> str:
     return finished.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.timeout(600)
 @pytest.mark.skipif(not COMPILED, reason="runs a servo")
 def test_a_new_effect_is_two_files_and_a_line_of_the_tick(copy: Path) -> None:
