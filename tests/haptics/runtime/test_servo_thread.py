@@ -29,7 +29,7 @@ def test_the_thread_ticks_while_python_computes_and_ends_when_told(probe):
         assert servo.load(HONEY) == 1
         wait_until(lambda: scene_of(servo.telemetry) == 1)
         wait_until(lambda: force_n(servo.telemetry) > 0.1)
-        assert servo.now_ns() >= servo.telemetry.latest().time_ns
+        assert servo.telemetry.latest().time_ns <= servo.now_ns()  # in this order: a tick may come between
         assert servo.describe()["priority"].split()[0] in {"real-time", "raised", "normal"}
         assert servo.describe()["delay_ticks"] == servo.delay_ticks == servo.dynamics.delay_ticks(servo.rate_hz)
         samples = reader.read()
