@@ -104,8 +104,8 @@ def duplicated(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:
     ]
     edits += [Set(place, initial(after.document, place)) for place in letters]
     after, _ = study.edited(*edits)
-    for fault in set(after.faults) - set(study.faults):
-        if fault.path == copy:
+    for fault in after.faults:
+        if fault.path == copy and fault not in study.faults:
             edits += _outside(after, fault)
     return tuple(edits), copy
 

@@ -1,4 +1,4 @@
-"""Edits that turn one form of a table into another: another kind, another language."""
+"""Edits that give a table another kind."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from typing import Any
 from study_app.authoring.additions import initial
 from study_app.authoring.schema_nodes import node_at, table_of, tags
 from study_app.authoring.study import Study
-from study_app.authoring.writer.edits import Edit, Insert, Set, Unset
+from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.authoring.writer.refused import Refused
-from study_app.protocol.checks.cross_references import TEXTS
-from study_app.protocol.source.document import Path, entries, has
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.source.document import Path, has
 
 
 def switched(study: Study, path: Path, kind: str | None, left: Mapping[str, Any]) -> tuple[Edit, ...]:
@@ -66,32 +64,6 @@ def left_by(study: Study, path: Path, kind: str | None) -> dict[str, Any]:
     return {
         name: value for name, value in _table(study, path).items() if name != key and name not in node["properties"]
     }
-
-
-def with_language(study: Study, language: str) -> tuple[Edit, ...]:
-    """Return the edits that add a language to a study; texts that are plain strings become tables of languages.
-
-    What is then missing is counted by `facts.facts`.
-
-    Raises
-    ------
-    Refused
-        The program has no words in the language, or the study has it already.
-    """
-    document = study.document
-    languages = [str(name) for _, name in entries(document, "study.languages.*")]
-    if language not in LANGUAGES:
-        raise Refused(f'the program has no words in "{language}": it has {", ".join(LANGUAGES)}')
-    if language in languages:
-        raise Refused(f'the study has "{language}" already')
-    first = languages[0] if languages else "en"
-    listed: Edit = (
-        Insert(("study", "languages", len(languages)), language)
-        if languages
-        else Set(("study", "languages"), [first, language])
-    )
-    texts = ((path, text) for pattern in TEXTS for path, text in entries(document, pattern))
-    return (listed, *(Set(path, {first: text}) for path, text in texts if isinstance(text, str)))
 
 
 def _of_kind(study: Study, path: Path, kind: str | None) -> tuple[str, Mapping[str, Any]]:

@@ -1,4 +1,4 @@
-"""Facts of a study that follow every edit: its length, trials, forces, balance, missing texts and warnings."""
+"""Facts of a study that follow every edit: its length, trials, forces, missing texts and warnings."""
 
 from __future__ import annotations
 
@@ -7,11 +7,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from study_app.authoring.study import Study
-from study_app.errors import StudyError
 from study_app.haptics.model.steady_state import HAND_MPS, steady
 from study_app.protocol.describe import expected_duration_s, step_duration_s, warnings
-from study_app.protocol.model import Protocol
-from study_app.protocol.orders.balance import balances, numbered
 from study_app.protocol.orders.block_orders import orders_of
 
 MOST_PARTICIPANTS: Final = 200
@@ -67,32 +64,3 @@ def facts(study: Study) -> Facts:
         missing=missing,
         warnings=warnings(protocol),
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Evenness:
-    """Whether the orders of so many participants are balanced in position and carry-over, and of how many they are.
-
-    ``next_even`` is the smallest number from ``participants`` on; None where none up to 200 is, as with random orders.
-    """
-
-    participants: int
-    balanced: bool
-    next_even: int | None
-
-
-def balance_of(protocol: Protocol, participants: int, seed: int = 1) -> Evenness:
-    """Return how balanced the orders of a number of participants are."""
-    counts = range(participants, max(participants, MOST_PARTICIPANTS if protocol.assigns_rows else 0) + 1)
-    return Evenness(
-        participants,
-        _balanced(protocol, participants, seed),
-        next((count for count in counts if _balanced(protocol, count, seed)), None),
-    )
-
-
-def _balanced(protocol: Protocol, participants: int, seed: int) -> bool:
-    try:
-        return all(one.balanced for one in balances(protocol, numbered(participants), seed))
-    except StudyError:
-        return False

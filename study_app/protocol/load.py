@@ -119,7 +119,7 @@ def examined(document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS) -> 
         faults += newer
     faults += _outside(broken, _faults(Protocol, document))
     if not formats.is_later(document):
-        unfilled = [path for path in broken if path[0] == "questionnaires" or path[-1] in {"method", "design"}]
+        unfilled = [path for path in broken if path[0] == "questionnaires"]
         faults += _outside(unfilled, check(document, [fault.path for fault in faults]))
     if faults:
         return None, faults

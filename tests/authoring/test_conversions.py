@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.authoring.conversions import left_by, switched, with_language
-from study_app.authoring.facts import facts
+from study_app.authoring.conversions import left_by, switched
 from study_app.authoring.study import Study, read
 from study_app.authoring.writer.refused import Refused
 from tests.authoring.grown import PROTOCOLS
@@ -41,19 +40,3 @@ def test_switched_leaves_the_kind_of_a_statement_out() -> None:
 def test_switched_refuses_a_kind_that_does_not_exist() -> None:
     with pytest.raises(Refused, match="there is no kind 'swim' here: explore, reach, follow"):
         switched(study_of("demo"), TASK, "swim", {})
-
-
-def test_with_language_turns_every_text_into_a_table_and_counts_what_is_missing() -> None:
-    study = study_of("demo")
-    changed, _ = study.edited(*with_language(study, "nl"))
-    assert changed.document["study"]["languages"] == ("en", "nl")
-    assert changed.document["study"]["title"] == {"en": "A first look"}
-    assert {fault.message for fault in changed.faults} == {'is missing in "nl"'}
-    assert facts(changed).missing == {"nl": len(changed.faults)}
-    assert changed.text.count("#") == study.text.count("#")
-
-
-@pytest.mark.parametrize(("language", "sentence"), [("xx", "has no words in"), ("en", "already")])
-def test_with_language_refuses_what_is_there_or_has_no_words(language: str, sentence: str) -> None:
-    with pytest.raises(Refused, match=sentence):
-        with_language(study_of("demo"), language)

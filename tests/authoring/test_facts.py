@@ -4,12 +4,11 @@ import itertools
 
 import pytest
 
-from study_app.authoring.facts import balance_of, facts
+from study_app.authoring.facts import facts
 from study_app.authoring.levels import levels
 from study_app.authoring.study import Study, read
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, shipped
-from study_app.protocol.orders.balance import balances, numbered
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from tests.authoring.grown import PROTOCOLS
 
@@ -46,15 +45,6 @@ def test_facts_count_the_texts_that_each_language_lacks() -> None:
     )
     assert facts(study).missing == {"nl": 2}
     assert facts(study).expected_s is None
-
-
-@pytest.mark.parametrize(("participants", "even"), [(10, True), (12, False), (20, True)])
-def test_balance_of_names_the_next_number_that_is_even(participants: int, even: bool) -> None:
-    protocol = load("slime")
-    found = balance_of(protocol, participants)
-    assert found.balanced == even
-    assert found.next_even == (participants if even else 20)
-    assert all(one.balanced for one in balances(protocol, numbered(20), 1))
 
 
 @pytest.mark.parametrize(

@@ -19,12 +19,12 @@ from study_app.gui.designer.row_fields import (
     UnknownField,
     add_button,
 )
+from study_app.gui.designer.segments import Segments
 from study_app.gui.designer.typed_fields import FIELD_PX
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.controls import Choice, IconButton
 from study_app.gui.widgets.labels import Elided, label
-from study_app.gui.widgets.segments import Segments
 from study_app.viewmodels.designer.form_rows import Entry, FormRow
 from study_app.viewmodels.designer.requests import AddElement, AddEntry, MoveEntry, RemoveKey
 

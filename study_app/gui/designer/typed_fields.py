@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QLineEdit, QPlainTextEdit
+from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.gui.theme.theme import font
 
@@ -15,18 +15,23 @@ HAND_ON_MS = 150
 FIELD_PX = 34
 KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
 
+if TYPE_CHECKING:
+    _Base = QWidget
+else:
+    _Base = object  # mixed into fields of Qt
 
-class _Typed:
+
+class _Typed(_Base):
     """What a line and a field of several lines share; ``typed`` carries the text."""
 
     typed: Any
+    came: Any
     rests = True
     """Whether what is typed is handed on while typing, not only at Enter and on leaving."""
 
     def begin(self) -> None:
         self.pending = False
         self._before = ""
-        assert isinstance(self, QObject)  # noqa: S101 - mixed into fields alone
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)
         self._rest.timeout.connect(self.flush)
@@ -47,7 +52,7 @@ class _Typed:
     def accept(self) -> None:
         """Hand on what was typed; Esc restores it from now on, unless it is refused."""
         self.flush()
-        if self.property("state") != "refused":  # type: ignore[attr-defined]
+        if self.property("state") != "refused":
             self._before = self.words()
 
     def words(self) -> str:
@@ -75,6 +80,28 @@ class _Typed:
         self.flush()
         event.ignore()
         return True
+
+    def event(self, event: QEvent) -> bool:
+        """Leave to the place the keys that are its own."""
+        return True if self.leaves_to_place(event) else super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Restore at Esc."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.restore()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Remember what is there."""
+        super().focusInEvent(event)
+        self._before = self.words()
+        self.came.emit()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Hand on what was typed."""
+        super().focusOutEvent(event)
+        self.flush()
 
 
 class TypedLine(_Typed, QLineEdit):
@@ -112,28 +139,6 @@ class TypedLine(_Typed, QLineEdit):
             self.style().unpolish(self)
             self.style().polish(self)
 
-    def event(self, event: QEvent) -> bool:
-        """Leave to the place the keys that are its own."""
-        return True if self.leaves_to_place(event) else super().event(event)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Restore at Esc."""
-        if event.key() == Qt.Key.Key_Escape:
-            self.restore()
-        else:
-            super().keyPressEvent(event)
-
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Remember what is there."""
-        super().focusInEvent(event)
-        self._before = self.text()
-        self.came.emit()
-
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Hand on what was typed."""
-        super().focusOutEvent(event)
-        self.flush()
-
 
 class TypedText(_Typed, QPlainTextEdit):
     """Several lines; Tab leaves the field."""
@@ -166,25 +171,3 @@ class TypedText(_Typed, QPlainTextEdit):
             self._showing = True
             self.setPlainText(text)
             self._showing = False
-
-    def event(self, event: QEvent) -> bool:
-        """Leave to the place the keys that are its own."""
-        return True if self.leaves_to_place(event) else super().event(event)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Restore at Esc."""
-        if event.key() == Qt.Key.Key_Escape:
-            self.restore()
-        else:
-            super().keyPressEvent(event)
-
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Remember what is there."""
-        super().focusInEvent(event)
-        self._before = self.words()
-        self.came.emit()
-
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Hand on what was typed."""
-        super().focusOutEvent(event)
-        self.flush()

@@ -14,13 +14,13 @@ from study_app.gui.designer.new_study import NewStudyPage, NoStudyCard
 from study_app.gui.designer.outline import OutlineCard
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt, VersionCard
+from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import SHADOW, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
-from study_app.gui.widgets.segments import Segments
 from study_app.viewmodels.designer.fact_cards import FactCards
 from study_app.viewmodels.designer.outline_rows import OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow

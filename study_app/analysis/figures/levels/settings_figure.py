@@ -23,9 +23,9 @@ from study_app.analysis.figures.levels.level_figure import (
 )
 from study_app.analysis.figures.levels.track_figure import FOOT_PT, MARK_PT2, MOST_PANELS, PANEL_PT, level_ticks
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
-from study_app.analysis.figures.picture import Picture
+from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
 from study_app.analysis.results.levels import LevelsFound, SettingFound
-from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study import Study
 
@@ -43,24 +43,14 @@ def setting_pictures(
 
     A figure that fails is left out, and kept in ``failures``.
     """
-    held = Failures() if failures is None else failures
-    for found in levels:
-        if not found.own_settings:
-            continue
-        name = f"settings-{found.block}"
-        drawn = held.attempt(f"figure {name}", partial(_picture, study, found, name, forms), block=found.block)
-        if not isinstance(drawn, Failure):
-            yield drawn
+    shown = (found for found in levels if found.own_settings)
+    yield from attempted(
+        ((found.block, f"settings-{found.block}", partial(_picture, study, found, forms)) for found in shown), failures
+    )
 
 
-def _picture(study: Study, found: LevelsFound, name: str, forms: Sequence[str]) -> Picture:
-    files = {
-        form: style.file_bytes(
-            _draw(study, found, style.fonts_for(form)).figure, form, f"{study.name}: {found.title}, settings"
-        )
-        for form in forms
-    }
-    simulated = "SIMULATED participants, no people; " if study.simulated else ""
+def _picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+    files = files_of(partial(_draw, study, found), forms, f"{study.name}: {found.title}, settings")
     rest = len(found.own_settings) - MOST_PANELS
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
     compared = any(one.constant_error is not None for one in found.own_settings)
@@ -68,7 +58,7 @@ def _picture(study: Study, found: LevelsFound, name: str, forms: Sequence[str]) 
     caption = (
         f"{found.title}: the levels that participants set, in their order. Filled: started high; hollow: started low. "
         f"Line and band: point of subjective equality with its 95 % interval (Student's t).{standard}{left_out} "
-        f"{simulated}{counted(len(found.people), 'participant')}."
+        f"{sample_words(study, len(found.people))}"
     )
     return Picture(found.block, name, caption, files)
 
