@@ -159,7 +159,7 @@ class MainController(QObject):
             if self.desk is not None:
                 self.desk.show_results(self.results)
             if self.designer is not None:
-                self.designer.results = self.results
+                self.designer.editing.results = self.results
         self._show_machine()
 
     def _test_display(self) -> None:
@@ -184,7 +184,7 @@ class MainController(QObject):
         from study_app.app.designer.controller import DesignerController  # noqa: PLC0415 - only once it is needed
 
         self.designer = DesignerController(self.results)
-        self.designer.saved.connect(self._show_saved)
+        self.designer.saving.saved.connect(self._show_saved)
         return self.designer.place
 
     def _show_saved(self, _file: Path) -> None:

@@ -6,12 +6,12 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QMenu, QStackedWidget, QVBoxLayout, QWidget
 
-from study_app.gui.designer.facts import FactsRow
-from study_app.gui.designer.file_editor import FileCard
-from study_app.gui.designer.form import FormCard
+from study_app.gui.designer.form.form import FormCard
 from study_app.gui.designer.header import DesignerHeader
 from study_app.gui.designer.new_study import NewStudyPage, NoStudyCard
 from study_app.gui.designer.outline import OutlineCard
+from study_app.gui.designer.pane.file_editor import FileCard
+from study_app.gui.designer.pane.right_pane import PanePage, RightPane
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt, VersionCard
 from study_app.gui.designer.segments import Segments
@@ -30,7 +30,6 @@ from study_app.viewmodels.designer.view import Banner, DesignerView, HeaderState
 
 OUTLINE_PX, OUTLINE_NARROW_PX, WIDE_FROM = 284, 244, 1400
 ONE_PANE_BELOW = 1130
-FACTS_FROM = 860
 
 
 class DesignerPlace(Place):
@@ -65,7 +64,7 @@ class DesignerPlace(Place):
         self.prompt: Prompt | None = None
         self.menu: QMenu | None = None
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
-        self._pane = "form"
+        self._side = "form"
         self.header = DesignerHeader()
         self.banner = Card(padding=10, gap=6)
         self.banner_words = label("", "label", wraps=True)
@@ -78,8 +77,9 @@ class DesignerPlace(Place):
         self.file = FileCard()
         self.problems = ProblemsCard()
         self.new_page = NewStudyPage()
-        self.panes = Segments("Pane")
-        self.facts = FactsRow()
+        self.sides = Segments("Side")
+        self.pane = RightPane()
+        self.pane.add_page(PanePage("file", "File", self.file))
         self.nothing = NoStudyCard()
         self._lay_out()
         self._connect()
@@ -95,16 +95,12 @@ class DesignerPlace(Place):
         across = QHBoxLayout()
         across.setSpacing(14 - 2 * SHADOW)
         across.addWidget(self.form, 44)
-        pane = QVBoxLayout()
-        pane.setSpacing(12 - 2 * SHADOW)
-        pane.addWidget(self.file, 1)
-        pane.addWidget(self.facts)
-        across.addLayout(pane, 56)
-        panes = QHBoxLayout()
-        panes.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        panes.addWidget(self.panes)
-        panes.addStretch()
-        right.addLayout(panes)
+        across.addWidget(self.pane, 56)
+        sides = QHBoxLayout()
+        sides.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        sides.addWidget(self.sides)
+        sides.addStretch()
+        right.addLayout(sides)
         right.addLayout(self._prompts)
         right.addLayout(across, 1)
         right.addWidget(self.problems)
@@ -154,16 +150,16 @@ class DesignerPlace(Place):
         self.problems.close_asked.connect(self.problems.hide)
         self.new_page.begin_asked.connect(self.begin_asked)
         self.new_page.given_up.connect(self.close_new)
-        self.panes.chosen.connect(lambda pane: self._show_pane(str(pane)))
+        self.sides.chosen.connect(lambda side: self._show_side(str(side)))
 
     def _take_keys(self) -> None:
         for keys, act in (
             ("Ctrl+Z", self._undo), ("Ctrl+Shift+Z", self._redo), ("Ctrl+Y", self._redo), ("Ctrl+S", self._save),
             ("F8", self._next_problem), ("Ctrl+D", self.form.head.duplicate), ("Ctrl+F", self.outline.words.setFocus),
             ("Alt+Up", lambda: self.form.head.move_by(-1)), ("Alt+Down", lambda: self.form.head.move_by(1)),
-            ("Alt+Left", self.back_asked.emit), ("F2", self._rename), ("Ctrl+E", self._switch_pane),
+            ("Alt+Left", self.back_asked.emit), ("F2", self._rename), ("Ctrl+E", self._switch_to_file),
             ("F6", lambda: self._cycle(1)), ("Shift+F6", lambda: self._cycle(-1)),
-            ("Ctrl+1", self.outline.tree.setFocus), ("Ctrl+2", self._focus_form), ("Ctrl+3", self._focus_file),
+            ("Ctrl+1", self.outline.tree.setFocus), ("Ctrl+2", self._focus_form), ("Ctrl+3", self._focus_pane),
             ("Ctrl+4", self._focus_problems),
         ):  # fmt: skip
             made = QShortcut(QKeySequence(keys), self)
@@ -202,7 +198,7 @@ class DesignerPlace(Place):
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object, facts: FactCards) -> None:
         """Show the rows of the outline, and the facts of the study."""
         self.outline.show_outline(rows, selected)
-        self.facts.show_facts(facts)
+        self.pane.facts.show_facts(facts)
 
     def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
         """Offer the repairs of a problem."""
@@ -334,21 +330,26 @@ class DesignerPlace(Place):
             self.form.head.id.setFocus(Qt.FocusReason.ShortcutFocusReason)
             self.form.head.id.selectAll()
 
-    # panes
+    # parts of the place
 
     def _focus_form(self) -> None:
-        self._show_pane("form")
+        self._show_side("form")
         self.form.focus_first()
 
+    def _focus_pane(self) -> None:
+        self._show_side("pane")
+        page = next(one for one in self.pane.pages if one.name == self.pane.tab)
+        (page.body.focusProxy() or self.pane.tabs).setFocus(Qt.FocusReason.ShortcutFocusReason)
+
     def _focus_file(self) -> None:
-        self._show_pane("file")
-        self.file.editor.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.pane.show_tab("file")
+        self._focus_pane()
 
     def _focus_problems(self) -> None:
         self.problems.show()
         self.problems.next.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
-    def _switch_pane(self) -> None:
+    def _switch_to_file(self) -> None:
         if self.file.editor.hasFocus():
             self._focus_form()
         else:
@@ -359,7 +360,7 @@ class DesignerPlace(Place):
             (self.header, self.header.study.setFocus),
             (self.outline, self.outline.tree.setFocus),
             (self.form, self._focus_form),
-            (self.file, self._focus_file),
+            (self.pane, self._focus_pane),
         ]
         if self.problems.isVisible():
             stops.append((self.problems, self._focus_problems))
@@ -367,18 +368,18 @@ class DesignerPlace(Place):
         here = next((at for at, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -by)
         stops[(here + by) % len(stops)][1]()
 
-    def _show_pane(self, pane: str) -> None:
-        self._pane = pane
+    def _show_side(self, side: str) -> None:
+        self._side = side
         self._arrange()
 
     def _arrange(self) -> None:
         one = self.width() < ONE_PANE_BELOW
         self.outline.setFixedWidth(OUTLINE_PX if self.width() >= WIDE_FROM else OUTLINE_NARROW_PX)
-        self.panes.setVisible(one)
-        self.panes.show_values((("form", "Form"), ("file", "File")), self._pane)
-        self.form.setVisible(not one or self._pane == "form")
-        self.file.setVisible(not one or self._pane == "file")
-        self.facts.setVisible(self.file.isVisibleTo(self._editing) and self.height() >= FACTS_FROM)
+        self.sides.setVisible(one)
+        self.sides.show_values((("form", "Form"), ("pane", "Views")), self._side)
+        self.form.setVisible(not one or self._side == "form")
+        self.pane.setVisible(not one or self._side == "pane")
+        self.pane.make_room()
 
     def enter(self) -> None:
         """Look again at what there is."""

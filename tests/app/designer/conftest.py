@@ -26,6 +26,7 @@ class Designer:
         self.file.write_bytes(demo.replace(b'name = "demo"', b'name = "kitchen"'))
         self.results = folder / "results"
         self.controller = DesignerController(self.results)
+        self.editing, self.saving = self.controller.editing, self.controller.saving
         self.place = self.controller.place
         self.messages: list[tuple[str, str]] = []
         self.place.message.connect(lambda title, sentence: self.messages.append((title, sentence)))
@@ -42,8 +43,8 @@ class Designer:
     @property
     def text(self) -> str:
         """The text of the open study."""
-        assert self.controller.opened is not None
-        return self.controller.opened.study.text
+        assert self.editing.opened is not None
+        return self.editing.opened.study.text
 
 
 @pytest.fixture

@@ -33,7 +33,7 @@ def test_opening_and_looking_at_every_form_changes_neither_file_nor_its_time(des
     designer.controller.open("kitchen")
     for row in designer.place.outline.rows:
         if row.path:
-            designer.controller.select(row.path)
+            designer.editing.select(row.path)
     designer.window.go("home")
     assert (designer.file.read_bytes(), designer.file.stat().st_mtime_ns) == before
     assert draft_of(designer.file) is None
@@ -42,16 +42,16 @@ def test_opening_and_looking_at_every_form_changes_neither_file_nor_its_time(des
 def test_an_edit_changes_its_bytes_alone_is_undone_redone_and_saved(designer: Any) -> None:
     before = designer.file.read_text()
     designer.controller.open("kitchen")
-    designer.controller.ask(SetValue(("study", "version"), "0.7"))
+    designer.editing.ask(SetValue(("study", "version"), "0.7"))
     assert "Change Version" in designer.place.header.undo.accessibleName()
     changed = [line for line in designer.text.splitlines() if line not in before.splitlines()]
     assert len(changed) == 1
     assert changed[0].startswith('version = "0.7"')
-    designer.controller.undo()
+    designer.editing.undo()
     assert designer.text == before
-    designer.controller.redo()
+    designer.editing.redo()
     assert designer.file.read_text() == before
-    designer.controller.save()
+    designer.saving.save()
     assert designer.file.read_text() == designer.text != before
     assert draft_of(designer.file) is None
     assert not designer.place.header.save.isEnabled()
@@ -60,18 +60,18 @@ def test_an_edit_changes_its_bytes_alone_is_undone_redone_and_saved(designer: An
 def test_typing_in_one_field_is_one_step(designer: Any) -> None:
     before = designer.file.read_text()
     designer.controller.open("kitchen")
-    page = designer.controller.opened.history.selected
+    page = designer.editing.opened.history.selected
     for text in ("H", "He", "Hel", "Hello"):
-        designer.controller.ask(SetText((*page, "title"), "en", text))
+        designer.editing.ask(SetText((*page, "title"), "en", text))
     assert "Hello" in designer.text
-    designer.controller.undo()
+    designer.editing.undo()
     assert designer.text == before
 
 
 def test_a_draft_is_kept_on_leaving_and_found_again_until_it_is_discarded(designer: Any) -> None:
     before = designer.file.read_text()
     designer.controller.open("kitchen")
-    designer.controller.ask(SetValue(("study", "version"), "0.7"))
+    designer.editing.ask(SetValue(("study", "version"), "0.7"))
     designer.window.go("home")
     draft = draft_of(designer.file)
     assert draft is not None
@@ -80,10 +80,10 @@ def test_a_draft_is_kept_on_leaving_and_found_again_until_it_is_discarded(design
 
     again = type(designer.controller)(designer.results)
     again.open("kitchen")
-    assert again.opened.study.text == draft.text
+    assert again.editing.opened.study.text == draft.text
     assert again.place.banner_words.text().startswith("Draft of today")
-    again.answer_banner("discard")
-    assert again.opened.study.text == before
+    again.saving.answer_banner("discard")
+    assert again.editing.opened.study.text == before
     assert draft_of(designer.file) is None
     again.place.deleteLater()
 
@@ -95,33 +95,33 @@ def test_a_file_changed_outside_is_taken_in_or_asked_about_and_never_overwritten
     designer.controller.enter()
     assert designer.text.endswith("# outside\n")
 
-    designer.controller.ask(SetValue(("study", "version"), "0.7"))
+    designer.editing.ask(SetValue(("study", "version"), "0.7"))
     designer.file.write_text(before + "# outside again\n")
-    designer.controller.save()
+    designer.saving.save()
     assert designer.file.read_text() == before + "# outside again\n"
     assert [words for _, words in designer.place.view.banner.actions] == ["Keep mine", "Take the file's"]
-    designer.controller.answer_banner("keep")
-    designer.controller.save()
+    designer.saving.answer_banner("keep")
+    designer.saving.save()
     assert designer.file.read_text() == designer.text
     assert 'version = "0.7"' in designer.text
 
 
 def test_a_version_that_was_run_is_saved_under_another_number(designer: Any) -> None:
     designer.controller.open("kitchen")
-    version = designer.controller.opened.study.document["study"]["version"]
+    version = designer.editing.opened.study.document["study"]["version"]
     session = designer.results / "kitchen" / "data" / "sub-P001" / "ses-01"
     session.mkdir(parents=True)
     protocol = {"study": {"version": version}}
     receipt = {"key_hash": "0" * 64, "protocol_hash": "of another content", "protocol": protocol, "started_at": MOMENT}
     (session / "receipt.json").write_text(json.dumps(receipt))
     before = designer.file.read_text()
-    designer.controller.ask(SetValue(("blocks", "liquids", "repetitions"), 3))
-    designer.controller.save()
+    designer.editing.ask(SetValue(("blocks", "liquids", "repetitions"), 3))
+    designer.saving.save()
     assert designer.file.read_text() == before
     assert designer.place.prompt is not None
     designer.place.prompt.save.click()
     assert designer.place.prompt is None
-    saved = designer.controller.opened.study.document["study"]["version"]
+    saved = designer.editing.opened.study.document["study"]["version"]
     assert saved != version
     assert designer.file.read_text() == designer.text
 
@@ -132,16 +132,16 @@ def test_a_shipped_study_is_read_only_and_can_be_copied(designer: Any, name: str
     designer.controller.open(name)
     assert "ships with the program" in designer.place.banner_words.text()
     text = designer.text
-    designer.controller.ask(SetValue(("study", "version"), "9"))
-    designer.controller.ask(RetypeFile("format = 1\n"))
-    designer.controller.save()
+    designer.editing.ask(SetValue(("study", "version"), "9"))
+    designer.editing.ask(RetypeFile("format = 1\n"))
+    designer.saving.save()
     assert designer.text == text
     assert shipped_file(name).read_bytes() == before
     designer.controller.begin(name, "mine")
-    assert not designer.controller.opened.file.exists()
-    assert designer.controller.opened.study.faults == ()
-    designer.controller.save()
-    assert designer.controller.opened.file.read_text() == designer.text
+    assert not designer.editing.opened.file.exists()
+    assert designer.editing.opened.study.faults == ()
+    designer.saving.save()
+    assert designer.editing.opened.file.read_text() == designer.text
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="everybody may write here")
@@ -160,8 +160,8 @@ def test_a_new_study_that_was_never_saved_is_found_again(designer: Any) -> None:
     again.enter()
     assert "mine" in [choice.title for choice in again.place.header.state.studies]
     again.open(str(file))
-    assert again.opened.study.document["study"]["name"] == "mine"
-    again.save()
+    assert again.editing.opened.study.document["study"]["name"] == "mine"
+    again.saving.save()
     assert file.exists()
     again.place.deleteLater()
 
@@ -172,7 +172,7 @@ def test_a_name_that_cannot_be_is_refused_in_place(designer: Any, name: str) -> 
     designer.place.new_page.name.setText(name)
     designer.place.new_page.make.click()
     assert designer.place.new_page.refusal.text()
-    assert designer.controller.opened is None
+    assert designer.editing.opened is None
 
 
 def test_a_file_that_is_not_utf_8_is_refused_with_a_message(designer: Any) -> None:
@@ -186,27 +186,27 @@ def test_elements_are_added_copied_moved_renamed_and_deleted(designer: Any) -> N
     controller.open("kitchen")
     first = designer.text
 
-    controller.ask(AddElement(("liquids",)))
-    assert controller.opened.history.selected == ("liquids", "liquid")
-    controller.ask(RenameElement(("liquids", "liquid"), "syrup2"))
+    controller.editing.ask(AddElement(("liquids",)))
+    assert controller.editing.opened.history.selected == ("liquids", "liquid")
+    controller.editing.ask(RenameElement(("liquids", "liquid"), "syrup2"))
     assert designer.place.view.form.id == "syrup2"
 
-    controller.ask(DuplicateElement(("blocks", "liquids")))
-    assert controller.opened.history.selected == ("blocks", "liquids_2")
-    assert controller.opened.study.faults == ()
-    steps = controller.opened.study.document["sequence"]
+    controller.editing.ask(DuplicateElement(("blocks", "liquids")))
+    assert controller.editing.opened.history.selected == ("blocks", "liquids_2")
+    assert controller.editing.opened.study.faults == ()
+    steps = controller.editing.opened.study.document["sequence"]
     assert steps.index("liquids_2") == steps.index("liquids") + 1
-    controller.ask(MoveElement(("blocks", "liquids_2"), -1))
-    moved = controller.opened.study.document["sequence"]
+    controller.editing.ask(MoveElement(("blocks", "liquids_2"), -1))
+    moved = controller.editing.opened.study.document["sequence"]
     assert moved.index("liquids_2") == moved.index("liquids") - 1
 
     controller.ask_to_delete(("tasks", "explore"))
     assert designer.place.prompt is not None
     designer.place.prompt.all.click()
-    assert "explore" not in controller.opened.study.document["tasks"]
+    assert "explore" not in controller.editing.opened.study.document["tasks"]
 
-    while controller.opened.history.done:
-        controller.undo()
+    while controller.editing.opened.history.done:
+        controller.editing.undo()
     assert designer.text == first
 
 
@@ -215,64 +215,64 @@ def test_a_copy_comes_right_after_its_original(designer: Any, path: tuple[str | 
     text = designer.file.read_text()
     designer.file.write_text(text.replace('\nintro = "', '\nintro.en = "'))
     designer.controller.open("kitchen")
-    at = position_of(designer.controller.opened.study.document, path)
-    designer.controller.select(path)
+    at = position_of(designer.editing.opened.study.document, path)
+    designer.editing.select(path)
     designer.place.form.head.copy.click()
-    study = designer.controller.opened.study
+    study = designer.editing.opened.study
     assert {fault.message for fault in study.faults} <= {"reads as an earlier item does"}
     assert at is not None
-    assert position_of(study.document, designer.controller.opened.history.selected) == (at[0] + 1, at[1] + 1)
+    assert position_of(study.document, designer.editing.opened.history.selected) == (at[0] + 1, at[1] + 1)
 
 
 def test_what_can_be_added_begins_with_the_lists_of_the_selected_element(designer: Any) -> None:
     designer.controller.open("kitchen")
     assert "Question" not in [words for _, words in designer.place.view.addable]
-    designer.controller.select(("questionnaires", "liquid", "items", 0))
+    designer.editing.select(("questionnaires", "liquid", "items", 0))
     assert designer.place.view.addable[0] == (("questionnaires", "liquid", "items"), "Question")
     designer.place.ask_to_add()
     designer.place.menu.actions()[0].trigger()
     designer.place.menu.close()
     assert designer.place.view.form.path == ("questionnaires", "liquid", "items", 2)
-    assert designer.controller.opened.study.faults == ()
+    assert designer.editing.opened.study.faults == ()
 
 
 def test_what_is_refused_is_said_at_its_field(designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.controller.select(("liquids", "thin"))
-    designer.controller.ask(RenameElement(("liquids", "thin"), "thick"))
+    designer.editing.select(("liquids", "thin"))
+    designer.editing.ask(RenameElement(("liquids", "thin"), "thick"))
     assert designer.place.form.head.refusal.text() == 'The name "thick" is taken: choose another one.'
     assert designer.place.form.head.refusal.isVisible()
 
 
 def test_a_kind_is_switched_and_back_without_losing_values(designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.controller.select(("tasks", "explore"))
-    before = designer.controller.opened.study.document["tasks"]["explore"]
-    designer.controller.ask(SwitchKind(("tasks", "explore"), "reach"))
-    assert designer.controller.opened.study.document["tasks"]["explore"]["kind"] == "reach"
-    designer.controller.ask(SwitchKind(("tasks", "explore"), "explore"))
-    assert designer.controller.opened.study.document["tasks"]["explore"] == before
+    designer.editing.select(("tasks", "explore"))
+    before = designer.editing.opened.study.document["tasks"]["explore"]
+    designer.editing.ask(SwitchKind(("tasks", "explore"), "reach"))
+    assert designer.editing.opened.study.document["tasks"]["explore"]["kind"] == "reach"
+    designer.editing.ask(SwitchKind(("tasks", "explore"), "explore"))
+    assert designer.editing.opened.study.document["tasks"]["explore"] == before
 
 
 def test_an_optional_key_is_written_and_removed(designer: Any) -> None:
     designer.controller.open("kitchen")
     before = designer.text
-    designer.controller.ask(AddKey(("blocks", "liquids", "break_every")))
-    assert "break_every" in designer.controller.opened.study.document["blocks"]["liquids"]
-    designer.controller.ask(RemoveKey(("blocks", "liquids", "break_every")))
+    designer.editing.ask(AddKey(("blocks", "liquids", "break_every")))
+    assert "break_every" in designer.editing.opened.study.document["blocks"]["liquids"]
+    designer.editing.ask(RemoveKey(("blocks", "liquids", "break_every")))
     assert designer.text == before
 
 
 def test_every_optional_key_of_a_liquid_can_be_added_and_undone(designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.controller.select(("liquids", "thick"))
+    designer.editing.select(("liquids", "thick"))
     before = designer.text
     absent = [row.path for section in designer.place.view.form.sections for row in section.absent]
     assert len(absent) > 5
     for path in absent:
-        designer.controller.ask(AddKey(path))
-        assert path[-1] in designer.controller.opened.study.document["liquids"]["thick"], path
-        designer.controller.undo()
+        designer.editing.ask(AddKey(path))
+        assert path[-1] in designer.editing.opened.study.document["liquids"]["thick"], path
+        designer.editing.undo()
         assert designer.text == before
 
 
@@ -290,7 +290,7 @@ def test_a_broken_file_is_repaired_by_a_button(designer: Any, qtbot: Any) -> Non
 
 def test_deleting_with_gaps_leaves_faults_and_undo_takes_them_back(designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.controller.ask(DeleteElement(("liquids", "thick")))
-    assert designer.controller.opened.study.faults
-    designer.controller.undo()
-    assert not designer.controller.opened.study.faults
+    designer.editing.ask(DeleteElement(("liquids", "thick")))
+    assert designer.editing.opened.study.faults
+    designer.editing.undo()
+    assert not designer.editing.opened.study.faults

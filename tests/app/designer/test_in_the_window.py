@@ -52,7 +52,7 @@ def test_a_small_study_is_edited_by_keys_alone(qtbot: Any, designer: Any) -> Non
     press(qtbot, designer, "Up")
     assert designer.place.view.form.path == ("blocks", "liquids")
     press(qtbot, designer, "Alt+Down")
-    assert designer.controller.opened.study.document["sequence"][:3] == ("welcome", "reaching", "liquids")
+    assert designer.editing.opened.study.document["sequence"][:3] == ("welcome", "reaching", "liquids")
     press(qtbot, designer, "Alt+Up")
     press(qtbot, designer, "F2")
     assert designer.place.form.head.id.hasFocus()
@@ -69,7 +69,7 @@ def test_a_small_study_is_edited_by_keys_alone(qtbot: Any, designer: Any) -> Non
     assert line.hasFocus()
     qtbot.keyClicks(line, "4")
     press(qtbot, designer, "Return")
-    assert designer.controller.opened.study.document["blocks"]["fluids"]["repetitions"] == int(line.text())
+    assert designer.editing.opened.study.document["blocks"]["fluids"]["repetitions"] == int(line.text())
     assert f"repetitions = {line.text()}" in designer.place.file.editor.words()
     press(qtbot, designer, "Ctrl+E")
     assert designer.place.file.editor.hasFocus()
@@ -79,7 +79,7 @@ def test_a_small_study_is_edited_by_keys_alone(qtbot: Any, designer: Any) -> Non
     press(qtbot, designer, "Ctrl+Shift+Z")
     press(qtbot, designer, "Ctrl+S")
     assert designer.file.read_text() == designer.text != before
-    while designer.controller.opened.history.done:
+    while designer.editing.opened.history.done:
         press(qtbot, designer, "Ctrl+Z")
     assert designer.text == before
 
@@ -97,7 +97,7 @@ def test_a_small_study_is_edited_by_mouse_alone(qtbot: Any, designer: Any) -> No
     assert place.view.form.path == ("blocks", "liquids")
     replicates = designer.row("blocks", "liquids", "replicates").field.toggle
     qtbot.mouseClick(replicates, Qt.MouseButton.LeftButton, pos=QPoint(16, 16))
-    assert designer.controller.opened.study.document["blocks"]["liquids"]["replicates"] is True
+    assert designer.editing.opened.study.document["blocks"]["liquids"]["replicates"] is True
     click(designer.row("blocks", "liquids", "task").field.arrow)
     assert place.view.form.path == ("tasks", "explore")
     click(place.form.head.copy)
@@ -112,7 +112,7 @@ def test_a_small_study_is_edited_by_mouse_alone(qtbot: Any, designer: Any) -> No
 
 def test_typing_into_the_file_reaches_the_form_and_a_fault_its_field(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.controller.select(("blocks", "liquids"))
+    designer.editing.select(("blocks", "liquids"))
     editor = designer.place.file.editor
     line = next(at for at, text in enumerate(editor.words().split("\n")) if text.startswith("order = ")
                 and editor.shown.selected[0][0] < at)  # fmt: skip
@@ -137,7 +137,7 @@ def test_typing_into_the_file_reaches_the_form_and_a_fault_its_field(qtbot: Any,
 
 def test_text_that_is_not_a_number_stays_with_its_reason(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.controller.select(("device",))
+    designer.editing.select(("device",))
     before = designer.text
     row = designer.row("device", "force_limit_n")
     row.field.line.setFocus()
@@ -154,7 +154,7 @@ def test_text_that_is_not_a_number_stays_with_its_reason(qtbot: Any, designer: A
 
 def test_esc_restores_what_was_accepted_last(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.controller.select(("device",))
+    designer.editing.select(("device",))
     line = designer.row("device", "force_limit_n").field.line
     line.setFocus()
     for typed, key in (("5", "Return"), ("strong", "Return"), ("", "Escape")):
@@ -162,14 +162,14 @@ def test_esc_restores_what_was_accepted_last(qtbot: Any, designer: Any) -> None:
         qtbot.keyClicks(line, typed)
         press(qtbot, designer, key)
     assert line.text() == "5"
-    assert designer.controller.opened.study.document["device"]["force_limit_n"] == 5
+    assert designer.editing.opened.study.document["device"]["force_limit_n"] == 5
 
 
 def test_every_form_fits_its_width(designer: Any) -> None:
     designer.controller.open("kitchen")
     area = designer.place.form.area
     for row in designer.place.outline.rows:
-        designer.controller.select(row.path)
+        designer.editing.select(row.path)
         QApplication.processEvents()
         assert area.widget().minimumSizeHint().width() <= area.viewport().width(), row.path
 
@@ -215,7 +215,7 @@ def test_no_part_of_a_form_is_shown_as_a_window(designer: Any) -> None:
     QApplication.instance().installEventFilter(watch)
     designer.controller.open("kitchen")
     for path in [row.path for row in designer.place.outline.rows if row.path]:
-        designer.controller.select(path)
+        designer.editing.select(path)
     designer.controller.ask_to_delete(("liquids", "thick"))
     QApplication.instance().removeEventFilter(watch)
     assert not windows
@@ -226,7 +226,7 @@ def test_everything_that_takes_the_keyboard_has_a_name(designer: Any) -> None:
     designer.controller.open("kitchen")
     nameless = []
     for path in [row.path for row in designer.place.outline.rows if row.path]:
-        designer.controller.select(path)
+        designer.editing.select(path)
         for kind in kinds:
             for part in designer.place.findChildren(kind):
                 inner = any(isinstance(one, QComboBox) for one in above(part))
@@ -246,7 +246,7 @@ def test_the_place_fits_its_window(designer: Any, size: tuple[int, int], theme: 
     assert (designer.window.width(), designer.window.height()) == size
     assert designer.place.form.isVisible()
     assert designer.place.file.isVisible() == (size[0] > 1200)
-    designer.place.panes.buttons[1].click()
+    designer.place.sides.buttons[1].click()
     assert designer.place.file.isVisible()
 
 
@@ -263,7 +263,7 @@ designer = DesignerController(Path(sys.argv[1]))
 designer.place.resize(1400, 900)
 designer.place.show()
 designer.open("kitchen")
-designer.select(("study",))
+designer.editing.select(("study",))
 line = next(row for row in designer.place.form.rows if row.row.row.path[-1] == "version").field.line
 line.setFocus()
 for count in range(100000):

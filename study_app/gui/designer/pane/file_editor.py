@@ -21,7 +21,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QWidget
 
-from study_app.gui.designer.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
+from study_app.gui.designer.form.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Themed
@@ -256,6 +256,7 @@ class FileCard(Card):
         self.name.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.editor = FileEditor()
         self.editor.typed.connect(self.typed)
+        self.setFocusProxy(self.editor)
         top = QHBoxLayout()
         top.addWidget(label("File", "card"))
         top.addWidget(self.name, 1)

@@ -8,8 +8,8 @@ from typing import Any
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QWidget
 
+from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.designer.segments import Segments
-from study_app.gui.designer.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label

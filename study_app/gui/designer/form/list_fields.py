@@ -8,7 +8,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QWidget
 
-from study_app.gui.designer.row_fields import (
+from study_app.gui.designer.form.row_fields import (
     ChecksField,
     ChoiceField,
     Field,
@@ -19,8 +19,8 @@ from study_app.gui.designer.row_fields import (
     UnknownField,
     add_button,
 )
+from study_app.gui.designer.form.typed_fields import FIELD_PX
 from study_app.gui.designer.segments import Segments
-from study_app.gui.designer.typed_fields import FIELD_PX
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.controls import Choice, IconButton

@@ -5,10 +5,10 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.gui.designer.form_head import LABEL_PX, FormHead
-from study_app.gui.designer.list_fields import field, structure
-from study_app.gui.designer.row_fields import add_button
-from study_app.gui.designer.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.gui.designer.form.form_head import LABEL_PX, FormHead
+from study_app.gui.designer.form.list_fields import field, structure
+from study_app.gui.designer.form.row_fields import add_button
+from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import Card, Icon, Rule
 from study_app.gui.widgets.controls import IconButton

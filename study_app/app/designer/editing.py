@@ -1,0 +1,164 @@
+"""The study that is open in the designer, and the steps that are made in it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import QObject, Signal
+
+from study_app.app.designer.open_study import OpenStudy
+from study_app.app.designer.steps import Step, Steps
+from study_app.app.designer.studies import there
+from study_app.authoring.history import History
+from study_app.authoring.writer.edits import Edit
+from study_app.authoring.writer.refused import Refused
+from study_app.protocol.source.document import Path as Place
+from study_app.viewmodels.designer.file_text import retyped
+from study_app.viewmodels.designer.requests import Request, RetypeFile
+
+JOIN_S: Final = 1.0  # typing in one field is one step until the keyboard rests for so long
+
+
+class Editing(QObject):
+    """The open study: every change of it and of its selection is made here.
+
+    Parameters
+    ----------
+    results
+        Folder that holds the studies' results folders.
+
+    ``opened_other`` is emitted when another study is open, ``changed`` after each step of the study or of its
+    selection, ``edited`` after each step of the study alone; ``refused`` carries the path that a refused request
+    concerns, the sentence that says why, and the request.
+    """
+
+    opened_other = Signal()
+    changed = Signal()
+    edited = Signal()
+    refused = Signal(object, str, object)
+
+    def __init__(self, results: Path, parent: QObject) -> None:
+        super().__init__(parent)
+        self.results = results
+        self.opened: OpenStudy | None = None
+        self._steps = Steps()
+        self._joins: tuple[object, float] = (None, 0.0)
+        self._back: list[Place] = []
+
+    @property
+    def writable(self) -> OpenStudy | None:
+        """The open study, None where there is none or it is read-only."""
+        return None if self.opened is None or self.opened.read_only else self.opened
+
+    @property
+    def selected(self) -> Place:
+        """The path of the selected element, () where no study is open."""
+        return () if self.opened is None else self.opened.history.selected
+
+    def open(self, opened: OpenStudy) -> None:
+        """Take another study from now on."""
+        self.opened = opened
+        self._steps, self._joins, self._back = Steps(), (None, 0.0), []
+        self.opened_other.emit()
+
+    # selection
+
+    def select(self, path: Place, *, back: bool = False) -> None:
+        """Select an element."""
+        opened = self.opened
+        if opened is None or opened.history.selected == path:
+            return
+        if not back:
+            self._back.append(opened.history.selected)
+        self._steps.leave()
+        self._joins = (None, 0.0)
+        opened.history = replace(opened.history, selected=path)
+        self.keep_selection()
+        self.changed.emit()
+
+    def go_back(self) -> None:
+        """Select what was selected before."""
+        if self._back:
+            self.select(self._back.pop(), back=True)
+
+    def keep_selection(self) -> None:
+        """Select the nearest element that exists."""
+        if (opened := self.opened) is not None:
+            selected = there(opened.study.document, opened.history.selected)
+            opened.history = replace(opened.history, selected=selected)
+
+    # steps
+
+    def ask(self, asked: Request) -> None:
+        """Make a step as a view asks for it; ``refused`` says why where it cannot be made."""
+        opened = self.writable
+        if opened is None:
+            return
+        try:
+            if isinstance(asked, RetypeFile):
+                text = retyped(opened.study.text, asked.text)
+                if text == opened.study.text:
+                    return
+                opened.history = opened.history.typed("Edit the file", text, joins=self._joined("file"))
+            else:
+                self._make(opened, self._steps.step(opened.study, asked))
+        except Refused as refusal:
+            path = asked.path if hasattr(asked, "path") else opened.history.selected
+            self.refused.emit(path, f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.", asked)
+            return
+        self._note()
+
+    def _make(self, opened: OpenStudy, step: Step) -> None:
+        joins = step.continues is not None and self._joined(step.continues)
+        if step.continues is None:
+            self._joins = (None, 0.0)
+        opened.history = opened.history.edited(step.words, *step.edits, select=step.select, joins=joins)
+
+    def _joined(self, key: object) -> bool:
+        """Return whether an edit continues the last step, and remember it."""
+        before, then = self._joins
+        now = time.monotonic()
+        self._joins = (key, now)
+        return key == before and now - then < JOIN_S
+
+    def make(self, words: str, *edits: Edit, select: Place | None = None) -> None:
+        """Make a step of edits.
+
+        Raises
+        ------
+        Refused
+            The step cannot be made; nothing is changed.
+        """
+        if (opened := self.writable) is not None:
+            opened.history = opened.history.edited(words, *edits, select=select)
+            self._joins = (None, 0.0)
+            self._note()
+
+    def undo(self) -> None:
+        """Undo the last step."""
+        self._travel(History.undo)
+
+    def redo(self) -> None:
+        """Redo the step that was undone last."""
+        self._travel(History.redo)
+
+    def _travel(self, to: Callable[[History], History]) -> None:
+        if (opened := self.writable) is not None:
+            opened.history = to(opened.history)
+            self._joins = (None, 0.0)
+            self._note()
+
+    def _note(self) -> None:
+        if self.opened is not None:
+            self.opened.note_edit(time.monotonic())
+            self.announce()
+
+    def announce(self) -> None:
+        """Let every view show the study as it is now."""
+        self.keep_selection()
+        self.changed.emit()
+        self.edited.emit()

@@ -1,0 +1,91 @@
+"""The pane at the right of the designer: a page for each tab, and the facts below."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+
+from study_app.gui.designer.pane.facts import FactsRow
+from study_app.gui.designer.segments import Segments
+from study_app.gui.widgets.cards import SHADOW
+
+FACTS_FROM = 860
+
+
+@dataclass(frozen=True)
+class PanePage:
+    """A page of the pane.
+
+    Attributes
+    ----------
+    name, words : str
+        Name of the tab, and what it says.
+    body : QWidget
+        What the tab shows; its focus proxy takes the keyboard.
+    aside : QWidget or None
+        Controls at the right of the tabs, while the page is shown.
+    with_facts : bool
+        Whether the facts stay below the page.
+    """
+
+    name: str
+    words: str
+    body: QWidget
+    aside: QWidget | None = None
+    with_facts: bool = True
+
+
+class RightPane(QWidget):
+    """Tabs, the page of the chosen one, and the facts; ``tab_shown`` carries the name of a tab when it is shown."""
+
+    tab_shown = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Views of the study")
+        self.pages: list[PanePage] = []
+        self.tab = ""
+        self.tabs = Segments("View of the study")
+        self.facts = FactsRow()
+        self._asides = QHBoxLayout()
+        bar = QHBoxLayout()
+        bar.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        bar.addWidget(self.tabs)
+        bar.addStretch()
+        bar.addLayout(self._asides)
+        self._stack = QStackedWidget()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(12 - 2 * SHADOW)
+        column.addLayout(bar)
+        column.addWidget(self._stack, 1)
+        column.addWidget(self.facts)
+        self.tabs.chosen.connect(lambda name: self.show_tab(str(name)))
+
+    def add_page(self, page: PanePage) -> None:
+        """Add a page as the last tab; the first one is shown."""
+        self.pages.append(page)
+        self._stack.addWidget(page.body)
+        if page.aside is not None:
+            self._asides.addWidget(page.aside)
+        self.show_tab(self.tab or page.name)
+
+    def show_tab(self, name: str) -> None:
+        """Show the page of a tab."""
+        page = next(one for one in self.pages if one.name == name)
+        changed, self.tab = name != self.tab, name
+        self.tabs.show_values([(one.name, one.words) for one in self.pages], name)
+        self._stack.setCurrentWidget(page.body)
+        for one in self.pages:
+            if one.aside is not None:
+                one.aside.setVisible(one is page)
+        self.make_room()
+        if changed:
+            self.tab_shown.emit(name)
+
+    def make_room(self) -> None:
+        """Hide the facts where the window is too low for them, or the page takes their place."""
+        page = next((one for one in self.pages if one.name == self.tab), None)
+        self.facts.setVisible(page is not None and page.with_facts and self.window().height() >= FACTS_FROM)
