@@ -275,6 +275,7 @@ def check_left(program: Visitor) -> None:
     assert json.loads(settings_file().read_text(encoding="utf-8"))["theme"] == "dark"
 
 
+@pytest.mark.nightly
 def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan: MainController, qtbot: Any) -> None:
     person = ByKeyboard(program)
     pointer = program.xdotool("getmouselocation")

@@ -40,6 +40,7 @@ def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, 
     assert sorted(tmp_path.iterdir()) == sorted(taken)
 
 
+@pytest.mark.nightly
 @needs_servo
 def test_a_session_that_cannot_be_taken_is_let_go_of(qapp, tmp_path, monkeypatch):
     def fails(_held, _name):

@@ -56,6 +56,7 @@ def test_an_exception_cancels_the_cases_that_have_not_finished(dask_cluster: str
     assert any(future.cancelled() for future in waiting)  # type: ignore[attr-defined]
 
 
+@pytest.mark.nightly
 @needs_distributed
 @posix
 def test_killed_workers_change_no_result_and_a_lost_scheduler_is_one_line(tmp_path: Path) -> None:
