@@ -28,6 +28,7 @@ from study_app.validation.stability.stability_cases import (
     Case,
     liquids,
     materials,
+    of_physical2,
     scenes,
 )
 
@@ -125,22 +126,28 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     found.append(Group(f"{driven}, held", driven_held))
     driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), FALCONS_KG))
     found.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
-    found += _of_materials(seed, light, count)
+    found += _of_liquids("non-Newtonian liquids", materials, seed, light, count)
+    found += _of_liquids("liquids of physical2", of_physical2, seed, light, count)
     found.append(_late_forces(seed, light, count))
     fewer = min(KALMAN_CASES, count or KALMAN_CASES)
     return (*found, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
 
 
-def _of_materials(seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None) -> Iterator[Group]:
-    """Yield the non-Newtonian liquids as the sweep has the others, believed another delay, and let go."""
-    name = "non-Newtonian liquids"
-    whole = tuple(_grid(GRIPS, names=materials))
+def _of_liquids(
+    name: str,
+    names: Callable[[], Iterable[str]],
+    seed: str,
+    choices: Mapping[str, tuple[Any, ...]],
+    count: int | None,
+) -> Iterator[Group]:
+    """Yield liquids that the sweep has not as the sweep has the others, believed another delay, and let go."""
+    whole = tuple(_grid(GRIPS, names=names))
     yield Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
     for change in MISJUDGED:
         cases = [case for case in map(CHANGES[change], whole) if case is not None]
         few = some(cases, min(CASES, count or CASES))
         yield Group(f"{name}, {change}", tuple(_drawn(f"{seed} {name} {change}", few, choices)))
-    free = tuple(_releases(f"{seed} {name}", PLANTS, HANDLES_KG, materials))
+    free = tuple(_releases(f"{seed} {name}", PLANTS, HANDLES_KG, names))
     yield Group(f"{name}, let go in mid-stroke", some(free, count))
 
 

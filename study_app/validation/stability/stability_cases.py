@@ -218,6 +218,12 @@ def materials() -> tuple[str, ...]:
     return tuple(name for name, scene in scenes().items() if scene.liquids[0].non_newtonian is not None)
 
 
+@cache
+def of_physical2() -> tuple[str, ...]:
+    """Return the names of the liquids of physical2: unsteady drag where the Reynolds number permits it."""
+    return tuple(name for name in scenes() if name.startswith("physical2_"))
+
+
 def scene_of(case: Case) -> Scene:
     """Return what the case presents."""
     velocity, link = ESTIMATORS[case.estimator], _link_of(case)

@@ -20,13 +20,24 @@ from study_app.validation.stability.case_groups import (
 )
 from study_app.validation.stability.closed_loop import SLOWER_S, begin, play
 from study_app.validation.stability.device_bench import new_bench, new_trace, trace_of
-from study_app.validation.stability.stability_cases import DAMPER, GRIPS, PLANTS, Case, liquids, materials, parse
+from study_app.validation.stability.stability_cases import (
+    DAMPER,
+    GRIPS,
+    PLANTS,
+    Case,
+    liquids,
+    materials,
+    of_physical2,
+    parse,
+)
 from study_app.validation.stability.verdict import MISJUDGED_ALLOWANCE_J, judge, windows
 from tests.haptics.scenes import COMPILED
 
 pytestmark = pytest.mark.slow
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+
+OTHER_LIQUIDS = {"non-Newtonian liquids": materials, "liquids of physical2": of_physical2}
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +46,8 @@ def all_groups():
 
 
 def own_plants(all_groups):
-    return {name: it for name, it in all_groups.items() if not name.startswith(("through", "kalman", "non-Newtonian"))}
+    others = ("through", "kalman", *OTHER_LIQUIDS)
+    return {name: it for name, it in all_groups.items() if not name.startswith(others)}
 
 
 def test_the_kalman_filter_is_judged_in_each_group(all_groups):
@@ -116,21 +128,25 @@ def test_mass_of_the_handle_changes_every_150_ms(plant):
         assert found_kg == pytest.approx((0.1, 0.25)[k % 2], rel=0.02), k
 
 
-def test_groups_of_non_newtonian_liquids_have_each_preset_held_misjudged_and_let_go(all_groups):
-    found = {name: cases for name, cases in all_groups.items() if name.startswith("non-Newtonian")}
-    assert [len(cases) for cases in found.values()] == [2500, 1500, 1500, 1500, 480]
+@pytest.mark.parametrize(("group", "sizes"), [
+    ("non-Newtonian liquids", [2500, 1500, 1500, 1500, 480]),
+    ("liquids of physical2", [3000, 1500, 1500, 1500, 576]),
+])  # fmt: skip
+def test_groups_of_other_liquids_have_each_held_misjudged_and_let_go(all_groups, group, sizes):
+    found = {name: cases for name, cases in all_groups.items() if name.startswith(group)}
+    assert [len(cases) for cases in found.values()] == sizes
     for cases in found.values():
-        assert {case.liquid for case in cases} == set(materials())
+        assert {case.liquid for case in cases} == set(OTHER_LIQUIDS[group]())
     assert [any(case.misjudged for case in cases) for cases in found.values()] == [False, True, True, True, False]
-    released = all_groups["non-Newtonian liquids, let go in mid-stroke"]
+    released = all_groups[f"{group}, let go in mid-stroke"]
     assert {(case.hand, case.plant, case.mass_kg) for case in released} == set(
         itertools.product(["lets-go"], PLANTS, HANDLES_KG)
     )
 
 
 @compiled
-def test_a_sample_of_closed_loops_in_non_newtonian_liquids_is_stable():
-    sampled = [group for group in groups(count=25) if group.name.startswith("non-Newtonian")]
+def test_a_sample_of_closed_loops_in_other_liquids_is_stable():
+    sampled = [group for group in groups(count=25) if group.name.startswith(tuple(OTHER_LIQUIDS))]
     unstable = [case for group in sampled for case in group.cases if not judge(case, safe=True).stable]
     assert not unstable
 
