@@ -23,9 +23,23 @@ from study_app.cli.progress import progress
 @click.option(
     "--sav", is_flag=True, help="Also the answers, long and wide, for SPSS, jamovi and JASP; needs pyreadstat."
 )
-@click.option("--psych-ds", is_flag=True, help="Also a folder of all tables for sharing, which follows Psych-DS.")
-def export(results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psych_ds: bool) -> None:
+@click.option(
+    "--psych-ds",
+    is_flag=True,
+    help="Also a folder to share that follows Psych-DS: all tables, the report with its script, the study's file.",
+)
+@click.option(
+    "--validator",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="PATH",
+    help="A Psych-DS validator that is installed: run on that folder; ends with exit code 3 if it finds faults.",
+)
+def export(
+    results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psych_ds: bool, validator: Path | None
+) -> None:
     """Write the tidy tables of all participants, with a codebook."""
+    if validator is not None and not psych_ds:
+        raise click.UsageError("--validator checks the folder that --psych-ds writes: give both")
     from study_app.analysis.export.export import Extra
     from study_app.analysis.export.export import export as export_study
 
@@ -36,6 +50,22 @@ def export(results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psy
         files = export_study(results, to, extras=extras, warn=partial(click.echo, err=True))
     for written in files:
         click.echo(written)
+    if validator is not None:
+        _validate(validator, to)
+
+
+def _validate(validator: Path, to: Path) -> None:
+    """Run a Psych-DS validator on the folder of an export."""
+    import subprocess
+
+    from study_app.analysis.export.psychds_dataset import FOLDER
+
+    try:
+        ended = subprocess.run([validator.absolute(), to / FOLDER], check=False)  # noqa: S603 - named by the user
+    except OSError as error:
+        raise click.UsageError(f"{validator} cannot be run: {error.strerror}; give an executable file") from error
+    if ended.returncode:
+        raise click.exceptions.Exit(EXIT_FOUND)
 
 
 @click.command()

@@ -23,6 +23,7 @@ TABLES: Final = ("stimuli", "designs", "methods", "groups", "sequences")
 LEVEL_LIMITS: Final = {"level_error_percent": 2, "level_error_ms": 2, "pace_error_percent": 40, "attempts": 3}
 """Limits of what an interval delivers, with their defaults."""
 NEW_KEYS: Final = (
+    "study.credits",
     "questionnaires.*.instrument",
     "questionnaires.*.scores",
     "questionnaires.*.items.*.kind",

@@ -37,6 +37,7 @@ from study_app.haptics.model.scene import (
 )
 from study_app.protocol.analysis_plan import Analysis
 from study_app.protocol.blocks import Block, Compared, Kind
+from study_app.protocol.credits import Credits
 from study_app.protocol.forms.questionnaire import Questionnaire
 from study_app.protocol.forms.scale import Scale
 from study_app.protocol.groups.group import Group, Sequences, Steps
@@ -108,6 +109,12 @@ class StudyHead(Table):
         description="Who must not know what is felt: participant and operator, or the participant alone; in a "
         "single-blind study the operator sees force and wake while it runs.",
     )
+    credits: Credits | None = Field(default=None, description="What exports state of authors and licence.")
+
+    @model_serializer(mode="wrap")
+    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Omit the keys of format 2 that are not used: receipts and keys of format 1 keep their bytes."""
+        return {name: value for name, value in plain(self).items() if name != "credits" or value}
 
 
 class DeviceNeeds(Table):

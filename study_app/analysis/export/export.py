@@ -39,7 +39,8 @@ def export(
     ----------
     extras : what is written in addition
         "wide": the answers, a row a participant; "parquet": the tables as Parquet; "sav": the answers, long and wide,
-        for SPSS; "psych-ds": a folder of all tables that keeps the rules of Psych-DS.
+        for SPSS; "psych-ds": a folder to share that keeps the rules of Psych-DS: all tables, report, script
+        and the study's file.
 
     Raises
     ------
@@ -77,8 +78,15 @@ def export_files(study: Study, extras: Collection[Extra] = NOTHING_ELSE) -> dict
     if across is not None and "psych-ds" in extras:
         held = {_name(study, table, "csv"): table for table in dict.fromkeys((*tables, across))}
         contents = {name: files.get(name) or table_bytes(table) for name, table in held.items()}
-        files |= psychds_dataset.dataset_files(study, contents, {name: table.columns for name, table in held.items()})
+        described = {name: table.columns for name, table in held.items()}
+        files |= psychds_dataset.dataset_files(study, contents, described, _report(study))
     return files
+
+
+def _report(study: Study) -> dict[str, bytes]:
+    from study_app.analysis.report.write_report import asks, report_files  # noqa: PLC0415 - only to share a study
+
+    return report_files(study)[0] if asks(study) else {}
 
 
 def _name(study: Study, table: Delivered, ending: str) -> str:

@@ -1,42 +1,79 @@
-"""An export as a Psych-DS folder of its own, to share: its tables under ``data``, every column described both ways."""
+"""An export as a Psych-DS folder of its own, to share: tables, report, script, and the study's file."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import Final
+from collections.abc import Iterator, Mapping
+from pathlib import PurePosixPath
+from typing import Any, Final
 
 from study_app import __version__
 from study_app.analysis.export.codebook import codebook_bytes
 from study_app.analysis.tables.compared_blocks import spoken, text_in
 from study_app.analysis.tables.study import Study
+from study_app.protocol.source.files import at_hand, find, protocol_hash, source_bytes
+from study_app.protocol.source.liquid_files import unbundled
 from study_app.store.tables.cells import variable
 from study_app.store.tables.column import Column
 
 FOLDER: Final = "psych-ds"
 KEYWORDS: Final = ("haptics", "psychophysics", "liquids", "Likert scale")
+SCRIPT: Final = "report.R"
+CREDITS: Final = {"authors": "author", "license": "license", "citation": "citation", "funder": "funder", "url": "url"}
+"""Keys of ``[study.credits]``, and the properties of schema.org that say the same."""
 
 
 def dataset_files(
-    study: Study, tables: Mapping[str, bytes], columns: Mapping[str, tuple[Column, ...]]
+    study: Study, tables: Mapping[str, bytes], columns: Mapping[str, tuple[Column, ...]], report: Mapping[str, bytes]
 ) -> dict[str, bytes]:
-    """Return the folder's files by their paths; ``tables`` and ``columns`` go by the names of the tables' files."""
-    return {
-        f"{FOLDER}/dataset_description.json": _description(study, columns),
-        f"{FOLDER}/README.md": _readme(study, tables),
-        f"{FOLDER}/CHANGES.md": f"# Changes\n\n- {study.version}: exported by liquid-study {__version__}\n".encode(),
-        f"{FOLDER}/.psychds-ignore": b".psychds-ignore\n",
-        **{f"{FOLDER}/data/{name}": content for name, content in tables.items()},
-        f"{FOLDER}/documentation/codebook.json": codebook_bytes(study, columns),
+    """Return the folder's files by their paths.
+
+    ``tables`` and ``columns`` go by the names of the tables' files; ``report`` has the files of the report, its own
+    copies of the tables among them.
+    """
+    shown = {name: content for name, content in report.items() if name not in tables and name != SCRIPT}
+    files = {
+        "dataset_description.json": _json(_description(study, columns)),
+        "README.md": _readme(study, tables, report),
+        "CHANGES.md": f"# Changes\n\n- {study.version}: exported by liquid-study {__version__}\n".encode(),
+        ".psychds-ignore": b".psychds-ignore\n",
+        **{f"data/{name}": content for name, content in tables.items()},
+        "documentation/codebook.json": codebook_bytes(study, columns),
+        "analysis/settings.json": _json(study.protocol.get("analysis", {})),
+        **({f"analysis/{SCRIPT}": report[SCRIPT]} if SCRIPT in report else {}),
+        **{f"results/{name}": content for name, content in shown.items() if name != "codebook.json"},
+        "materials/protocol.json": _json(study.protocol),
+        **{f"materials/{name}": content for name, content in _own_files(study)},
     }
+    return {f"{FOLDER}/{name}": content for name, content in files.items()}
 
 
-def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> bytes:
+def _own_files(study: Study) -> Iterator[tuple[str, bytes]]:
+    """Yield the study's file and its liquid files where this machine has them, once the key was opened."""
+    if not study.revealed:
+        return
+    hashes = set(study.participants["protocol_hash"])
+    for name in at_hand():
+        source = source_bytes(name)
+        if protocol_hash(source) in hashes:
+            content, liquids = unbundled(source)
+            yield find(name).name, content
+            inside = {name: text for name, text in liquids.items() if ".." not in PurePosixPath(name).parts}
+            yield from ((name, text.encode()) for name, text in inside.items() if not PurePosixPath(name).is_absolute())
+            return
+
+
+def _credits(study: Study) -> dict[str, Any]:
+    stated = study.protocol.get("study", {}).get("credits") or {}
+    return {name: stated[name] for name in CREDITS if stated.get(name)}
+
+
+def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dict[str, Any]:
     """Return the dataset's description; a column that several tables share is described once."""
     every = {column.name: column for of_table in columns.values() for column in of_table}
     head = study.protocol.get("study", {})
     description = head.get("description") or study.title
-    content = {
+    return {
         "@context": "https://schema.org/",
         "@type": "Dataset",
         "name": study.name,
@@ -47,19 +84,30 @@ def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> byt
         "version": study.version,
         "keywords": [*KEYWORDS, *(["simulated"] if study.simulated else [])],
         "variableMeasured": [variable(column) for column in every.values()],
+        **{CREDITS[name]: value for name, value in _credits(study).items()},
     }
+
+
+def _json(content: Any) -> bytes:
     return f"{json.dumps(content, indent=2, ensure_ascii=False)}\n".encode()
 
 
-def _readme(study: Study, tables: Mapping[str, bytes]) -> bytes:
+def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, bytes]) -> bytes:
     simulated = "**All participants are simulated.** " if study.simulated else ""
     blinded = "Settings are named." if study.revealed else "Settings are codes: the key is sealed."
+    stated = _credits(study)
+    script = f"; `Rscript analysis/{SCRIPT} data` computes its main numbers again" if SCRIPT in report else ""
     lines = [
         f"# {study.title}",
         "",
         f"{simulated}{study.n} participants. {blinded} A Psych-DS dataset; `n/a` is a missing cell. Statements, levels "
-        "and exclusions are in `documentation/codebook.json`.",
+        "and exclusions are in `documentation/codebook.json`, the study's texts in `materials`.",
         "",
         *(f"- `data/{name}`" for name in tables),
+        *([f"- `results/report.html`: the report{script}"] if "report.html" in report else []),
+        "",
+        f"Authors: {', '.join(stated.get('authors', [])) or 'not stated'}.",
+        f"Licence: {stated.get('license', 'not stated; ask the authors before you use the data')}.",
+        f"How to cite: {stated.get('citation', 'not stated; name the study, its version and its authors')}.",
     ]
     return ("\n".join(lines) + "\n").encode()

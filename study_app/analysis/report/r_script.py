@@ -14,13 +14,14 @@ from study_app.analysis.statistics.trend import EXACT_UP_TO
 from study_app.analysis.tables.study import Study
 
 START: Final = """\
-# Computes the main numbers of report.html again, in base R (4.0 or newer, no packages), from the table of responses
-# next to this file, and says where they differ:  Rscript report.R   (exit code 1 if any does, or if there is
-# nothing to compare)
+# Computes the main numbers of report.html again, in base R (4.0 or newer, no packages), from the tables next to this
+# file or in the folder that is named, and says where they differ:  Rscript report.R [FOLDER]   (exit code 1 if any
+# does, or if there is nothing to compare)
 # The exact p of trends and of pairs come from all rearrangements, up to {exact} participants; beyond that, and for
 # Friedman's test, the approximate p are compared.
 
-answers <- read.csv("{table}", colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
+folder <- c(commandArgs(trailingOnly = TRUE), ".")[1]
+answers <- read.csv(file.path(folder, "{table}"), colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
 answers <- answers[answers$counted == "true", ]
 answers$response <- {numeric}
 differing <- 0

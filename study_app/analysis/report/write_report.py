@@ -74,18 +74,31 @@ def report(
     going = partial(_going, progress, cancelled)
     going("reading", 0.0)
     study = load_study(folder)
-    if not study.blocks and not study.others.questions:
+    if not asks(study):
         raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to report")
+    files, found = report_files(study, going)
+    going("writing", 0.95)
+    written = write_files(Path(to), files)
+    study.tell_doubts(warn)
+    if failed is not None:
+        for failure in found:
+            failed(f"error: {failure}")
+    return written
+
+
+def asks(study: Study) -> bool:
+    """Return whether a study has answers to report."""
+    return bool(study.blocks or study.others.questions)
+
+
+def report_files(
+    study: Study, going: Progress = lambda _what, _share: None
+) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
+    """Return the files of a study's report by their names, ``report.html`` first, and the sections that failed."""
     results = evaluate(study, progress=lambda what, share: going(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
     drawn = list(_drawn(study, results, going, failures))
-    going("writing", 0.95)
-    written = write_files(Path(to), _files(study, results, drawn, failures))
-    study.tell_doubts(warn)
-    if failed is not None:
-        for failure in failures.found:
-            failed(f"error: {failure}")
-    return written
+    return _files(study, results, drawn, failures), tuple(failures.found)
 
 
 def _going(

@@ -14,7 +14,6 @@ def variable(column: Column) -> dict[str, Any]:
         "@type": "PropertyValue",
         "name": column.name,
         "description": f"{column.description} Levels: {meanings}." if meanings else column.description,
-        "valuePattern": cell_pattern(column),
     }
     if column.unit:
         described["unitText"] = column.unit

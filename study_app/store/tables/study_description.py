@@ -64,13 +64,13 @@ def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 
 def describes_alike(content: bytes, expected: bytes) -> bool:
     """Return whether a description says the same of the study, and of the same columns but for `LATER`.
 
-    Earlier versions of the program lack columns, and describe others in other words; units, ranges and levels are the
-    same in all.
+    Earlier versions of the program lack columns, describe others in other words, and add a pattern of the cells, which
+    is no property of schema.org's PropertyValue; units and ranges are the same in all.
     """
     try:
         found, wanted = parse_json(content), parse_json(expected)
         columns, wanted_columns = (
-            [(variable["name"], variable | {"description": ""}) for variable in it.pop("variableMeasured")]
+            [(variable["name"], _comparable(variable)) for variable in it.pop("variableMeasured")]
             for it in (found, wanted)
         )
     except (AttributeError, KeyError, TypeError, ValueError):
@@ -79,6 +79,11 @@ def describes_alike(content: bytes, expected: bytes) -> bool:
     return bool(
         found == wanted and columns == [one for one in wanted_columns if one[0] in names or one[0] not in LATER]
     )
+
+
+def _comparable(variable: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what every version says of a column."""
+    return {name: value for name, value in variable.items() if name not in ("description", "valuePattern")}
 
 
 def write_description(

@@ -75,8 +75,8 @@ def test_what_earlier_versions_wrote_in_clear_is_not_handed_out_sealed(rek: Resu
     """Their tables have the columns that tell a condition: files that are handed out have them after unblinding."""
     rek.add("P001", lambda *_: 6, changes={"force_mean_n": 4.8151623})
     export(rek.folder, to, extras=("psych-ds", "wide"))
-    held = {path: path.read_text(encoding="utf-8") for path in to.rglob("*") if path.is_file()}
-    assert not [path for path, text in held.items() if "4.8151623" in text]
+    held = {path: path.read_bytes() for path in to.rglob("*") if path.is_file()}
+    assert not [path for path, content in held.items() if b"4.8151623" in content]
     assert set(json.loads((to / "codebook.json").read_text())["sealed_columns"]) == SEALED
     described = json.loads((to / "psych-ds" / "dataset_description.json").read_text())["variableMeasured"]
     assert not SEALED & {one["name"] for one in described}

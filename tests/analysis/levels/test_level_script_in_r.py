@@ -101,7 +101,9 @@ def test_r_computes_d_prime_of_every_design(design: str, settings: tuple, tmp_pa
         trial=range(len(frame)), analysed="true", right=frame["right"].map({True: "true", False: "false"})
     )
     table.to_csv(tmp_path / "study-s_description-tracks_data.csv", index=False)
-    same = START[START.index("differing <- 0") : START.index("# Sums of")].replace("{{", "{").replace("}}", "}")
+    same = 'folder <- "."\n' + START[START.index("differing <- 0") : START.index("# Sums of")].replace(
+        "{{", "{"
+    ).replace("}}", "}")
     (tmp_path / "report.R").write_text("\n".join([same, *lines, 'cat(compared, "numbers,", differing, "differ\\n")']))
     done = run_in_r(tmp_path)
     assert done.stderr == ""

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 def test_the_script_in_r_has_every_number_of_the_report(of_twelve: Path) -> None:
     script = (of_twelve / "report.R").read_text(encoding="utf-8")
-    assert 'read.csv("study-rek2024_description-responses_data.csv"' in script
+    assert 'read.csv(file.path(folder, "study-rek2024_description-responses_data.csv")' in script
     for left, right in ("()", "{}"):
         assert script.count(left) == script.count(right)
     found = numbers(of_twelve)["results"]["blocks"]

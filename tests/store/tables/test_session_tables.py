@@ -17,7 +17,7 @@ from study_app.errors import StoreError
 from study_app.store.journals.journal import read
 from study_app.store.progress import progress_of
 from study_app.store.sessions.begin import SessionStore
-from study_app.store.tables.cells import variable
+from study_app.store.tables.cells import cell_pattern
 from study_app.store.tables.column import MISSING, Column, header, unsealed
 from study_app.store.tables.columns import RESPONSES, TABLES, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, in_columns_of, read_table
@@ -323,7 +323,7 @@ def test_every_cell_of_a_session_matches_its_columns_pattern(
         assert rows
         for column in unsealed(TABLES[name]):
             for row in rows:
-                assert re.fullmatch(variable(column)["valuePattern"], row[column.name]), (column.name, row)
+                assert re.fullmatch(cell_pattern(column), row[column.name]), (column.name, row)
 
 
 def test_tables_come_from_the_journal_alone(

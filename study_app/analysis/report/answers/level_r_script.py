@@ -21,7 +21,7 @@ START: Final = """
 # Blocks with a design: d' and criterion, means of reversals, random-effects means with Hartung-Knapp intervals, and
 # Weber exponents, and settings of the method of adjustment.
 
-tracks <- read.csv("{table}", colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
+tracks <- read.csv(file.path(folder, "{table}"), colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
 for (name in c("standard", "trial", "level_asked")) tracks[[name]] <- as.numeric(tracks[[name]])
 judged <- tracks[tracks$analysed == "true" & !is.na(tracks$response), ]
 at_standard <- function(rows, block, participant, standard) {{

@@ -1,0 +1,78 @@
+"""The export to share: a Psych-DS folder that holds what is needed to read, check and repeat the study."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.export.export import export
+from study_app.analysis.export.psychds_dataset import FOLDER
+from study_app.cli import commands
+from study_app.protocol.source.files import shipped_file
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store.blinded.blinding import reveal
+from study_app.store.verification.psychds import validate
+
+pytestmark = pytest.mark.slow
+
+OF_SCHEMA_ORG = {"@type", "name", "description", "unitText", "minValue", "maxValue"}
+"""Properties of schema.org's PropertyValue that a column has."""
+
+
+CREDITS = 'credits = { authors = ["A. Kox", "B. Lam"], license = "CC-BY-4.0", citation = "Kox and Lam (2026)" }\n'
+
+
+@pytest.fixture
+def kitchen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Results of a study of the workspace, whose file states authors and licence; the key is open."""
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    text = shipped_file("demo").read_text(encoding="utf-8").replace("format = 1", "format = 2", 1)
+    file = tmp_path / "protocols" / "kitchen.toml"
+    file.parent.mkdir()
+    file.write_text(
+        text.replace("[study]\n", f"[study]\n{CREDITS}", 1).replace('"demo"', '"kitchen"', 1), encoding="utf-8"
+    )
+    folder = rehearse_answers("kitchen", participants=4, seed=1, results=tmp_path / "results" / "kitchen")
+    reveal(folder, by="AK", reason="to share it")
+    return folder
+
+
+def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path, tmp_path: Path) -> None:
+    stand_in, to = tmp_path / "validator", tmp_path / "out"
+    stand_in.write_text('#!/bin/sh\ntest -f "$1/dataset_description.json" && exit $(cat "$0.code")\n')
+    stand_in.chmod(0o755)
+    asked = ["export", str(kitchen), "--to", str(to), "--validator", str(stand_in)]
+    assert CliRunner().invoke(commands, asked).exit_code == 2
+    for code, expected in (("0", 0), ("1", 3)):
+        Path(f"{stand_in}.code").write_text(code)
+        assert CliRunner().invoke(commands, [*asked, "--psych-ds"]).exit_code == expected
+    folder = to / FOLDER
+    said = validate(folder)
+    assert said.errors == ()
+    assert {issue.code for issue in said.warnings} <= {"JSON_KEY_RECOMMENDED"}
+    assert (folder / "materials" / "kitchen.toml").read_bytes() == (tmp_path / "protocols/kitchen.toml").read_bytes()
+    assert "questionnaires" in json.loads((folder / "materials" / "protocol.json").read_bytes())
+    assert (folder / "results" / "report.html").is_file()
+    assert not [path for path in (folder / "results").iterdir() if path.name.endswith("_data.csv")]
+    if rscript := shutil.which("Rscript"):
+        ran = subprocess.run([rscript, "analysis/report.R", "data"], cwd=folder, check=False, capture_output=True)
+        assert ran.returncode == 0, ran.stdout
+        assert b"every number that R computes is the report's" in ran.stdout
+
+
+def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path, tmp_path: Path) -> None:
+    export(kitchen, tmp_path / "out", extras=["psych-ds"])
+    folder = tmp_path / "out" / FOLDER
+    described = json.loads((folder / "dataset_description.json").read_bytes())
+    assert {name for one in described["variableMeasured"] for name in one} <= OF_SCHEMA_ORG
+    assert described["author"] == ["A. Kox", "B. Lam"]
+    assert described["license"] == "CC-BY-4.0"
+    assert described["citation"] == "Kox and Lam (2026)"
+    readme = (folder / "README.md").read_text(encoding="utf-8")
+    assert "Authors: A. Kox, B. Lam." in readme
+    assert "Licence: CC-BY-4.0." in readme
