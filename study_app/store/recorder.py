@@ -26,7 +26,7 @@ from study_app.store.journals.journal import Line
 if TYPE_CHECKING:
     from study_app.store.recording_files import SamplesFile, Written
 
-ROOM = 120_000  # samples that may wait: two minutes at 1 kHz, 23 MB
+ROOM = 120_000  # samples that may wait: two minutes at 1 kHz, 37 MB
 ENOUGH = 5_000  # samples that are worth waking the thread for
 PATIENCE_S = 30.0  # how long the end of a session waits for the disk
 LEAVING_S = 2.0  # how long a session that is left without an end does: nothing must hold up who ends the program

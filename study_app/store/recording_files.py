@@ -1,8 +1,9 @@
 """The files of a trial's recording: every sample of the servo, and every frame that was shown, as Parquet.
 
-Times and positions are kept to the last bit, so that the trial can be computed again from them; velocities and forces,
-which then come out again, are rounded to steps far below what a device or a hand can tell, so that half an hour at
-1 kHz takes 30 to 56 MB. What was computed is proved by the CRC-32 of its exact numbers, one of every second.
+Times, positions and velocities that a device measures are kept to the last bit, so that the trial can be computed again
+from them; velocities and forces, which then come out again, are rounded to steps far below what a device or a hand can
+tell, so that half an hour at 1 kHz takes 30 to 56 MB. What was computed is proved by the CRC-32 of its exact numbers,
+one of every second.
 
 Positions, velocities and forces are in the frames of ``haptics.model.layout.SAMPLE``. Readers need no code of ours: any
 Parquet reader gives the columns, with unit and meaning in each column's metadata.
@@ -26,14 +27,21 @@ from pyarrow import parquet
 
 from study_app.errors import StoreError
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
-from study_app.haptics.model.layout import FORCE_STEP_N, SAMPLE, records
+from study_app.haptics.model.layout import (
+    FORCE_STEP_N,
+    MEASURED_GRIPPER,
+    MEASURED_ORIENTATION,
+    MEASURED_VELOCITY,
+    SAMPLE,
+    records,
+)
 from study_app.store.atomic import cannot_read, sync_folder, temporary_path
 from study_app.store.journals.journal import plain
 from study_app.store.journals.parsing import parse_json
 from study_app.store.tables.column import Column
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
 
-FORMAT = 2
+FORMAT = 3
 SPEED_STEP_MPS = 2.0**-12
 ROUNDED_TO = {
     "velocity_mps": SPEED_STEP_MPS,
@@ -50,8 +58,17 @@ FRAME = np.dtype([("painted_ns", np.int64), ("sample_ns", np.int64), ("age_ns", 
 _FACTS = b"liquid_study"
 _COMPRESSION = ("zstd", 9)
 _AXES = ("x", "y", "z")
-_LATER = frozenset({"delay_ticks", *(f"undelivered_{axis}_n" for axis in _AXES)})  # columns that format 1 lacks
-_SHORT = frozenset({"buttons", "delay_ticks", "limiters", "scene", "status"})
+_MEASURED = {
+    **{f"device_velocity_{axis}_mps": ("device_velocity_mps", i, MEASURED_VELOCITY) for i, axis in enumerate(_AXES)},
+    **{f"orientation_{part}": ("orientation", i, MEASURED_ORIENTATION) for i, part in enumerate("wxyz")},
+    "gripper_m": ("gripper_m", None, MEASURED_GRIPPER),
+}
+"""What a device may measure itself: field of ``layout.SAMPLE``, its component, and its bit."""
+_LATER = frozenset(
+    {"delay_ticks", *(f"undelivered_{axis}_n" for axis in _AXES)}  # columns that format 1 lacks
+    | {"measured", "device_time_ns", *_MEASURED}  # and format 2
+)
+_SHORT = frozenset({"buttons", "delay_ticks", "limiters", "measured", "scene", "status"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +160,8 @@ def read_samples(path: Path) -> Any:
     """Return the samples (n,) as a recarray of ``SAMPLE``; ``busy_ns``, which is not recorded, is 0.
 
     The first sample's force on the hand, from which the next one moves, is exact. Recordings of format 1 were made
-    where every device was taken to send what it was asked for, one tick late.
+    where every device was taken to send what it was asked for, one tick late; until format 2 no device measured its
+    velocity.
 
     Raises
     ------
@@ -164,6 +182,11 @@ def read_samples(path: Path) -> Any:
         samples["device_force_n"][:, i] = device
         samples["command_n"][:, i] = device + columns.get(f"undelivered_{axis}_n", 0.0)
         samples["force_n"][:, i] = device + columns[f"withheld_{axis}_n"]
+    if "measured" in columns and len(samples):
+        samples["measured"], samples["device_time_ns"] = columns["measured"], columns["device_time_ns"]
+        for name, (field, component, bit) in _MEASURED.items():
+            values = np.where(columns["measured"] & bit, columns[name], 0.0)
+            samples[field][... if component is None else (..., component)] = values
     if len(samples) and None not in facts["first_device_force_n"]:
         samples["device_force_n"][0] = facts["first_device_force_n"]
         samples["command_n"][0] = facts.get("first_command_n", facts["first_device_force_n"])
@@ -229,7 +252,7 @@ def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
         "tick": samples["tick"],
         "time_ns": samples["time_ns"],
         "due_ns": samples["time_ns"] - samples["lateness_ns"],
-        **{name: samples[name] for name in ("fresh", "buttons", "delay_ticks", "limiters", "scene", "status")},
+        **{name: samples[name] for name in ("fresh", *sorted(_SHORT), "device_time_ns")},
     }
     with np.errstate(invalid="ignore", over="ignore"):  # a fault's numbers are kept as they are
         device = _rounded(samples["device_force_n"], FORCE_STEP_N)
@@ -242,6 +265,9 @@ def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
             columns[f"device_force_{axis}_n"] = device[:, i]
             columns[f"undelivered_{axis}_n"] = undelivered[:, i]
             columns[f"withheld_{axis}_n"] = withheld[:, i]
+        for name, (field, component, bit) in _MEASURED.items():
+            values = samples[field] if component is None else samples[field][:, component]
+            columns[name] = np.where(samples["measured"] & bit, values, np.nan)
         return {name: np.ascontiguousarray(column, _NUMPY_TYPES[name]) for name, column in columns.items()}
 
 
@@ -306,7 +332,7 @@ def _type(column: Column) -> pa.DataType:
         return pa.bool_()
     if column.kind == "integer":
         return pa.int32() if column.name in _SHORT else pa.int64()
-    return pa.float64() if column.name.startswith("position_") else pa.float32()
+    return pa.float64() if column.name.startswith(("position_", "device_velocity_")) else pa.float32()
 
 
 _NUMPY_TYPES = {column.name: _type(column).to_pandas_dtype() for column in (*SAMPLES, *FRAMES)}
@@ -341,7 +367,7 @@ def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any
 
 
 def _are_of(table: pa.Table, columns: Sequence[Column], rows: int) -> bool:
-    """Return whether a table has these columns, each once and whole, but for those that format 1 lacks."""
+    """Return whether a table has these columns, each once and whole, but for those that earlier formats lack."""
     expected = {column.name: _type(column) for column in columns}
     held = {field.name: field.type for field in table.schema}
     return (

@@ -64,6 +64,14 @@ class LightDevice(ScriptedDevice):
         return Dynamics(0.0, 10e-6, 0.005)
 
 
+class TachometerDevice(ScriptedDevice):
+    """A device that measures its velocity."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.measure_velocity()
+
+
 def begun(folder: Path, device: ScriptedDevice, servo: Servo) -> SessionStore:
     return begin(
         folder,
@@ -225,6 +233,30 @@ def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tm
     (place / "receipt.json").write_text(json.dumps(receipt | {"resumed": []}))
     with pytest.raises(StoreError, match="lacks the device since"):
         replay(place)
+
+
+def test_a_session_on_a_device_that_measures_velocity_comes_out_to_the_last_bit(tmp_path: Path) -> None:
+    with (
+        TachometerDevice() as device,
+        Servo(device, clock=VirtualClock(), elements=100) as servo,
+        begun(tmp_path / "results", device, servo) as store,
+    ):
+        runner, wait = held(store, device, servo)
+        runner.post(Begin(store.clock.seconds()))
+        wait(500)
+        runner.post(Continue(store.clock.seconds()))
+        wait(1500)
+        runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
+        place: Path = store.folder.path
+    found = replay(place)
+    assert (found.differences, found.uncompared) == ((), ())
+    assert (found.recordings, found.proved) == (1, True)
+
+    def nudge(columns: dict[str, Any]) -> None:
+        columns["device_velocity_x_mps"][-5:] += 1e-9
+
+    rewrite(place / "recordings" / "trial-001.parquet", nudge)
+    assert any("force on the hand differs" in line for line in replay(place).differences)
 
 
 @pytest.mark.parametrize("ticks", [200, 450, 550, 650])

@@ -32,6 +32,11 @@ PROBE = np.dtype(
         ("buttons", np.int64),
         ("delay_ticks", np.int64),  # as it says it measured it
         ("share_sent", np.float64),  # of the force, as it says
+        ("measured", np.int64),  # what it says it measured, of the following
+        ("measured_mps", np.float64, (3,)),
+        ("orientation", np.float64, (4,)),
+        ("gripper_m", np.float64),
+        ("clock_ahead_ns", np.int64),  # its own clock, before that of the servo
         ("held_when_lost_n", np.float64),  # along x, as it says once it was lost
         ("hangs", np.int64),  # while not 0, a reading does not end
         ("clock", np.intp),
@@ -66,6 +71,13 @@ def _read(context, now_ns, reading):
         out.position_m[axis] = probe.velocity_mps[axis] * (now_ns - probe.began_ns) * 1e-9
     out.buttons = probe.buttons
     out.delay_ticks = probe.delay_ticks
+    out.measured = probe.measured
+    for axis in range(3):
+        out.velocity_mps[axis] = probe.measured_mps[axis]
+    for part in range(4):
+        out.orientation[part] = probe.orientation[part]
+    out.gripper_m = probe.gripper_m
+    out.device_time_ns = now_ns + probe.clock_ahead_ns
     if probe.reads == probe.bad_at_read:
         out.position_m[1] = np.nan
     return READ_NEW

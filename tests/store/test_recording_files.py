@@ -60,6 +60,37 @@ def test_times_and_places_come_back_to_the_last_bit_and_the_rest_to_its_step(tmp
     assert (read["device_force_n"][untouched] == read["force_n"][untouched]).all()
 
 
+def test_what_a_device_measures_comes_back_and_its_velocity_to_the_last_bit(tmp_path: Path, samples_of: Make) -> None:
+    samples = samples_of(2_000)
+    generator = np.random.default_rng(1)
+    samples["measured"] = generator.integers(0, 16, 2_000)
+    for name, bit in (("device_velocity_mps", 1), ("orientation", 2), ("gripper_m", 4), ("device_time_ns", 8)):
+        field = samples[name]
+        has = samples["measured"] & bit != 0
+        field[has] = 1000 * generator.random(field[has].shape)
+    path = write(tmp_path / "trial-003.parquet", samples).path
+    read = read_samples(path)
+    for name in ("measured", "device_velocity_mps", "device_time_ns"):
+        assert np.array_equal(read[name], samples[name]), name
+    for name in ("orientation", "gripper_m"):
+        assert read[name] == pytest.approx(samples[name], rel=1e-6), name
+    table = parquet.read_table(path)
+    assert (np.isnan(table["gripper_m"].to_numpy()) == (samples["measured"] & 4 == 0)).all()
+
+
+def test_recordings_of_format_2_are_read(tmp_path: Path, samples_of: Make) -> None:
+    path = write(tmp_path / "trial-003.parquet", samples_of(100)).path
+    table = parquet.read_table(path)
+    older = table.select(table.column_names[: table.column_names.index("measured")])
+    facts = json.loads(parquet.read_metadata(path).metadata[b"liquid_study"]) | {"format": 2}
+    with parquet.ParquetWriter(path, older.schema) as writer:
+        writer.write_table(older)
+        writer.add_key_value_metadata({b"liquid_study": json.dumps(facts)})
+    read = read_samples(path)
+    assert not read["measured"].any()
+    assert np.array_equal(read["position_m"], samples_of(100)["position_m"])
+
+
 def test_numbers_of_a_fault_come_back_as_they_are(tmp_path: Path, samples_of: Make) -> None:
     samples = samples_of(4)
     samples["position_m"][1] = np.nan
@@ -124,7 +155,7 @@ def test_a_recording_says_what_it_is_without_being_read(tmp_path: Path, samples_
     facts = read_facts(write(tmp_path / "trial-003.parquet", samples_of(2_500), rate_hz=500).path)
     assert facts.pop("crc32")["rows"] == 500
     assert facts.pop("first_device_force_n") == facts.pop("first_command_n")
-    assert facts == {"format": 2, "kind": "samples", **FACTS, "rate_hz": 500, "dropped": 0, "rows": 2_500}
+    assert facts == {"format": 3, "kind": "samples", **FACTS, "rate_hz": 500, "dropped": 0, "rows": 2_500}
 
 
 def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Path, samples_of: Make) -> None:
@@ -219,9 +250,9 @@ def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None
 
 def test_a_newer_format_is_told(tmp_path: Path, samples_of: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as newer:
-        newer.setattr(recording_files, "FORMAT", 3)
+        newer.setattr(recording_files, "FORMAT", 4)
         path = write(tmp_path / "trial-003.parquet", samples_of(10)).path
-    with pytest.raises(StoreError, match="has format 3, this version reads 1 to 2: use a newer version"):
+    with pytest.raises(StoreError, match="has format 4, this version reads 1 to 3: use a newer version"):
         read_samples(path)
 
 

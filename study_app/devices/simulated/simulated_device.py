@@ -25,7 +25,7 @@ from study_app.haptics.kernels.c_functions import (
 )
 from study_app.haptics.kernels.plant import HANDLE, let_go, measure, move, push
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.layout import COMMAND, READING, records
+from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, records
 
 SIMULATED = np.dtype(
     [
@@ -35,6 +35,7 @@ SIMULATED = np.dtype(
         ("started", np.int64),  # 1 after the first read
         ("buttons", np.int64),
         ("unplugged", np.int64),  # 1: answers no more
+        ("measures_velocity", np.int64),  # 1: says the handle's velocity with every sample
     ],
     align=True,
 )
@@ -72,7 +73,12 @@ class SimulatedDevice(HandOrders, Device):
     def dynamics(self) -> Dynamics:
         """The handle's own numbers; its delay as it is at 1 kHz."""
         handle = self.state.handle
-        return Dynamics(1e-3 * float(handle.delay), float(handle.quantum_m), float(handle.mass_kg))
+        lag_s = 0.0 if self.state.measures_velocity else None
+        return Dynamics(1e-3 * float(handle.delay), float(handle.quantum_m), float(handle.mass_kg), lag_s)
+
+    def measure_velocity(self) -> None:
+        """Say the handle's velocity with every sample, as devices with tachometers do."""
+        self.state.measures_velocity = 1
 
     def unplug(self) -> None:
         """Answer no more, as a device whose cable was pulled."""
@@ -135,6 +141,10 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     measure(device.handle, out.position_m)
     out.buttons = device.buttons
     out.delay_ticks = device.handle.delay
+    if device.measures_velocity != 0:
+        out.measured |= MEASURED_VELOCITY
+        for axis in range(3):
+            out.velocity_mps[axis] = device.handle.velocity_mps[axis]
     return READ_NEW
 
 

@@ -16,7 +16,15 @@ from study_app.haptics.kernels.passivity import log_delivery
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.model.device_dynamics import MOST_DELAY
-from study_app.haptics.model.layout import BUTTON_STOP, STATUS_DEVICE_LOST, STATUS_OK
+from study_app.haptics.model.layout import (
+    BUTTON_STOP,
+    MEASURED_GRIPPER,
+    MEASURED_ORIENTATION,
+    MEASURED_TIME,
+    MEASURED_VELOCITY,
+    STATUS_DEVICE_LOST,
+    STATUS_OK,
+)
 
 _read, _write, _now, _sleep = call_at(READ), call_at(WRITE), call_at(NOW), call_at(SLEEP)
 
@@ -147,6 +155,7 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
 def _sense(sample: Any, safety: Any, reading: Any, device: Any) -> None:
     """Read the device into ``sample``; a lost one leaves its status, no velocity and no force."""
     reading[0].delay_ticks = -1
+    reading[0].measured = 0
     answer = _read(device.read, device.context, sample.time_ns, np.intp(reading.ctypes.data))
     sample.fresh = 1 if answer == READ_NEW else 0
     sample.status = STATUS_DEVICE_LOST if answer == READ_LOST else STATUS_OK
@@ -162,6 +171,20 @@ def _sense(sample: Any, safety: Any, reading: Any, device: Any) -> None:
         sample.force_n[axis] = 0.0
         sample.command_n[axis] = 0.0
         sample.device_force_n[axis] = 0.0
+    take_measurements(sample, reading[0])
+
+
+@kernel
+def take_measurements(sample: Any, reading: Any) -> None:
+    """Take what the device measured besides position and buttons; what it did not measure is 0."""
+    measured = reading.measured
+    sample.measured = measured
+    for axis in range(3):
+        sample.device_velocity_mps[axis] = reading.velocity_mps[axis] if measured & MEASURED_VELOCITY else 0.0
+    for part in range(4):
+        sample.orientation[part] = reading.orientation[part] if measured & MEASURED_ORIENTATION else 0.0
+    sample.gripper_m = reading.gripper_m if measured & MEASURED_GRIPPER else 0.0
+    sample.device_time_ns = reading.device_time_ns if measured & MEASURED_TIME else 0
 
 
 @kernel

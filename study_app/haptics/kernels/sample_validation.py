@@ -6,7 +6,15 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import copy, square_distance
-from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_STALE, STATUS_OK, STATUS_STALE_FAULT, Record
+from study_app.haptics.model.estimators import device
+from study_app.haptics.model.layout import (
+    LIMITER_GLITCH,
+    LIMITER_STALE,
+    MEASURED_VELOCITY,
+    STATUS_OK,
+    STATUS_STALE_FAULT,
+    Record,
+)
 
 SHORTEST_S = 0.2e-3
 LONGEST_S = 20e-3
@@ -29,7 +37,8 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
 
     Δt is the time since the last accepted sample, so that the next one covers any gap; the first takes the nominal
     period. A position that is no number, lies more than 10 m off the device's middle along an axis, or is out of reach
-    of a hand of 10 m/s within Δt, is refused; after five refusals in a row estimator and wakes have lost the
+    of a hand of 10 m/s within Δt, is refused; so is one without the velocity, of 10 m/s at most along an axis, where
+    the device is to measure that. After five refusals in a row estimator and wakes have lost the
     body, and the next position that a hand can have is a new beginning. A position that the device only repeats after
     it was refused is marked as refused too.
     """
@@ -40,7 +49,7 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
     interval_s: float = parameters.period_s
     if state.tracking:
         interval_s = clamp((sample.time_ns - state.accepted_ns) * 1e-9)
-    if not _plausible(state, sample, interval_s):
+    if not _plausible(parameters, state, sample, interval_s):
         sample.limiters |= LIMITER_GLITCH
         state.rejected += 1
         if state.rejected == REFUSALS_IN_A_ROW:
@@ -50,6 +59,9 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
     hand_m = sample.position_m
     copy(hand_m, state.hand_m)
     place(state, *_in_scene(parameters, hand_m))
+    if parameters.estimator == device.CODE:
+        for axis in range(3):
+            state.estimate_mps[axis] = parameters.scale * sample.device_velocity_mps[axis]
     state.rejected = 0
     state.accepted_ns = sample.time_ns
     safety.usable_ns = sample.time_ns
@@ -74,14 +86,25 @@ def _in_scene(parameters: Record, hand_m: Any) -> tuple[float, float, float]:
 
 
 @part
-def _plausible(state: Record, sample: Record, interval_s: float) -> bool:
+def _plausible(parameters: Record, state: Record, sample: Record, interval_s: float) -> bool:
     """Return whether the position is one that a hand can have, and within reach of the last accepted one."""
     hand_m = sample.position_m
     for axis in range(3):
         if not abs(hand_m[axis]) <= FARTHEST_HAND_M:  # NaN neither
             return False
+    if parameters.estimator == device.CODE and not _has_velocity(sample):
+        return False
     farthest_m = FASTEST_HAND_MPS * interval_s
     return state.tracking == 0 or square_distance(hand_m, state.hand_m) <= farthest_m * farthest_m
+
+
+@part
+def _has_velocity(sample: Record) -> bool:
+    """Return whether the device measured the velocity, and it is one that a hand can have."""
+    for axis in range(3):
+        if not abs(sample.device_velocity_mps[axis]) <= FASTEST_HAND_MPS:  # NaN neither
+            return False
+    return bool(sample.measured & MEASURED_VELOCITY)
 
 
 @part

@@ -19,11 +19,14 @@ class Dynamics(NamedTuple):
     ``delay_s`` is the measured time from a force being written until a position that it could have changed is read, as
     far as that is more than the tick in which it is written [s]; None where the device does not measure it. ``count_m``
     is one encoder count at the handle [m], ``mass_kg`` the least mass that the device presents there [kg].
+    ``velocity_lag_s`` is the mean lag of the velocity that the device measures and gives with every new sample [s];
+    None where it measures none.
     """
 
     delay_s: float | None = None
     count_m: float = 38e-6
     mass_kg: float = 0.1
+    velocity_lag_s: float | None = None
 
     def delay_ticks(self, rate_hz: float) -> int:
         """Return the delay in whole ticks, rounded up; `BELIEVED_TICKS` where it is not measured."""

@@ -51,7 +51,7 @@ class EstimatorKind:
     measured : tuple of float
         At which values.
     of_device : bool
-        Whether it estimates from a device's positions.
+        Whether it estimates from a device's positions, and files may name it.
     """
 
     name: str

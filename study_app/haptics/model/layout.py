@@ -69,11 +69,22 @@ SAMPLE = np.dtype(
         ("limiters", np.int64),  # LIMITER_* bits that acted
         ("fresh", np.int64),  # 1 where the device reported a new sample
         ("status", np.int64),  # STATUS_*
+        ("measured", np.int64),  # MEASURED_* bits: which of the following the device measured; the others are 0
+        ("device_velocity_mps", np.float64, (3,)),  # hand frame, as the device measured it
+        ("orientation", np.float64, (4,)),  # unit quaternion w, x, y, z: from the handle's frame to the hand frame
+        ("gripper_m", np.float64),  # opening of the gripper
+        ("device_time_ns", np.int64),  # time of the sample on the device's own clock
     ],
     align=True,
 )
 
-CONTRACT_VERSION = 1
+# What a device may measure besides position and buttons, as bits of Reading.measured.
+MEASURED_VELOCITY = 1 << 0
+MEASURED_ORIENTATION = 1 << 1
+MEASURED_GRIPPER = 1 << 2
+MEASURED_TIME = 1 << 3
+
+CONTRACT_VERSION = 2
 """Of `READING` and `COMMAND`. Later versions append fields: a driver uses those that fit into ``size_bytes``."""
 
 READING = np.dtype(
@@ -83,6 +94,12 @@ READING = np.dtype(
         ("position_m", np.float64, (3,)),  # hand frame, after the driver's mapping
         ("buttons", np.int64),
         ("delay_ticks", np.int64),  # how many writes late a force acts, as measured while running; -1: not measured
+        # from version 2 on
+        ("measured", np.int64),  # MEASURED_* bits of what follows; the servo sets it to 0 before each reading
+        ("velocity_mps", np.float64, (3,)),  # of the handle, hand frame
+        ("orientation", np.float64, (4,)),  # unit quaternion w, x, y, z: from the handle's frame to the hand frame
+        ("gripper_m", np.float64),  # opening of the gripper
+        ("device_time_ns", np.int64),  # time of the sample on the device's own clock
     ],
     align=True,
 )

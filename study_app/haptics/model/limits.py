@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 from study_app.errors import StudyError
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import NAMED
+from study_app.haptics.model.estimators.device import DeviceVelocity
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Velocity
 
 SLOWEST_HZ: Final = 500.0
@@ -60,24 +61,27 @@ class Entry(NamedTuple):
     limits: DampingLimits
 
 
-def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> float:
+def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity | DeviceVelocity = _THESIS) -> float:
     """Return the greatest damping of drag [N·s/m at the hand]; see `damping_limits`."""
     return damping_limits(period_s, delay_ticks, velocity).drag_nspm
 
 
-def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> DampingLimits:
+def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | DeviceVelocity = _THESIS) -> DampingLimits:
     """Return the limits of a loop with a tick period [s], a delay [ticks] and a velocity estimator.
 
     Between two entries of the table, of periods as of parameters, the worse one counts, and of delays the next longer;
     beyond the fastest, less in the ratio of the periods. An adaptive window of smaller tolerance than usual also has
     the limit of the raw difference. A given velocity has no estimator; it is taken as the thesis' own, "ewma". The
-    entries of "kalman" hold where the delay is one tick longer or shorter than believed, and while EWMA stands in.
+    velocity that a device measures has the limits of a line of the same lag (`DeviceVelocity.window`). The entries of
+    "kalman" hold where the delay is one tick longer or shorter than believed, and while EWMA stands in.
 
     Raises
     ------
     StudyError
         A loop slower or more delayed than any entry.
     """
+    if isinstance(velocity, DeviceVelocity):
+        velocity = velocity.window(period_s)
     found = [one for row in _rows(velocity) for one in _neighbours(row, period_s, delay_ticks)]
     if not found:
         raise StudyError(
@@ -88,7 +92,7 @@ def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity = _THES
     return DampingLimits(*(beyond * min(limits) for limits in zip(*found, strict=True)))
 
 
-def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity = _THESIS) -> float:
+def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity | DeviceVelocity = _THESIS) -> float:
     """Return the most that the force on a device's handle changes within a tick [N].
 
     A loop slower than 1 kHz gets as much a millisecond. A device that measures no delay has "ewma" for "kalman".

@@ -15,6 +15,7 @@ from study_app.haptics.kernels.safety import guard, new_safety
 from study_app.haptics.kernels.sample_validation import clamp, place
 from study_app.haptics.kernels.tick import step_model, write_sample
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
+from study_app.haptics.model.estimators.device import CODE as DEVICE
 from study_app.haptics.model.estimators.given import CODE as GIVEN
 from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.limits import damping_limits
@@ -67,7 +68,7 @@ def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None
     """Return what `simulate` tabulates as the servo's own samples: (n,) recarray of ``layout.SAMPLE``.
 
     ``dynamics`` are those of a device: limits, slew and delay are then those of its loop at the scene's rate. By
-    default the loop is that of `simulate`.
+    default the loop is that of `simulate`. A velocity that the device measures is the difference of the positions.
 
     Raises
     ------
@@ -104,6 +105,9 @@ def _run(model: Any, safety: Record, samples: Any, t_s: Any) -> None:
         if parameters.estimator == GIVEN:
             for axis in range(3):
                 state.estimate_mps[axis] = sample.velocity_mps[axis]
+        elif parameters.estimator == DEVICE:
+            for axis in range(3):
+                state.estimate_mps[axis] = (state.position_m[axis] - state.previous_m[axis]) / interval_s
         safety.tick_s = interval_s
         take_force(state, safety)
         step_model(model, interval_s, safety.delay_ticks)

@@ -13,6 +13,7 @@ from study_app.haptics.model.device_dynamics import MOST_DELAY, UNKNOWN, Dynamic
 from study_app.haptics.model.effect import GRAVITY_MPS2
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.estimators import NAMED as ESTIMATORS
+from study_app.haptics.model.estimators.device import MOST_LAG_TICKS, DeviceVelocity
 from study_app.haptics.model.force_link import FORCES
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.limits import (
@@ -175,10 +176,22 @@ def _whole_numbers(rows: Any) -> list[int]:
 
 
 def _for_device(scene: Scene, dynamics: Dynamics) -> Scene:
-    """Return the scene with its effects chosen; "kalman" is for devices that measure their delay, others get "ewma"."""
+    """Return the scene with its effects chosen, and with the velocity as the device permits it.
+
+    A device that measures its velocity replaces the scene's estimator; "kalman" is for devices that measure their
+    delay, others get "ewma".
+    """
+    if takes_device_velocity(scene.rate_hz, dynamics) and not isinstance(scene.velocity, Given):
+        velocity = DeviceVelocity(lag_s=dynamics.velocity_lag_s or 0.0)
+        return resolve(scene).model_copy(update={"velocity": velocity})
     if isinstance(scene.velocity, Kalman) and dynamics.delay_s is None:
         scene = scene.model_copy(update={"velocity": Ewma()})
     return resolve(scene)
+
+
+def takes_device_velocity(rate_hz: float, dynamics: Dynamics) -> bool:
+    """Return whether the velocity that a device measures replaces the scene's estimator at this rate."""
+    return dynamics.velocity_lag_s is not None and dynamics.velocity_lag_s * rate_hz <= MOST_LAG_TICKS
 
 
 def _by_delay(scene: Scene, dynamics: Dynamics) -> Sequence[DampingLimits]:

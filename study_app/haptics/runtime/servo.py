@@ -14,7 +14,7 @@ from study_app.haptics.model.layout import STATUS_DEVICE_LOST, STATUS_NON_FINITE
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.clocks.clock import Clock, SystemClock
 from study_app.haptics.runtime.clocks.grants import Grant
-from study_app.haptics.runtime.pack import built_alike, elements_needed
+from study_app.haptics.runtime.pack import built_alike, elements_needed, takes_device_velocity
 from study_app.haptics.runtime.telemetry import Telemetry
 from study_app.haptics.runtime.thread import LoopThread
 
@@ -218,9 +218,15 @@ class Servo:
     def describe(self) -> dict[str, Any]:
         """Return what a receipt should record: rate, the thread's priority, and how late a force is believed to act.
 
-        Nothing that follows from the liquids: they are blinded.
+        ``estimator`` is "device" where the device measures the velocity, else "scene": the protocol names it. Nothing
+        that follows from the liquids: they are blinded.
         """
-        return {"rate_hz": self.rate_hz, "priority": self.loop.grant.priority, "delay_ticks": self.delay_ticks}
+        return {
+            "rate_hz": self.rate_hz,
+            "priority": self.loop.grant.priority,
+            "delay_ticks": self.delay_ticks,
+            "estimator": "device" if takes_device_velocity(self.rate_hz, self.dynamics) else "scene",
+        }
 
     def __enter__(self) -> Self:
         if self.loop.clock.runs:

@@ -17,7 +17,7 @@ from study_app.haptics.kernels.c_functions import fence
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
 
-HISTORY = 32_768  # samples kept: 32 s at 1 kHz, 6 MB
+HISTORY = 32_768  # samples kept: 32 s at 1 kHz, 10 MB
 
 
 class Telemetry:

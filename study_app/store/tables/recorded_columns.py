@@ -46,6 +46,24 @@ SAMPLES: tuple[Column, ...] = (
             ("3", "a non-finite force (NaN or infinite)"),
         ),
     ),
+    Column(
+        "measured",
+        "integer",
+        "What the device measured itself, as bits: 1 velocity, 2 orientation, 4 gripper, 8 time.",
+        minimum=0,
+        maximum=15,
+    ),
+    *_vector("device_velocity", "m/s", "mps", "Velocity of the hand, as the device measured it; NaN if not measured"),
+    *(
+        Column(
+            f"orientation_{part}",
+            "number",
+            f"Orientation of the handle in the hand frame: {part} of a unit quaternion; NaN if not measured.",
+        )
+        for part in "wxyz"
+    ),
+    Column("gripper_m", "number", "Opening of the gripper; NaN if not measured.", "m"),
+    Column("device_time_ns", "integer", "Time of the sample on the device's clock; 0 if not measured.", "ns"),
 )
 
 FRAMES: tuple[Column, ...] = (

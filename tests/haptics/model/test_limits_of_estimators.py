@@ -3,6 +3,7 @@
 import pytest
 
 from study_app.haptics.model.estimators import ESTIMATORS, NAMED
+from study_app.haptics.model.estimators.device import MOST_LAG_TICKS, DeviceVelocity
 from study_app.haptics.model.limits import damping_limits, table
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Lead, Line, Raw
 
@@ -48,3 +49,10 @@ def test_a_parameter_that_is_measured_is_a_field_of_the_model():
     for kind in NAMED.values():
         assert kind.parameter is None or kind.parameter in kind.model.model_fields
         assert bool(kind.parameter) == bool(kind.measured)
+
+
+def test_velocity_of_a_device_has_the_limits_of_a_line_that_lags_as_much():
+    assert limit(DeviceVelocity(lag_s=2e-3)) == limit(Line(samples=5))
+    assert limit(DeviceVelocity(lag_s=3e-3)) == limit(Line(samples=7)) == min(entry("line", 5), entry("line", 8))
+    assert limit(DeviceVelocity()) == limit(Line(samples=2))
+    assert DeviceVelocity(lag_s=MOST_LAG_TICKS * 1e-3).window(1e-3) == Line(samples=16)

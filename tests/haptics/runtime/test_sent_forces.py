@@ -35,6 +35,7 @@ def test_records_of_the_contract_say_version_and_size():
         assert (record[0].version, record[0].size_bytes) == (CONTRACT_VERSION, record.itemsize)
     assert READING.fields["version"][1] == 0
     assert READING.fields["size_bytes"][1] == 8
+    assert READING.fields["measured"][1] == 56  # where the record of version 1 ended
 
 
 def test_telemetry_and_passivity_observer_take_the_force_that_the_device_sent():

@@ -9,7 +9,7 @@ from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.estimators.kalman import begin_filter, filter_velocity
 from study_app.haptics.kernels.estimators.lead import add_lead, begin_lead
 from study_app.haptics.kernels.vector import clear, copy, norm, square
-from study_app.haptics.model.estimators import ewma, foaw, given, kalman, lead, line, raw
+from study_app.haptics.model.estimators import device, ewma, foaw, given, kalman, lead, line, raw
 from study_app.haptics.model.layout import KNEE_SQRT, KNEE_SQUARE, Record
 
 TIE = 1e-9
@@ -19,7 +19,7 @@ NOTHING_MPS = 1e-30
 @part
 def reset_estimator(parameters: Record, state: Record) -> None:
     """Begin anew: a position alone says nothing about velocity, so it is 0. A given velocity is already there."""
-    if parameters.estimator != given.CODE:
+    if parameters.estimator not in (given.CODE, device.CODE):
         clear(state.estimate_mps)
         state.window_held = 0
     if parameters.estimator == kalman.CODE:
