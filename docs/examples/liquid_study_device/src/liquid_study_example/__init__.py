@@ -1,0 +1,1 @@
+"""Template of a device for liquid-study."""

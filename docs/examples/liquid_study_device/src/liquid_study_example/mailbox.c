@@ -1,0 +1,118 @@
+/* A device whose library owns the 1 kHz thread: it calls `tick` every millisecond, and the servo runs in a thread of its
+ * own. Samples and forces change hands in two mailboxes that hold the newest value only; neither thread waits for the
+ * other. A force acts at least one tick later than with direct.c: READ says how much later, and the servo permits less
+ * damping accordingly. */
+#include "frames.h"
+
+#include <stdatomic.h>
+#include <string.h>
+
+#define SILENT_TICKS 20 /* without a force for so many ticks, the servo hangs or is gone: zero force */
+
+typedef struct {
+    double position_mm[3], velocity_mmps[3];
+    int64_t time_ns;
+    int64_t acted; /* number of the WRITE whose force acted until this sample */
+} sample;
+
+typedef struct {
+    double force_n[3];
+    int64_t number; /* counts WRITEs */
+} force;
+
+/* Three places and the index of the newest: the writer fills its own, then exchanges it for the newest; so does the
+ * reader. Nothing is read while it is written. */
+#define NEW 4u
+#define MAILBOX(type)            \
+    struct {                     \
+        type places[3];          \
+        atomic_uint newest;      \
+        unsigned written, taken; \
+    }
+
+#define RESET(box) ((box).written = 0u, (box).taken = 1u, atomic_store(&(box).newest, 2u))
+#define PUT(box, value)                        \
+    ((box).places[(box).written] = (value),    \
+     (box).written = atomic_exchange(&(box).newest, (box).written | NEW) & 3u)
+#define IS_NEW(box) ((atomic_load(&(box).newest) & NEW) != 0u)
+#define TAKE(box) ((box).taken = atomic_exchange(&(box).newest, (box).taken) & 3u, (box).places[(box).taken])
+
+static struct {
+    double force_limit_n;
+    MAILBOX(sample) samples;
+    MAILBOX(force) forces;
+    int64_t written;   /* WRITEs so far; of the servo's thread */
+    force acting;      /* of the library's thread, as the following */
+    int64_t silent;
+    atomic_int lost;
+} device;
+
+static void tick(void *unused) {
+    sample now = {.acted = device.acting.number};
+    double force_n[3];
+    (void)unused;
+    if (maker_get(now.position_mm, now.velocity_mmps, &now.time_ns) != 0) {
+        device.lost = 1;
+        return;
+    }
+    PUT(device.samples, now);
+    if (IS_NEW(device.forces)) {
+        device.acting = TAKE(device.forces);
+        device.silent = 0;
+    } else if (++device.silent >= SILENT_TICKS) {
+        memset(device.acting.force_n, 0, sizeof device.acting.force_n);
+    }
+    to_maker(device.acting.force_n, force_n);
+    if (maker_set_force(force_n) != 0) {
+        device.lost = 1;
+    }
+}
+
+/* Return the context, 0 where the device cannot be opened. */
+intptr_t mailbox_open(double force_limit_n) {
+    memset(&device.acting, 0, sizeof device.acting);
+    device.force_limit_n = force_limit_n;
+    device.written = device.silent = 0;
+    device.lost = 0;
+    RESET(device.samples);
+    RESET(device.forces);
+    if (maker_open() != 0) {
+        return 0;
+    }
+    if (maker_start(tick, 0) != 0) {
+        maker_close();
+        return 0;
+    }
+    return (intptr_t)&device;
+}
+
+void mailbox_close(intptr_t context) {
+    (void)context;
+    maker_close(); /* ends the thread, then zero force */
+}
+
+int32_t mailbox_read(intptr_t context, int64_t now_ns, intptr_t reading) {
+    liquid_study_reading *out = (liquid_study_reading *)reading;
+    (void)context;
+    (void)now_ns;
+    if (device.lost) {
+        return LIQUID_STUDY_READ_LOST;
+    }
+    if (!IS_NEW(device.samples)) {
+        return LIQUID_STUDY_READ_NOTHING_NEW;
+    }
+    sample newest = TAKE(device.samples);
+    fill_reading(out, newest.position_mm, newest.velocity_mmps, newest.time_ns);
+    out->delay_ticks = device.written - newest.acted;
+    return LIQUID_STUDY_READ_NEW;
+}
+
+int32_t mailbox_write(intptr_t context, intptr_t command) {
+    liquid_study_command *asked = (liquid_study_command *)command;
+    force next = {.number = ++device.written};
+    (void)context;
+    limit_force(asked->force_n, device.force_limit_n, asked->sent_n);
+    memcpy(next.force_n, asked->sent_n, sizeof next.force_n);
+    PUT(device.forces, next);
+    return device.lost ? LIQUID_STUDY_READ_LOST : 0;
+}

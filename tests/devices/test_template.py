@@ -1,0 +1,213 @@
+"""The published contract: the C header describes the servo's records; the template package runs by entry point."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import json
+import shutil
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study_app.devices.backends import backends
+from study_app.devices.registry import discover, open_device
+from study_app.errors import DeviceLost
+from study_app.haptics.model import layout
+from tests.compiled import needs_servo
+
+TEMPLATE = Path(__file__).parents[2] / "docs" / "examples" / "liquid_study_device"
+SOURCES = Path("src", "liquid_study_example")
+COMPILER = shutil.which("cc")
+PATIENCE_S = 10.0
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(COMPILER is None, reason="no C compiler ('cc') is installed"),
+    pytest.mark.skipif(sys.platform == "win32", reason="the template's stand-in for a maker's library is POSIX"),
+]
+
+OFFSETS = """
+#include <stddef.h>
+#include <stdio.h>
+#include "liquid_study_device.h"
+#define FIELD(type, name) printf("\\"%s\\": [%zu, %zu]", #name, offsetof(type, name), sizeof(((type *)0)->name))
+int main(void) {{
+    printf("{{\\"reading\\": {{"); {reading}
+    printf("}}, \\"command\\": {{"); {command}
+    printf("}}, \\"sizes\\": [%zu, %zu]", sizeof(liquid_study_reading), sizeof(liquid_study_command));
+    printf(", \\"constants\\": {{");
+    {constants}
+    printf("}}}}\\n");
+    return 0;
+}}
+"""
+
+
+def printed(names: tuple[str, ...], of: str) -> str:
+    return ' printf(", "); '.join(f"FIELD({of}, {name});" for name in names)
+
+
+def test_header_and_numpy_records_have_the_same_offsets_sizes_and_constants(tmp_path: Path) -> None:
+    from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
+
+    constants = {
+        "CONTRACT_VERSION": layout.CONTRACT_VERSION,
+        "READ_NEW": READ_NEW,
+        "READ_NOTHING_NEW": READ_NOTHING_NEW,
+        "READ_LOST": READ_LOST,
+        "BUTTON_STOP": layout.BUTTON_STOP,
+        **{name: value for name, value in vars(layout).items() if name.startswith("MEASURED_")},
+    }
+    records = {"reading": layout.READING, "command": layout.COMMAND}
+    text = OFFSETS.format(
+        **{name: printed(dtype.names, f"liquid_study_{name}") for name, dtype in records.items()},
+        constants=' printf(", "); '.join(f'printf("\\"{name}\\": %d", LIQUID_STUDY_{name});' for name in constants),
+    )
+    (tmp_path / "offsets.c").write_text(text)
+    program = tmp_path / "offsets"
+    include = f"-I{TEMPLATE / SOURCES}"
+    subprocess.run(
+        [COMPILER, "-std=c11", "-Wall", "-Werror", include, program.with_suffix(".c"), "-o", program], check=True
+    )
+    found = json.loads(subprocess.run([program], capture_output=True, text=True, check=True).stdout)
+    for name, dtype in records.items():
+        assert found[name] == {
+            field: [dtype.fields[field][1], dtype.fields[field][0].itemsize] for field in dtype.names
+        }
+    assert found["sizes"] == [layout.READING.itemsize, layout.COMMAND.itemsize]
+    assert found["constants"] == constants
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the built template's modules, with the metadata of an installed package."""
+    if importlib.util.find_spec("setuptools") is None:
+        pytest.skip("setuptools, which builds the template, is not installed")
+    folder = tmp_path_factory.mktemp("template") / "package"
+    shutil.copytree(TEMPLATE, folder)
+    build = [sys.executable, "-W", "ignore", "setup.py", "-q", "build_ext", "--inplace"]
+    subprocess.run(build, cwd=folder, check=True, capture_output=True)
+    project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
+    metadata = folder / "src" / f"liquid_study_example-{project['version']}.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+    )
+    points = project["entry-points"]["liquid_study.devices"]
+    lines = "".join(f"{name} = {value}\n" for name, value in points.items())
+    (metadata / "entry_points.txt").write_text(f"[liquid_study.devices]\n{lines}")
+    return folder / "src"
+
+
+@pytest.fixture
+def installed(built: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.syspath_prepend(built)
+    discover.cache_clear()
+    yield
+    discover.cache_clear()
+
+
+def maker_force_n(loaded: ctypes.CDLL) -> list[float]:
+    """Return what the motors give."""
+    force = (ctypes.c_double * 3)()
+    loaded.maker_force_now(force)
+    return list(force)
+
+
+def until(reached, what: str) -> None:
+    began = time.monotonic()
+    while not reached():
+        assert time.monotonic() - began < PATIENCE_S, what
+        time.sleep(0.005)
+
+
+@pytest.mark.usefixtures("installed")
+class TestTemplate:
+    def test_is_found_by_its_entry_points(self):
+        found = {one.name: one for one in backends()}
+        assert {"example-direct", "example-mailbox"} <= set(found)
+        assert all(found[name].why == "" for name in ("example-direct", "example-mailbox"))
+
+    @needs_servo
+    @pytest.mark.parametrize(("name", "delays"), [("example-direct", {0}), ("example-mailbox", {1, 2, 3, 4})])
+    def test_runs_in_the_servo_and_ends_in_zero_force(self, name: str, delays: set[int]):
+        from study_app.haptics.runtime.servo import Servo
+        from tests.haptics.scenes import HONEY
+
+        with open_device(name) as device:
+            from liquid_study_example.driver import library
+
+            servo = Servo(device)
+            servo.start()
+            servo.load(HONEY)
+            reader = servo.telemetry.reader()
+            until(lambda: servo.telemetry.written[0] >= 1500, "the servo does not tick")
+            samples = reader.read()
+            assert np.abs(maker_force_n(library())).max() > 0.0
+            servo.stop()
+            assert maker_force_n(library()) == [0.0, 0.0, 0.0]
+        own = samples[(samples.fresh == 1) & (samples.scene == servo.serial)][100:]
+        assert len(own) > 500
+        assert set(own.delay_ticks.tolist()) <= delays
+        position_m, velocity_mps = own.position_m, own.device_velocity_mps
+        assert np.ptp(position_m[:, 0]) > 0.01  # the maker's y is the hand's x
+        assert np.ptp(position_m[:, 1:], axis=0).max() < 1e-3
+        moved_mps = np.gradient(position_m[:, 0], own.device_time_ns * 1e-9)
+        assert np.abs(moved_mps - velocity_mps[:, 0])[1:-1].max() < 0.01
+        power_w = (own.device_force_n * velocity_mps).sum(axis=1)
+        assert power_w.mean() < 0.0
+
+    @needs_servo
+    @pytest.mark.parametrize("name", ["example-direct", "example-mailbox"])
+    def test_pulled_cable_ends_the_servo(self, name: str):
+        from study_app.haptics.runtime.servo import Servo
+
+        with open_device(name) as device:
+            from liquid_study_example.driver import library
+
+            servo = Servo(device)
+            servo.start()
+            until(lambda: servo.telemetry.written[0] >= 20, "the servo does not tick")
+            library().maker_pull_cable()
+            until(lambda: servo.fault is not None, "the servo goes on without its device")
+            with pytest.raises(DeviceLost, match="stopped responding"):
+                servo.check()
+            servo.stop()
+        assert maker_force_n(library()) == [0.0, 0.0, 0.0]
+
+    @pytest.mark.parametrize("name", ["example-direct", "example-mailbox"])
+    @pytest.mark.parametrize(
+        ("asked_n", "sent_n"),
+        [((3.0, 0.0, 4.0), (1.2, 0.0, 1.6)), ((np.nan, 0.0, 1.0), (0.0, 0.0, 0.0)), ((0.5, 1.0, 0.0), (0.5, 1.0, 0.0))],
+    )
+    def test_force_is_limited_mapped_and_reported(self, name: str, asked_n, sent_n):
+        with open_device(name, force_limit_n=2.0) as device:
+            from liquid_study_example.driver import library
+
+            command = layout.new_command()
+            command[0].force_n = command[0].sent_n = asked_n
+            write = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_ssize_t, ctypes.c_ssize_t)(device.write.address)
+            assert write(device.context, command.ctypes.data) == 0
+            assert command[0].sent_n.tolist() == pytest.approx(sent_n)
+            x_n, y_n, z_n = sent_n
+            if any(sent_n):
+                until(lambda: maker_force_n(library()) == pytest.approx([z_n, x_n, y_n]), "the force is not sent")
+
+    def test_force_ends_where_the_servo_is_silent(self):
+        """The library's own thread goes on without the servo: a hang of ours must not hold a force."""
+        with open_device("example-mailbox") as device:
+            from liquid_study_example.driver import library
+
+            command = layout.new_command()
+            command[0].force_n = command[0].sent_n = (1.0, 0.0, 0.0)
+            write = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_ssize_t, ctypes.c_ssize_t)(device.write.address)
+            write(device.context, command.ctypes.data)
+            until(lambda: any(maker_force_n(library())), "the force is not sent")
+            until(lambda: not any(maker_force_n(library())), "the force goes on")
