@@ -1,4 +1,4 @@
-"""The commands about devices: what is connected, what is wrong with it, how strong a Falcon is, and emulating one."""
+"""The commands about devices: what is connected, what is wrong with it, its measurement, how strong a Falcon is."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from datetime import date
 from math import degrees
 from pathlib import Path
 from random import Random
@@ -19,8 +20,11 @@ import click
 
 from study_app.cli.device_options import TakesDeviceOptions, given
 from study_app.cli.options import EXIT_FOUND
+from study_app.errors import DeviceError
 
 if TYPE_CHECKING:
+    from study_app.devices.bench.protocol import Ask as AskOperator
+    from study_app.devices.bench.protocol import Found
     from study_app.devices.falcon.device import FalconDevice
     from study_app.devices.falcon.doctor.weighing import Ask, Notes
     from study_app.devices.falcon.emulator.emulator import Emulator
@@ -35,7 +39,7 @@ DEVICE = click.option("--device", "name", default="falcon", show_default=True, m
 @click.group(invoke_without_command=True)
 @click.pass_context
 def devices(context: click.Context) -> None:
-    """List the devices; examine one; calibrate a Falcon."""
+    """List the devices; examine or measure one; calibrate a Falcon."""
     if context.invoked_subcommand is None:
         context.invoke(list_devices)
 
@@ -127,13 +131,73 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
         click.echo(f"Kept in {calibration.save(serial or '', found)}.")
 
 
+@devices.command(cls=TakesDeviceOptions)
+@click.argument("name")
+@click.option("--to", type=click.Path(path_type=Path), metavar="FOLDER", help="Default: bench-NAME in this folder.")
+def bench(name: str, to: Path | None, **device_options: str | Path | None) -> None:
+    """Measure a device in ten minutes: timing, noise, mass, friction, force on a scale, stable damping.
+
+    Stay within reach of its power switch: the handle moves by itself, with at most 4 N. Enter, Ctrl-C and the handle's
+    button 4 end the force. The report (bench.md, bench.json) can be sent to others; receipts of later sessions on this
+    machine record what was measured.
+    """
+    from study_app.devices.registry import check_options, descriptor_of
+
+    descriptor, options = descriptor_of(name), given(device_options)
+    check_options(name, options)
+    if descriptor.kind == "seen":
+        raise DeviceError(
+            f"device '{name}' has no force to measure: see 'liquid-study devices list' for those that have"
+        )
+    click.echo(_PREPARING)
+    from study_app.devices.bench.protocol import run_bench
+    from study_app.devices.bench.simulated_operator import asks_hand
+    from study_app.devices.registry import open_device
+    from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock
+
+    folder = to if to is not None else Path(f"bench-{descriptor.name}")
+    folder.mkdir(parents=True, exist_ok=True)
+    with open_device(name, options=options, progress=click.echo) as device:
+        simulated = descriptor.moves_by_itself
+        found = run_bench(
+            device,
+            asks_hand(device, click.echo) if simulated else _ask_operator(Terminal(sys.stdin.fileno())),
+            progress=click.echo,
+            clock=VirtualClock() if simulated else SystemClock(),
+        )
+    _keep_bench(found, folder, simulated=descriptor.simulated)
+
+
+def _ask_operator(terminal: Terminal) -> AskOperator:
+    """Return what asks at the terminal; only "let-go" is answered by Enter alone."""
+    return lambda kind, words: terminal.ask(kind if kind == "let-go" else "reading", words)
+
+
+def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
+    """Write the report, and keep the numbers in this machine's settings where the device is a real one."""
+    from study_app.devices.bench.report import as_json, as_markdown, kept
+    from study_app.store import workstation
+    from study_app.store.atomic import write_file
+
+    day = date.today().isoformat()
+    text = as_markdown(found, day)
+    for name, content in (("bench.md", text), ("bench.json", as_json(found, day))):
+        write_file(folder / name, content.encode())
+    click.echo(f"\n{text}\nWritten: {folder / 'bench.md'}, {folder / 'bench.json'}")
+    if simulated:
+        click.echo("The device is simulated: its measurements are not kept for receipts.")
+        return
+    bench = workstation.DeviceBench.model_validate(kept(found, day))
+    workstation.save(workstation.load_or_default()[0].with_bench(bench))
+    click.echo("Kept in this machine's settings: receipts of its sessions record it.")
+
+
 def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:
     """Return the Falcon, not yet open, and the emulator behind it, if there is one."""
     from study_app.devices.falcon.device import FalconDevice
     from study_app.devices.falcon.emulated import EmulatedFalcon
     from study_app.devices.falcon.emulator.emulator import Emulator
     from study_app.devices.registry import descriptor_of
-    from study_app.errors import DeviceError
 
     kind = descriptor_of(name).name
     if not kind.startswith("falcon"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from study_app.protocol.model import Protocol
 from study_app.session.masking import Masking
 from study_app.session.preflight import Facts, Screen
 from study_app.session.request import NewSession, check_row
+from study_app.store import workstation
 from study_app.store.blinded.allocation import check_session
 from study_app.store.blinded.blinding import check_conditions
 from study_app.store.clock import SessionClock
@@ -90,7 +91,7 @@ def open_store(
             protocol,
             source,
             operator=chosen.operator,
-            device=rig.described,
+            device=with_bench(rig.described),
             screens=screens,
             motors_masked=None if masking is None else masking.entry,
             now_ns=rig.servo.now_ns,
@@ -101,7 +102,7 @@ def open_store(
         seed=chosen.seed,
         operator=chosen.operator,
         language=chosen.language,
-        device=rig.described,
+        device=with_bench(rig.described),
         screens=screens,
         simulated=descriptor_of(chosen.device).simulated,
         pilot=chosen.pilot,
@@ -110,3 +111,9 @@ def open_store(
         row_of=chosen.row_of,
     )
     return begin(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))
+
+
+def with_bench(described: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a receipt says of a device, with what ``devices bench`` measured of it on this machine, if it did."""
+    bench = workstation.load_or_default()[0].bench_of(described)
+    return {**described} if bench is None else {**described, "bench": bench.entry}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -35,6 +35,7 @@ REMEMBERED_OPTIONS: Final = ("firmware",)
 OFFSET_MS: Final = (0.0, 500.0)
 SPREAD_MS: Final = (0.0, 200.0)
 Place = Annotated[str, Field(pattern=r"^[^\x00]+$")]
+OfAxes = Annotated[tuple[float, float, float], Field(strict=False)]
 How = Literal["photodiode", "high-speed camera", "data sheet"]
 
 
@@ -55,6 +56,30 @@ class DisplayOffset(_Strict):
     screen: str = ""
 
 
+class DeviceBench(_Strict):
+    """What a bench measured of a device, on the day ``measured``; of x, y and z.
+
+    ``mass_kg``, ``damping_nspm`` and ``friction_n`` are the device's own, ``stable_nspm`` the greatest stable damping,
+    ``delay_ms`` how late a force acts, ``gain`` newtons on a scale for each newton sent (None without a scale). A
+    device is known by ``name`` and ``serial``, "" where it has none.
+    """
+
+    name: Annotated[str, Field(pattern=rf"^{NAME_PATTERN}$")]
+    serial: str = ""
+    measured: str
+    mass_kg: OfAxes
+    damping_nspm: OfAxes
+    friction_n: OfAxes
+    delay_ms: OfAxes
+    stable_nspm: OfAxes
+    gain: float | None = None
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """What a receipt records of it."""
+        return self.model_dump(mode="json", exclude={"name", "serial"})
+
+
 class MachineSettings(_Strict):
     """What this machine is like.
 
@@ -62,8 +87,8 @@ class MachineSettings(_Strict):
     ``viewing_distance_mm`` and ``screen_width_mm`` are None until they are measured. ``firmware`` is the file
     of a device's program, ``workspace`` the folder of protocols and results (None: not chosen: `study_app.workspace`);
     ``recent`` are the protocol files outside it that were opened last, newest first; ``operator`` are the initials that
-    were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at. Whether ``device`` is
-    known is for those to say who open it.
+    were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at; ``benches`` are the
+    latest measurements of devices. Whether ``device`` is known is for those to say who open it.
     """
 
     screen: str = ""
@@ -79,6 +104,7 @@ class MachineSettings(_Strict):
     sound: bool = False
     photodiode: bool = True
     operator: Annotated[str, Field(max_length=40)] = ""
+    benches: Annotated[tuple[DeviceBench, ...], Field(strict=False)] = ()
 
     @property
     def device_options(self) -> dict[str, Path]:
@@ -93,6 +119,16 @@ class MachineSettings(_Strict):
         name = str(protocol.absolute())
         others = (other for other in self.recent if other != name)
         return self.model_copy(update={"recent": (name, *others)[:MOST_RECENT]})
+
+    def with_bench(self, bench: DeviceBench) -> MachineSettings:
+        """Return the settings with this measurement in place of an earlier one of the same device."""
+        others = (one for one in self.benches if (one.name, one.serial) != (bench.name, bench.serial))
+        return self.model_copy(update={"benches": (bench, *others)})
+
+    def bench_of(self, described: Mapping[str, Any]) -> DeviceBench | None:
+        """Return the measurement of a device by what it says of itself; None where it was not measured."""
+        own = described.get("name"), described.get("serial") or ""
+        return next((one for one in self.benches if (one.name, one.serial) == own), None)
 
     def screen_among(self, names: Sequence[str]) -> int:
         """Return which of the screens with these names is the participant's, from 1; the last where it is not there."""

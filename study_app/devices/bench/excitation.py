@@ -1,0 +1,280 @@
+"""The forces of a bench protocol, computed between servo and device in the servo's own loop.
+
+The servo presents no liquid; `BenchDriver` stands between it and the device, and adds a force to its zero: a spring to
+a place, a constant push, a chirp, a damper. A write that no reading came before is zero: all ways out of the servo end
+with one. The force ends at once where the handle oscillates or moves too far, where its stop button is pressed, and
+where device or host are silent; then it stays zero until the next excitation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.haptics.kernels.c_functions import (
+    READ,
+    READ_LOST,
+    READ_NEW,
+    WRITE,
+    Driver,
+    c_function,
+    call_at,
+    record_at,
+)
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.vector import clear, copy, norm, square_distance
+from study_app.haptics.model.layout import BUTTON_STOP, COMMAND, READING, records
+
+RUNNING, OSCILLATES, MOVED, SILENT_DEVICE, SILENT_HOST, STOP_BUTTON = range(6)
+ENDED: Final = {
+    OSCILLATES: "the handle oscillates",
+    MOVED: "the handle moved too far",
+    SILENT_DEVICE: "the device reports no new position",
+    SILENT_HOST: "the program did not respond",
+    STOP_BUTTON: "the stop button was pressed",
+}
+
+EWMA: Final = 0.1
+"""Weight of the velocity of spring and damper for differences over 1 ms: that of the servo's `ewma`."""
+PACE_MPS: Final = 0.03
+PUSH_NPS: Final = 2.0
+SILENT_TICKS: Final = 20
+SLOW_S: Final = 8e-3  # a first-order filter of 20 Hz: what is above counts as oscillation
+SHAKE_S: Final = 0.1
+
+EXCITATION = np.dtype(
+    [
+        # the device behind
+        ("context", np.intp),
+        ("read", np.intp),
+        ("write", np.intp),
+        # written by the host
+        ("armed", np.int64),  # 1: forces are sent
+        ("alive_ns", np.int64),  # until then the host has said that it lives, on the servo's clock
+        ("limit_n", np.float64),
+        ("stiffness_npm", np.float64),
+        ("damping_nspm", np.float64),  # of the spring
+        ("integral_per_s", np.float64),  # by how much a second the spring takes over what holds it off
+        ("centre_m", np.float64, (3,)),
+        ("push_n", np.float64, (3,)),
+        ("axis", np.int64),  # of the chirp
+        ("wave_n", np.float64),
+        ("from_hz", np.float64),
+        ("hz_per_s", np.float64),
+        ("rise_nspm_per_s", np.float64),  # how fast the damper grows
+        ("most_nspm", np.float64),
+        ("shake_limit_n", np.float64),  # the greatest effective force of the damper above 20 Hz; 0: any
+        ("reach_m", np.float64),  # how far it may move from where it was; 0: anywhere
+        # of the loop
+        ("ended", np.int64),  # RUNNING, or why it ended
+        ("started", np.int64),
+        ("pending", np.int64),  # 1 between a reading and its write
+        ("silent", np.int64),  # readings without a new position in a row
+        ("now_ns", np.int64),
+        ("new_ns", np.int64),  # when the last new position was read
+        ("position_m", np.float64, (3,)),
+        ("from_m", np.float64, (3,)),  # where it was when this excitation began
+        ("velocity_mps", np.float64, (3,)),
+        ("aim_m", np.float64, (3,)),  # of the spring, on its way to the centre
+        ("bias_n", np.float64, (3,)),
+        ("pushed_n", np.float64, (3,)),
+        ("wave_s", np.float64),
+        ("damper_nspm", np.float64),
+        ("slow_n", np.float64, (3,)),  # the damper's force below 20 Hz
+        ("shake_n2", np.float64),  # mean square of the rest
+        ("force_n", np.float64, (3,)),
+    ],
+    align=True,
+)
+
+_excitation_at = record_at(EXCITATION)
+_reading_at = record_at(READING)
+_command_at = record_at(COMMAND)
+_inner_read, _inner_write = call_at(READ), call_at(WRITE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Excitation:
+    """What acts on the handle.
+
+    Attributes
+    ----------
+    stiffness_npm, damping_nspm, integral_per_s, centre_m : the spring to a place
+    push_n : the constant force, reached at 2 N/s
+    axis, wave_n, from_hz, hz_per_s : the chirp; -1: none
+    rise_nspm_per_s, most_nspm : the damper
+    shake_limit_n : the greatest effective force of the damper above 20 Hz; 0: any
+    reach_m : how far the handle may move from where it was; 0: anywhere
+    """
+
+    stiffness_npm: float = 0.0
+    damping_nspm: float = 0.0
+    integral_per_s: float = 0.0
+    centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    push_n: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axis: int = -1
+    wave_n: float = 0.0
+    from_hz: float = 0.0
+    hz_per_s: float = 0.0
+    rise_nspm_per_s: float = 0.0
+    most_nspm: float = 0.0
+    shake_limit_n: float = 0.0
+    reach_m: float = 0.0
+
+
+class BenchDriver:
+    """A device between the servo and ``inner``; both must live as long as the servo ticks.
+
+    Parameters
+    ----------
+    inner : the device that is measured, opened
+    limit_n : the greatest force of an excitation [N]
+    """
+
+    def __init__(self, inner: Driver, limit_n: float) -> None:
+        self.name = inner.name
+        self.force_limit_n = inner.force_limit_n
+        self.dynamics = inner.dynamics
+        self._inner = inner
+        self._memory = records(EXCITATION, 1)
+        self.state = self._memory[0]
+        self.state.context, self.state.read, self.state.write = inner.context, inner.read.address, inner.write.address
+        self.state.limit_n = limit_n
+        self.context = int(self._memory.ctypes.data)
+        self.read, self.write = _functions()
+
+    def excite(self, what: Excitation) -> None:
+        """Let this act from the next reading on; a spring begins where the handle is, and keeps what it holds up."""
+        state = self.state
+        state.armed = 0
+        held = state.stiffness_npm > 0.0 and what.stiffness_npm > 0.0 and state.ended == RUNNING
+        for name in Excitation.__slots__:
+            state[name] = getattr(what, name)
+        state.wave_s = state.damper_nspm = state.shake_n2 = 0.0
+        state.slow_n, state.from_m = 0.0, state.position_m
+        state.ended = RUNNING
+        if not held:
+            state.aim_m, state.bias_n, state.pushed_n = state.position_m, 0.0, 0.0
+        state.armed = 1
+
+    def end(self) -> None:
+        """Send zero force from now on, until the next excitation."""
+        self.state.armed = 0
+        self.state.ended = RUNNING
+
+
+@cache
+def _functions() -> tuple[Any, Any]:
+    return c_function(READ, _read), c_function(WRITE, _write)
+
+
+def _read(context: int, now_ns: int, reading: int) -> int:
+    bench = _excitation_at(context)
+    answer: int = _inner_read(bench.read, bench.context, now_ns, reading)
+    elapsed_s = (now_ns - bench.now_ns) * 1e-9 if bench.started != 0 else 0.0
+    bench.now_ns = now_ns
+    if answer == READ_LOST:
+        bench.armed = 0
+        return answer
+    out = _reading_at(reading)
+    if answer == READ_NEW:
+        _see(bench, out.position_m, now_ns)
+    else:
+        bench.silent += 1
+    _judge(bench, out.buttons)
+    _excite(bench, elapsed_s)
+    bench.pending = 1
+    return answer
+
+
+def _write(context: int, command: int) -> int:
+    bench, asked = _excitation_at(context), _command_at(command)
+    if bench.pending != 0 and bench.armed != 0 and bench.ended == RUNNING:
+        copy(bench.force_n, asked.force_n)
+    else:
+        clear(asked.force_n)
+    bench.pending = 0
+    copy(asked.force_n, asked.sent_n)
+    answer: int = _inner_write(bench.write, bench.context, command)
+    clear(asked.force_n)  # what the servo asked for: it then records what was sent instead
+    return answer
+
+
+@kernel
+def _see(bench: Any, position_m: Any, now_ns: int) -> None:
+    """Take a new position into the velocity."""
+    interval_s = (now_ns - bench.new_ns) * 1e-9
+    weight = 1.0 - (1.0 - EWMA) ** (interval_s * 1e3)
+    for axis in range(3):
+        if bench.started == 0 or interval_s <= 0.0:
+            bench.velocity_mps[axis] = 0.0
+        else:
+            moved_mps = (position_m[axis] - bench.position_m[axis]) / interval_s
+            bench.velocity_mps[axis] += weight * (moved_mps - bench.velocity_mps[axis])
+        bench.position_m[axis] = position_m[axis]
+    bench.new_ns = now_ns
+    bench.silent = 0
+    bench.started = 1
+
+
+@kernel
+def _judge(bench: Any, buttons: int) -> None:
+    """End the excitation where something is wrong."""
+    if bench.ended != RUNNING or bench.armed == 0:
+        return
+    if buttons & BUTTON_STOP:
+        bench.ended = STOP_BUTTON
+    elif bench.now_ns > bench.alive_ns:
+        bench.ended = SILENT_HOST
+    elif bench.silent > SILENT_TICKS:
+        bench.ended = SILENT_DEVICE
+    elif bench.reach_m > 0.0 and square_distance(bench.position_m, bench.from_m) > bench.reach_m * bench.reach_m:
+        bench.ended = MOVED
+    elif bench.shake_limit_n > 0.0 and bench.shake_n2 > bench.shake_limit_n * bench.shake_limit_n:
+        bench.ended = OSCILLATES
+
+
+@kernel
+def _excite(bench: Any, elapsed_s: float) -> None:
+    """Compute the force of the next write."""
+    wave_n = 0.0
+    if bench.wave_n > 0.0:
+        bench.wave_s += elapsed_s
+        turns = (bench.from_hz + 0.5 * bench.hz_per_s * bench.wave_s) * bench.wave_s
+        wave_n = bench.wave_n * math.sin(2.0 * math.pi * turns)
+    bench.damper_nspm = min(bench.damper_nspm + bench.rise_nspm_per_s * elapsed_s, bench.most_nspm)
+    shaken_n2 = 0.0
+    for axis in range(3):
+        bench.aim_m[axis] += _within(bench.centre_m[axis] - bench.aim_m[axis], PACE_MPS * elapsed_s)
+        off_m = bench.aim_m[axis] - bench.position_m[axis]
+        spring_n = bench.stiffness_npm * off_m
+        bench.bias_n[axis] += bench.integral_per_s * elapsed_s * spring_n
+        bench.bias_n[axis] = _within(bench.bias_n[axis], 0.5 * bench.limit_n)
+        bench.pushed_n[axis] += _within(bench.push_n[axis] - bench.pushed_n[axis], PUSH_NPS * elapsed_s)
+        damper_n = -bench.damper_nspm * bench.velocity_mps[axis]
+        bench.slow_n[axis] += elapsed_s / (elapsed_s + SLOW_S) * (damper_n - bench.slow_n[axis])
+        shaken_n2 += (damper_n - bench.slow_n[axis]) ** 2
+        bench.force_n[axis] = (
+            spring_n
+            - bench.damping_nspm * bench.velocity_mps[axis]
+            + bench.bias_n[axis]
+            + bench.pushed_n[axis]
+            + damper_n
+            + (wave_n if axis == bench.axis else 0.0)
+        )
+    bench.shake_n2 += elapsed_s / (elapsed_s + SHAKE_S) * (shaken_n2 - bench.shake_n2)
+    size_n = norm(bench.force_n)
+    if not math.isfinite(size_n):
+        clear(bench.force_n)
+    elif size_n > bench.limit_n:
+        for axis in range(3):
+            bench.force_n[axis] *= bench.limit_n / size_n
+
+
+@kernel
+def _within(value: float, most: float) -> float:
+    return min(max(value, -most), most)

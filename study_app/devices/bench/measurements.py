@@ -1,0 +1,246 @@
+"""What the samples of a bench say: regularity, noise, mass and friction, delay, gain of the force."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.haptics.runtime.telemetry import timing
+
+Floats = NDArray[np.float64]
+
+GRAVITY_MPS2: Final = 9.80665
+SIGMA_S: Final = 4e-3
+"""Width of the Gaussian that positions and forces are smoothed with alike: 40 Hz pass by half."""
+SLOW_MPS: Final = 1e-3
+"""Speed at which friction is taken as three quarters of what it is in motion."""
+MOST_DELAY_S: Final = 8e-3
+_STEP_S: Final = 0.1e-3
+_REACH: Final = 5  # widths of the Gaussian on either side
+
+
+class Regularity(NamedTuple):
+    """How regularly the loop ran with the device: see `regularity`."""
+
+    ticks: int
+    lateness_ms: tuple[float, float, float]
+    busy_ms: tuple[float, float, float]
+    new_share: float
+    longest_gap_ms: float
+    delay_ticks: tuple[int, int]
+
+
+class Noise(NamedTuple):
+    """Positions of a handle at rest: see `noise`."""
+
+    position_um: tuple[float, float, float]
+    peak_um: tuple[float, float, float]
+    velocity_mmps: float
+    drift_um: float
+
+
+class Motion(NamedTuple):
+    """What an axis is to a force: mass [kg], damping [N·s/m], Coulomb friction [N], delay [ms], variance explained."""
+
+    mass_kg: float
+    damping_nspm: float
+    friction_n: float
+    delay_ms: float
+    explained: float
+
+
+class Gain(NamedTuple):
+    """Force of a scale over the force that was sent: slope, offset [N], greatest residual [N], readings."""
+
+    gain: float
+    offset_n: float
+    residual_n: float
+    readings: int
+
+
+def regularity(samples: Any, rate_hz: float) -> Regularity:
+    """Return how regularly the loop ran.
+
+    Parameters
+    ----------
+    samples : (n,) recarray
+        Of ``layout.SAMPLE``.
+    rate_hz : float
+        Nominal ticks a second.
+
+    Returns
+    -------
+    Regularity
+        Lateness and duration of a tick (median, 99 %, greatest) [ms], share of ticks with a new position, longest time
+        between two new positions [ms], least and greatest delay [ticks].
+    """
+    new_ns = samples.time_ns[samples.fresh == 1]
+    return Regularity(
+        timing(samples, rate_hz).ticks,
+        _spread(samples.lateness_ns * 1e-6),
+        _spread(samples.busy_ns * 1e-6),
+        float((samples.fresh == 1).mean()) if len(samples) else 0.0,
+        float(np.diff(new_ns).max(initial=0) * 1e-6),
+        (int(samples.delay_ticks.min(initial=99)), int(samples.delay_ticks.max(initial=0))),
+    )
+
+
+def _spread(values: Floats) -> tuple[float, float, float]:
+    if len(values) == 0:
+        return math.nan, math.nan, math.nan
+    return tuple(float(it) for it in (*np.percentile(values, (50, 99)), values.max()))  # type: ignore[return-value]
+
+
+def noise(samples: Any) -> Noise:
+    """Return the noise of a handle that rests without force.
+
+    Parameters
+    ----------
+    samples : (n,) recarray
+        Of ``layout.SAMPLE``.
+
+    Returns
+    -------
+    Noise
+        Standard deviation and range of each axis about a straight line [µm], standard deviation of the EWMA velocity
+        (weight 0.1) over three axes [mm/s], and how far the handle moved from first to last [µm].
+    """
+    t_s, position_m = _new(samples)
+    line = np.column_stack([np.ones_like(t_s), t_s - t_s.mean()])
+    left_m = position_m - line @ np.linalg.lstsq(line, position_m, rcond=None)[0]
+    velocity_mps, smooth_mps = np.diff(position_m, axis=0) / np.diff(t_s)[:, None], np.zeros(3)
+    smoothed = np.empty_like(velocity_mps)
+    for k, newest_mps in enumerate(velocity_mps):
+        smooth_mps = smooth_mps + 0.1 * (newest_mps - smooth_mps)
+        smoothed[k] = smooth_mps
+    size_mps = float(np.sqrt((smoothed[len(smoothed) // 10 :] ** 2).sum(axis=1).mean()))
+    return Noise(
+        _three(1e6 * left_m.std(axis=0)),
+        _three(1e6 * np.ptp(left_m, axis=0)),
+        1e3 * size_mps,
+        1e6 * float(np.linalg.norm(position_m[-1] - position_m[0])),
+    )
+
+
+def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> Motion:
+    """Fit F(t − d) = m a + b v + f sgn v + k x + c to the forces that were sent along an axis.
+
+    Positions, forces and sgn v are smoothed by the same Gaussian, whose derivatives give v and a; so smoothing favours
+    no term. The delay d is the one of the least residual. Friction and delay are told apart by stretches of different
+    force: the phase that friction causes falls with the speed, that of a delay does not.
+
+    Parameters
+    ----------
+    stretches : sequence of (n,) recarray
+        Of ``layout.SAMPLE``, each without a gap, with the force of an excitation as ``device_force_n``.
+    axis : int
+        0, 1 or 2.
+    rate_hz : float
+        Nominal ticks a second.
+
+    Returns
+    -------
+    Motion
+        What was fitted.
+    """
+    step_s = 1.0 / rate_hz
+    prepared = [_prepared(samples, axis, step_s) for samples in stretches]
+    terms = np.concatenate([one.terms for one in prepared])
+    best: tuple[float, float, Floats, float] | None = None
+    for delay_s in np.arange(0.0, MOST_DELAY_S, _STEP_S):
+        force_n = np.concatenate([one.force_n(float(delay_s)) for one in prepared])
+        found, *_ = np.linalg.lstsq(terms, force_n, rcond=None)
+        left = float(((force_n - terms @ found) ** 2).mean())
+        if best is None or left < best[0]:
+            best = left, float(delay_s), found, float(force_n.var())
+    assert best is not None  # noqa: S101 - there is at least one delay
+    left, delay_s, (mass_kg, damping_nspm, friction_n, *_), variance = best
+    return Motion(
+        float(mass_kg),
+        float(damping_nspm),
+        float(friction_n),
+        1e3 * delay_s,
+        1.0 - left / variance if variance > 0.0 else 0.0,
+    )
+
+
+class _Prepared(NamedTuple):
+    """A stretch for the fit: the smoothed terms, and the forces that were sent, with the middle of their time."""
+
+    terms: Floats
+    sent_s: Floats
+    sent_n: Floats
+    grid_s: Floats
+    bell: Floats
+
+    def force_n(self, delay_s: float) -> Floats:
+        """Return the smoothed force, as it acts so much later than it is written."""
+        force_n = np.convolve(np.interp(self.grid_s - delay_s, self.sent_s, self.sent_n), self.bell, "valid")
+        reach = len(self.bell) // 2
+        return force_n[reach : len(force_n) - reach]
+
+
+def _prepared(samples: Any, axis: int, step_s: float) -> _Prepared:
+    t_s, position_m = _new(samples)
+    grid_s = np.arange(t_s[0], t_s[-1], step_s)
+    x_m = np.interp(grid_s, t_s, position_m[:, axis])
+    bell, *derivatives = _gaussians(step_s)
+    smooth, v_mps, a_mps2 = (np.convolve(x_m - x_m.mean(), kernel, "valid") for kernel in (bell, *derivatives))
+    friction = np.convolve(np.tanh(v_mps / SLOW_MPS), bell, "valid")
+    reach = len(bell) // 2
+    whole = slice(reach, len(smooth) - reach)  # where friction is smoothed like the rest
+    terms = np.column_stack([a_mps2[whole], v_mps[whole], friction, smooth[whole], np.ones_like(friction)])
+    sent_s = (samples.time_ns - samples.time_ns[0]) * 1e-9
+    # A force acts from its write to the next: its middle is half a tick later.
+    return _Prepared(terms, sent_s + 0.5 * step_s, samples.device_force_n[:, axis], grid_s, bell)
+
+
+def gain_of(sent_n: Sequence[float], shown_g: Sequence[float]) -> Gain:
+    """Return the straight line through what a scale showed [g] over the forces that were sent [N].
+
+    Parameters
+    ----------
+    sent_n : sequence of float
+        At least two different forces.
+    shown_g : sequence of float
+        As many readings.
+
+    Returns
+    -------
+    Gain
+        Its slope and offset, and what it leaves.
+    """
+    asked, shown_n = np.asarray(sent_n, float), np.asarray(shown_g, float) * 1e-3 * GRAVITY_MPS2
+    line = np.column_stack([asked, np.ones_like(asked)])
+    (slope, offset_n), *_ = np.linalg.lstsq(line, shown_n, rcond=None)
+    left_n = shown_n - line @ (slope, offset_n)
+    return Gain(float(slope), float(offset_n), float(np.abs(left_n).max()), len(asked))
+
+
+def _new(samples: Any) -> tuple[Floats, Floats]:
+    """Return times [s] and positions (n, 3) [m] of the new samples."""
+    new = samples[samples.fresh == 1]
+    return (new.time_ns - samples.time_ns[0]) * 1e-9, np.array(new.position_m)
+
+
+def _gaussians(step_s: float) -> tuple[Floats, Floats, Floats]:
+    """Return a Gaussian and its first and second derivative, for convolution, exact for 1, t and t²."""
+    reach = math.ceil(_REACH * SIGMA_S / step_s)
+    t_s = step_s * np.arange(-reach, reach + 1)
+    bell = np.exp(-0.5 * (t_s / SIGMA_S) ** 2)
+    bell /= bell.sum()
+    first = -t_s * bell
+    first /= -(first * t_s).sum()
+    second = (t_s**2 - (bell * t_s**2).sum()) * bell
+    second -= second.mean()
+    second /= 0.5 * (second * t_s**2).sum()
+    return bell, first, second
+
+
+def _three(values: Floats) -> tuple[float, float, float]:
+    x, y, z = (float(it) for it in values)
+    return x, y, z

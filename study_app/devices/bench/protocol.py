@@ -1,0 +1,238 @@
+"""The fixed protocol of ten minutes: rest, mass and friction, force against a scale, greatest stable damping."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from study_app.devices.base import Device
+from study_app.devices.bench.excitation import ENDED, OSCILLATES, Excitation
+from study_app.devices.bench.measurements import (
+    Gain,
+    Motion,
+    Noise,
+    Regularity,
+    gain_of,
+    motion_under_force,
+    noise,
+    regularity,
+)
+from study_app.devices.bench.stand import RATE_HZ, Stand
+from study_app.errors import DeviceError
+from study_app.haptics.runtime.clocks.clock import Clock
+
+Ask = Callable[[str, str], Callable[[], str | None]]
+"""(what is asked for: "let-go", "scale", "grams", "damping"; the words) -> a function that returns None until the
+operator has answered, then the answer."""
+
+AXES: Final = "xyz"
+SPRING_NPM: Final = 100.0
+SPRING_NSPM: Final = 6.0
+INTEGRAL_PER_S: Final = 0.7
+WAVE_N: Final = 2.0
+WEAKER: Final = 0.4
+FROM_HZ: Final = 1.5
+TO_HZ: Final = 25.0
+REACH_M: Final = 0.045
+SLIP_M: Final = 0.03
+"""A handle that moves by more while it pushes on a scale has slipped off."""
+MOST_NSPM: Final = 150.0
+SHAKE_N: Final = 0.35
+"""Effective force of the damper above 20 Hz that counts as oscillation. [choice]"""
+DRAW_N: Final = 0.6
+DRAW_HZ: Final = 0.7
+LEVELS_N: Final = (0.0, 1.0, 2.0, 3.0, 1.0)
+_PATIENCE_S: Final = 600.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Durations:
+    """How long each part lasts [s]; the default takes ten minutes with the operator's answers.
+
+    Attributes
+    ----------
+    rest_s : at rest, without force
+    come_s : until the spring holds the handle in the middle
+    wave_s : force on each axis for mass and friction
+    push_s : until the force on the scale is steady
+    damping_s : until the damper has grown to `MOST_NSPM`, on each axis
+    """
+
+    rest_s: float = 120.0
+    come_s: float = 6.0
+    wave_s: float = 30.0
+    push_s: float = 4.0
+    damping_s: float = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class StableDamping:
+    """The greatest damping on an axis [N·s/m] before ``ended``: "oscillation", "operator" or "most"."""
+
+    damping_nspm: float
+    ended: str
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a bench found; None where it was not measured.
+
+    Attributes
+    ----------
+    device : what the device says of itself
+    regularity, noise : at rest
+    motions : of the axes x, y, z
+    gain : of the force downward; None without a scale
+    damping : of the axes x, y, z
+    overruns : deadlines that the servo passed over, in all
+    """
+
+    device: dict[str, Any]
+    regularity: Regularity
+    noise: Noise
+    motions: tuple[Motion, ...]
+    gain: Gain | None
+    damping: tuple[StableDamping, ...]
+    overruns: int
+
+
+def run_bench(
+    device: Device,
+    ask: Ask,
+    *,
+    progress: Callable[[str], object],
+    durations: Durations | None = None,
+    clock: Clock | None = None,
+) -> Found:
+    """Measure an open device; every way out ends with zero force.
+
+    Parameters
+    ----------
+    device : Device
+        Opened.
+    ask : callable
+        Asks the operator.
+    progress : callable
+        Is given what happens, a line at a time.
+    durations : Durations, optional
+        Of the parts.
+    clock : Clock, optional
+        Default: the system's.
+
+    Returns
+    -------
+    Found
+        What was measured.
+
+    Raises
+    ------
+    DeviceError
+        The device was lost, or did what ends a measurement.
+    """
+    lasts = durations or Durations()
+    with Stand(device, clock) as stand:
+        _wait(stand, ask("let-go", "Let go of the handle and keep clear of it until the scale is asked for."))
+        progress(f"At rest, without force: {lasts.rest_s:g} s.")
+        samples, _ = stand.run(lasts.rest_s)
+        regular, still = regularity(samples, RATE_HZ), noise(samples)
+        motions = tuple(_motion(stand, axis, lasts, progress) for axis in range(3))
+        damping = tuple(_damping(stand, axis, lasts, ask, progress) for axis in range(3))
+        gain = _gain(stand, lasts, ask, progress)
+        stand.rest()
+        return Found(device.describe(), regular, still, motions, gain, damping, stand.overruns)
+
+
+def _held(**more: Any) -> Excitation:
+    """Return a spring to the middle, with more."""
+    return Excitation(
+        **{
+            "stiffness_npm": SPRING_NPM,
+            "damping_nspm": SPRING_NSPM,
+            "integral_per_s": INTEGRAL_PER_S,
+            "reach_m": 2 * REACH_M,
+            **more,
+        }
+    )
+
+
+def _motion(stand: Stand, axis: int, lasts: Durations, progress: Callable[[str], object]) -> Motion:
+    """Bring the handle to the middle, move it by a chirp, and fit what it did."""
+    stand.excite(_held())
+    stand.run(lasts.come_s)
+    most_n = min(WAVE_N, stand.limit_n / 2)
+    progress(f"Mass and friction along {AXES[axis]}: {lasts.wave_s:g} s of up to {most_n:.1f} N.")
+    sweep = (TO_HZ - FROM_HZ) / (lasts.wave_s / 2)
+    stretches = []
+    for wave_n in (most_n, WEAKER * most_n):
+        stand.excite(_held(integral_per_s=0.0, axis=axis, wave_n=wave_n, from_hz=FROM_HZ, hz_per_s=sweep))
+        samples, _ = stand.run(lasts.wave_s / 2)
+        stretches.append(samples)
+    stand.rest()
+    return motion_under_force(stretches, axis, RATE_HZ)
+
+
+def _damping(stand: Stand, axis: int, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> StableDamping:
+    """Draw the handle to and fro while the damper grows, until it oscillates, is ended, or reaches its greatest."""
+    stand.excite(_held())
+    stand.run(lasts.come_s)
+    progress(f"Stable damping along {AXES[axis]}: up to {MOST_NSPM:g} N·s/m in {lasts.damping_s:g} s.")
+    answered = ask("damping", "It ends where the handle buzzes; press Enter to end it sooner.")
+    stand.excite(
+        _held(
+            integral_per_s=0.0,
+            axis=axis,
+            wave_n=min(DRAW_N, stand.limit_n / 4),
+            from_hz=DRAW_HZ,
+            rise_nspm_per_s=MOST_NSPM / lasts.damping_s,
+            most_nspm=MOST_NSPM,
+            shake_limit_n=SHAKE_N,
+        )
+    )
+    _, answer = stand.run(lasts.damping_s, answered=answered, may_end=True)
+    reached = stand.damper_nspm
+    ended = stand.ended
+    stand.rest()
+    if ended is None:
+        return StableDamping(reached, "most" if answer is None else "operator")
+    if ended != ENDED[OSCILLATES]:
+        raise DeviceError(f"the bench was ended, since {ended}; the force is zero: check the device, then start again")
+    return StableDamping(reached, "oscillation")
+
+
+def _gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> Gain | None:
+    """Push down on a scale, and ask what it shows."""
+    words = (
+        "Rest the handle on a kitchen scale, near the middle of its range, and set the scale to zero; none: type 'no'."
+    )
+    if _wait(stand, ask("scale", words)).lower().startswith("n"):
+        progress("Force against a scale: left out.")
+        return None
+    sent_n, shown_g = [], []
+    for level_n in LEVELS_N:
+        if level_n > 0.75 * stand.limit_n:
+            continue
+        stand.excite(Excitation(push_n=(0.0, -level_n, 0.0), reach_m=SLIP_M))
+        samples, _ = stand.run(lasts.push_s)
+        answer = _wait(stand, ask("grams", f"{level_n:g} N downward: what does the scale show, in grams?"))
+        shown_g.append(_grams(answer))
+        sent_n.append(-float(samples.device_force_n[-len(samples) // 4 :, 1].mean()))
+    stand.rest()
+    return gain_of(sent_n, shown_g)
+
+
+def _wait(stand: Stand, answered: Callable[[], str | None]) -> str:
+    """Let time pass until the operator has answered."""
+    _, answer = stand.run(_PATIENCE_S, answered=answered)
+    if answer is None:
+        raise DeviceError(f"nothing was answered for {_PATIENCE_S:g} s, so the bench was ended; the force is zero")
+    return answer
+
+
+def _grams(answer: str) -> float:
+    try:
+        return float(answer.replace(",", ".").removesuffix("g").strip())
+    except ValueError:
+        raise DeviceError(
+            f"'{answer}' is no reading of a scale, so the bench was ended: type grams, such as 102"
+        ) from None

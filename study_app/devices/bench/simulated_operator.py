@@ -1,0 +1,38 @@
+"""Answers of a device's own simulated hand to what a bench asks the operator for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from study_app.devices.bench.measurements import GRAVITY_MPS2
+from study_app.devices.bench.protocol import Ask
+
+
+def asks_hand(device: Any, tell: Callable[[str], object]) -> Ask:
+    """Return what asks the hand of a device that moves by itself: it lets go, or is the scale.
+
+    The hand is the device's ``hand``, or the device itself: with ``held`` and the motors' ``force_n``.
+
+    Parameters
+    ----------
+    device : Device
+        A simulated one.
+    tell : callable
+        Is given what is asked for.
+    """
+    hand = getattr(device, "hand", device)
+
+    def ask(kind: str, words: str) -> Callable[[], str | None]:
+        if kind in ("let-go", "scale"):
+            hand.held = kind == "scale"
+            tell(words)
+        if kind == "scale":
+            hand.reach_to(0.0, 0.0, 0.0)
+        if kind == "damping":
+            return lambda: None
+        if kind == "grams":
+            return lambda: f"{-1e3 * float(hand.force_n[1]) / GRAVITY_MPS2:.1f}"
+        return lambda: ""
+
+    return ask

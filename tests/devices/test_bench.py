@@ -1,0 +1,252 @@
+"""`devices bench`: known numbers are found again, and every way out ends in zero force."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.devices.bench import measurements, protocol
+from study_app.devices.bench.measurements import gain_of
+from study_app.devices.bench.report import as_json, as_markdown, kept
+from study_app.errors import DeviceError, DeviceLost
+from study_app.store import workstation
+from tests.compiled import needs_servo
+
+QUICK = protocol.Durations(rest_s=1.0, come_s=3.0, wave_s=12.0, push_s=3.0, damping_s=8.0)
+
+pytestmark = [needs_servo, pytest.mark.slow]
+
+
+def opened(name):
+    from study_app.devices.registry import open_device
+
+    return open_device(name)
+
+
+def bench(device, ask=None, durations=QUICK):
+    from study_app.devices.bench.protocol import run_bench
+    from study_app.devices.bench.simulated_operator import asks_hand
+    from study_app.haptics.runtime.clocks.clock import VirtualClock
+
+    said = []
+    hand = asks_hand(device, said.append)
+    return run_bench(
+        device, ask(hand) if ask else hand, progress=said.append, durations=durations, clock=VirtualClock()
+    )
+
+
+def commanded(device):
+    """Return what the motors were told last: newtons, or a Falcon's motor units."""
+    return np.array(device.held[1] if device.name == "falcon-emulated" else device.force_n)
+
+
+@pytest.fixture(scope="module")
+def found_of():
+    """Return what was found of a device, once."""
+    found = {}
+
+    def measured(name):
+        if name not in found:
+            with opened(name) as device:
+                found[name] = bench(device)
+                assert not commanded(device).any()
+        return found[name]
+
+    return measured
+
+
+@pytest.mark.parametrize(("name", "delay_ms"), [("scripted", 0.0), ("falcon-emulated", 1.0)])
+def test_numbers_of_the_simulated_handle_are_found(found_of, name, delay_ms):
+    found = found_of(name)
+    for motion in found.motions:
+        assert motion.mass_kg == pytest.approx(0.2, rel=0.01)
+        assert motion.damping_nspm == pytest.approx(0.5, abs=0.05)
+        assert motion.friction_n == pytest.approx(0.1, abs=0.01)
+        assert motion.delay_ms == pytest.approx(delay_ms, abs=0.2)
+        assert motion.explained > 0.99
+    assert found.gain.gain == pytest.approx(1.0, abs=0.01)
+    assert found.regularity.new_share == pytest.approx(1.0)
+    assert found.regularity.delay_ticks == (round(delay_ms), round(delay_ms))
+
+
+def test_more_delay_permits_less_damping(found_of):
+    prompt, late = found_of("scripted"), found_of("falcon-emulated")
+    assert {one.ended for one in prompt.damping} == {"most"}
+    assert {one.ended for one in late.damping} == {"oscillation"}
+    assert all(70 < one.damping_nspm < 150 for one in late.damping)
+
+
+def test_report_and_settings_hold_what_was_found(found_of, tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path))
+    found = found_of("falcon-emulated")
+    text, document = as_markdown(found, "2026-11-21"), json.loads(as_json(found, "2026-11-21"))
+    assert re.search(r"\| apparent mass \[kg\] \| 0\.(20|19)\d \|", text)
+    assert "it oscillated" in text
+    assert document["motions"][0]["mass_kg"] == found.motions[0].mass_kg
+    assert document["device"]["serial"] == "EMULATED"
+    assert str(tmp_path) not in text
+    own = workstation.DeviceBench.model_validate(kept(found, "2026-11-21"))
+    workstation.save(workstation.DEFAULTS.with_bench(own).with_bench(own))
+    settings = workstation.load()
+    assert len(settings.benches) == 1
+    assert settings.bench_of(found.device) == own
+    assert settings.bench_of({"name": "falcon-emulated", "serial": "ANOTHER"}) is None
+    from study_app.session.start import with_bench
+
+    assert with_bench(found.device)["bench"]["mass_kg"] == pytest.approx([0.2] * 3, rel=0.01)
+    assert "bench" not in with_bench({"name": "mouse"})
+
+
+@pytest.mark.parametrize("at", ["damping", "grams"])
+@pytest.mark.parametrize("name", ["scripted", "falcon-emulated"])
+def test_interrupt_ends_in_zero_force(name, at):
+    """Ctrl-C while a force acts: in the second that the damper grows, and at the second force on the scale."""
+    forces = []
+
+    def interrupting(hand):
+        asked = []
+
+        def ask(kind, words):
+            asked.append(kind)
+
+            def stop():
+                forces.append(commanded(device))
+                if len(forces) > 1 and forces[-1].any():
+                    raise KeyboardInterrupt
+
+            return stop if kind == at and (at == "damping" or asked.count(at) > 1) else hand(kind, words)
+
+        return ask
+
+    with opened(name) as device:
+        with pytest.raises(KeyboardInterrupt):
+            bench(device, interrupting)
+        assert forces[-1].any()
+        assert not commanded(device).any()
+
+
+def test_key_ends_the_damper_and_no_scale_is_left_out():
+    def keys(hand):
+        def ask(kind, words):
+            return (lambda: "") if kind == "damping" else (lambda: "no") if kind == "scale" else hand(kind, words)
+
+        return ask
+
+    with opened("scripted") as device:
+        found = bench(device, keys)
+        assert {one.ended for one in found.damping} == {"operator"}
+        assert all(one.damping_nspm < 1.0 for one in found.damping)
+        assert found.gain is None
+        assert "Not measured." in as_markdown(found, "2026-11-21")
+
+
+@pytest.mark.parametrize(
+    ("happens", "error", "words"),
+    [
+        (lambda device: device.unplug(), DeviceLost, "stopped responding"),
+        (lambda device: device.press(8), DeviceError, "the stop button was pressed"),
+    ],
+    ids=["unplugged", "stop button"],
+)
+def test_what_happens_to_the_device_ends_the_bench(happens, error, words):
+    def watched(hand):
+        def ask(kind, text):
+            if kind == "damping":
+                happens(device)
+            return hand(kind, text)
+
+        return ask
+
+    with opened("scripted") as device:
+        with pytest.raises(error, match=words):
+            bench(device, watched)
+        assert device.force_n == (0.0, 0.0, 0.0)
+
+
+def test_handle_that_slips_off_the_scale_gets_no_force():
+    def slipping(hand):
+        def ask(kind, words):
+            answer = hand(kind, words)
+            if kind == "scale":
+                device.held = False
+            return answer
+
+        return ask
+
+    with opened("scripted") as device:
+        with pytest.raises(DeviceError, match="the handle moved too far"):
+            bench(device, slipping)
+        assert device.force_n == (0.0, 0.0, 0.0)
+
+
+def test_silent_host_ends_the_force():
+    """A program that hangs keeps no force on the handle."""
+    from study_app.devices.bench.excitation import BenchDriver, Excitation
+    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.servo import Servo
+
+    with opened("scripted") as device:
+        driver = BenchDriver(device, 4.0)
+        servo = Servo(driver, clock=VirtualClock(), elements=1)
+        driver.state.alive_ns = 500_000_000
+        driver.excite(Excitation(push_n=(0.0, -1.0, 0.0)))
+        servo.advance(499)
+        assert device.force_n[1] < -0.9
+        servo.advance(3)
+        assert device.force_n == (0.0, 0.0, 0.0)
+        servo.stop()
+
+
+def test_force_of_an_excitation_never_exceeds_its_limit():
+    from study_app.devices.bench.excitation import BenchDriver, Excitation
+    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.servo import Servo
+
+    with opened("scripted") as device:
+        driver = BenchDriver(device, 2.0)
+        servo = Servo(driver, clock=VirtualClock(), elements=1)
+        reader = servo.telemetry.reader()
+        driver.state.alive_ns = 10**12
+        driver.excite(Excitation(stiffness_npm=5000.0, centre_m=(0.04, 0.04, 0.0), push_n=(0.0, -9.0, 0.0)))
+        servo.advance(3000)
+        sizes = np.linalg.norm(reader.read().device_force_n, axis=1)
+        assert sizes.max() == pytest.approx(2.0, abs=1e-3)
+        servo.stop()
+        assert device.force_n == (0.0, 0.0, 0.0)
+
+
+def test_gain_is_the_slope_of_readings_over_forces():
+    sent_n = (0.0, 1.0, 2.0, 3.0)
+    shown_g = [1e3 * (0.1 + 0.8 * it) / measurements.GRAVITY_MPS2 for it in sent_n]
+    found = gain_of(sent_n, shown_g)
+    assert (found.gain, found.offset_n, found.readings) == (pytest.approx(0.8), pytest.approx(0.1), 4)
+    assert found.residual_n < 1e-12
+
+
+def liquid_study(*words):
+    return CliRunner().invoke(commands, words)
+
+
+def test_command_writes_its_report_and_keeps_nothing_of_a_simulated_device(tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
+    monkeypatch.setattr(protocol, "Durations", lambda: QUICK)
+    done = liquid_study("devices", "bench", "scripted", "--to", str(tmp_path / "report"))
+    assert done.exit_code == 0, done.output
+    assert {path.name for path in (tmp_path / "report").iterdir()} == {"bench.md", "bench.json"}
+    assert "its measurements are not kept" in done.output
+    assert workstation.load().benches == ()
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [(("mouse",), "device 'mouse' has no force to measure"), (("nothing",), "device 'nothing' is not known")],
+)
+def test_device_without_force_is_refused(words, reason):
+    refused = liquid_study("devices", "bench", *words)
+    assert isinstance(refused.exception, DeviceError)
+    assert str(refused.exception).startswith(reason)
