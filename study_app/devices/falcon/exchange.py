@@ -12,8 +12,6 @@ from functools import cache
 from typing import Any, Final
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 
 from study_app.devices.falcon.mechanics.geometry import OUT_STROKE_M, Geometry
 from study_app.devices.falcon.mechanics.kinematics import MECHANISM, REACHED, START_M, angles, forward
@@ -43,6 +41,7 @@ from study_app.haptics.kernels.c_functions import (
     c_function,
     call_at,
     fence,
+    full_fence,
     record_at,
 )
 from study_app.haptics.kernels.compiled import kernel
@@ -161,18 +160,6 @@ _command_at = record_at(COMMAND)
 _transfer = call_at(BULK)
 
 
-def _full_fence(_typing_context: Any) -> Any:
-    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
-        builder.fence("seq_cst")
-        return context.get_dummy_value()
-
-    return types.none(), generate
-
-
-_order_stores_and_loads: Any = intrinsic(_full_fence)
-"""For compiled code: other threads see what was written before it before anything after it is read."""
-
-
 def _offset(field: str) -> int:
     fields = FALCON.fields
     assert fields is not None  # noqa: S101 - it is a record
@@ -226,7 +213,7 @@ def _write(context: int, command: int) -> int:
 def _enter(falcon: Any) -> bool:
     """Return whether the bridge may be called until `_leave`; who closes it sets ``lost``, then reads ``inside``."""
     falcon.inside = 1
-    _order_stores_and_loads()
+    full_fence()
     if falcon.lost != 0:
         falcon.inside = 0
         return False

@@ -125,3 +125,15 @@ def _order_memory(_typing_context: Any) -> Any:
 
 fence: Any = intrinsic(_order_memory)
 """For compiled code: other threads see what was written before it before what is written after it."""
+
+
+def _order_all_memory(_typing_context: Any) -> Any:
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        builder.fence("seq_cst")
+        return context.get_dummy_value()
+
+    return types.none(), generate
+
+
+full_fence: Any = intrinsic(_order_all_memory)
+"""For compiled code: other threads see what was written before it before anything after it is read."""
