@@ -172,9 +172,15 @@ class Servo:
 
     @property
     def fault(self) -> str | None:
-        """Why the servo stopped itself, or hangs, in a sentence; None while it does neither."""
+        """Why the servo stopped itself, or hangs, in a sentence; None while it does neither.
+
+        A device that knows more of the cause says it as its ``failure``.
+        """
         status = int(self.loop.control[0].status)
         reason = _STUCK if status == STATUS_OK and self.loop.stuck else _FAULTS.get(status)
+        if status in {STATUS_DEVICE_LOST, STATUS_STALE_FAULT}:
+            own = getattr(self._device, "failure", None)
+            reason = reason if own is None else f"stopped: {own}"
         return None if reason is None else f"the device '{self._device.name}' {reason}"
 
     @property

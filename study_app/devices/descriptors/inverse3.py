@@ -1,0 +1,86 @@
+"""The Haply Inverse3: behind its maker's Inverse Service, or emulated in this program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, Doctor, OpenRequest, opened
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from study_app.devices.base import Device
+    from study_app.devices.doctor_report import Finding, Report
+
+
+def _open(request: OpenRequest) -> Device:
+    from study_app.devices.inverse3.device import Inverse3Device  # noqa: PLC0415 - the compiler
+
+    return opened(Inverse3Device(request.argument, progress=request.progress, **request.limits))
+
+
+def _open_emulated(request: OpenRequest) -> Device:
+    from study_app.devices.inverse3.emulated import EmulatedInverse3  # noqa: PLC0415 - the compiler
+
+    return opened(EmulatedInverse3(request.random, progress=request.progress, **request.limits))
+
+
+def _probe() -> list[Backend]:
+    from study_app.devices.inverse3.probe import probe  # noqa: PLC0415 - asks the service
+
+    return [probe()]
+
+
+def _probe_emulated() -> list[Backend]:
+    can = "simulated hand; the Inverse3's own driver with an emulated Inverse Service"
+    return [Backend("inverse3-emulated", "the program", READY, can)]
+
+
+def _findings() -> tuple[Finding, ...]:
+    from study_app.devices.inverse3.failures import findings  # noqa: PLC0415 - only where it is examined
+
+    return findings()
+
+
+def _examine(
+    name: str,
+    *,
+    options: Mapping[str, str | Path],
+    faults: Sequence[str] = (),
+    progress: Callable[[str], object],
+) -> Report:
+    from study_app.devices.inverse3.doctor import examine  # noqa: PLC0415 - the compiler
+
+    return examine(name, faults=faults, progress=progress)
+
+
+_DOCTOR: Final = Doctor(findings=_findings, examine=_examine)
+
+DEVICES: Final = (
+    DeviceDescriptor(
+        name="inverse3",
+        title="Haply Inverse3",
+        icon="device",
+        kind="felt",
+        degrees_of_freedom=3,
+        open=_open,
+        probe=_probe,
+        argument="HOST:PORT",
+        motion_shows_force=False,
+        doctor=_DOCTOR,
+    ),
+    DeviceDescriptor(
+        name="inverse3-emulated",
+        title="Emulated Inverse3",
+        icon="fast_forward",
+        kind="simulated",
+        degrees_of_freedom=3,
+        open=_open_emulated,
+        probe=_probe_emulated,
+        moves_by_itself=True,
+        motion_shows_force=False,
+        doctor=_DOCTOR,
+    ),
+)

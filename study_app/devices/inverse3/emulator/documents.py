@@ -1,0 +1,100 @@
+"""The messages of the emulated service, as its documentation shows them.
+
+Written from docs.haply.co: "WebSocket Protocol" 3.5.x, step 1 (inventory) and core rule; "Simulation Channel" 3.5.x
+(a state update has ``state`` and ``status``, a full state ``config``, too); "HTTP" 3.4.x, Devices (``status``, grips).
+Not shown there, so a guess: that a state update has a ``session_id``, and the values of ``control_mode`` but "idle".
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+from typing import Any, Final
+
+DEVICE_ID: Final = "EMU1"
+SLOTS: Final = tuple(f"{name}_{axis}" for name in ("position", "velocity", "force") for axis in "xyz")
+SLOT_WIDTH: Final = 14
+
+_UNIT: Final = {"x": 0, "y": 0, "z": 0}
+FACTORY_CONFIG: Final[dict[str, Any]] = {
+    "type": "inverse3",
+    "port": "EMULATED",
+    "device_info": {"major_version": 7, "minor_version": 4, "id": DEVICE_ID, "device_type": 4, "uuid": "00" * 16},
+    "extended_device_id": "00" * 16,
+    "extended_firmware_version": "00" * 16,
+    "gravity_compensation": {"enabled": True, "scaling_factor": 1.0},
+    "handedness": "right",
+    "streaming_mode": "USB",
+    "torque_scaling": {"enabled": True},
+    "home_return": {"enabled": False},
+    "preset": "defaults",
+    "basis": {"permutation": "XYZ"},
+    "mount": {
+        "position": dict(_UNIT),
+        "rotation": {"w": 1, "x": 0, "y": 0, "z": 0},
+        "scale": {"x": 1, "y": 1, "z": 1},
+    },
+    "filters": {"force_gate": {"gain": 0.3}, "damping": {"scalar": 0.0}},
+}
+STATUS: Final = {"calibrated": True, "in_use": False, "power_supply": True, "ready": True, "started": True}
+LEGACY_STATE: Final[dict[str, Any]] = {
+    "inverse3": {DEVICE_ID: {"config": {"device_info": {"id": DEVICE_ID}}, "state": {}, "status": {}}}
+}
+"""Format 3.0: an object by device id ("Haply Inverse Service" 3.0.x, Devices)."""
+
+
+def config() -> dict[str, Any]:
+    """Return a new configuration with factory values."""
+    return copy.deepcopy(FACTORY_CONFIG)
+
+
+def state_message(
+    status: dict[str, Any], buttons: int, full: dict[str, Any] | None = None, session_id: int = 7
+) -> dict[str, Any]:
+    """Return a state whose numbers are the words of `SLOTS`.
+
+    Parameters
+    ----------
+    status : of the device
+    buttons : of the wireless grip: a is bit 0
+    full : its configuration, for an inventory or a full state
+    session_id : of the connection
+    """
+
+    def vector(name: str) -> dict[str, str]:
+        return {axis: f"{name}_{axis}" for axis in "xyz"}
+
+    angles = {"a0": 0.0, "a1": 0.0, "a2": 0.0}
+    state = {
+        "cursor_position": vector("position"),
+        "cursor_velocity": vector("velocity"),
+        "angular_position": angles,
+        "angular_velocity": angles,
+        "body_orientation": {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0},
+        "current_cursor_force": vector("force"),
+        "current_cursor_position": dict(_UNIT),
+        "current_angular_torques": angles,
+        "current_angular_position": angles,
+        "control_domain": "cartesian",
+        "control_mode": "idle",
+    }
+    device: dict[str, Any] = {"device_id": DEVICE_ID}
+    if full is not None:
+        device["config"] = full
+    grip = {
+        "device_id": "0",
+        "state": {"battery_level": 0.8, "buttons": {name: bool(buttons >> k & 1) for k, name in enumerate("abc")}},
+    }
+    return {"session_id": session_id, "inverse3": [device | {"state": state, "status": status}],
+            "wireless_verse_grip": [grip]}  # fmt: skip
+
+
+def template(message: dict[str, Any]) -> tuple[bytes, list[int]]:
+    """Return a message as text with room for its numbers, and where each of `SLOTS` begins; -1 where it is not."""
+    text = json.dumps(message)
+    for slot in SLOTS:
+        text = text.replace(f'"{slot}"', "#" + slot.ljust(SLOT_WIDTH - 1))
+    places = [text.find(f"#{slot}") for slot in SLOTS]
+    for slot in SLOTS:
+        text = text.replace("#" + slot.ljust(SLOT_WIDTH - 1), "0.0".ljust(SLOT_WIDTH))
+    return text.encode(), places

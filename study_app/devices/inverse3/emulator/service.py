@@ -1,0 +1,289 @@
+"""An emulated Inverse Service with one Inverse3, whose handle a simulated hand holds.
+
+What a session is opened with is read by the standard library's JSON; the commands afterwards are compiled (``stream``).
+Documents: see ``documents``; "Device Configuration" 3.5.x for what ``configure`` takes, "Simulation Channel" 3.5.x for
+``session.force_render_full_state``, "Filters" and "Settings Reference" for the force scale, RFC 6455 §4.2 for the
+handshake.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from random import Random
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.devices.inverse3.emulator.documents import (
+    DEVICE_ID,
+    LEGACY_STATE,
+    STATUS,
+    config,
+    state_message,
+    template,
+)
+from study_app.devices.inverse3.emulator.faults import FAULTS, faulty_bytes
+from study_app.devices.inverse3.emulator.stream import (
+    SERVICE,
+    act,
+    drop,
+    fill,
+    go_on,
+    let_pass,
+    put_bytes,
+    put_frame,
+    rest,
+    stream_functions,
+    take_frames,
+)
+from study_app.devices.scripted import QUANTUM_M, TREMOR_M, new_scripted_handle
+from study_app.devices.simulated.hand_commands import HandOrders
+from study_app.errors import DeviceError
+from study_app.haptics.model.layout import records
+
+STOPS_M: Final = (0.10, 0.10, 0.10)
+_GUID: Final = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
+
+
+class Service(HandOrders):
+    """The emulated service; orders go to the hand at the handle.
+
+    Parameters
+    ----------
+    random : where the hand's tremor is drawn from; None: always the same one
+    workspace_m : half extents of where the hand can be sent [m]
+    tremor_m : amplitude of the tremor's waves [m]
+    quantum_m : one count of the encoders [m]
+
+    Attributes
+    ----------
+    config, status : of the device, as the documentation shows them; may be changed before a client connects
+    force_scale : the setting devices/force_scale
+    """
+
+    def __init__(
+        self,
+        random: Random | None = None,
+        *,
+        workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05),
+        tremor_m: float = TREMOR_M,
+        quantum_m: float = QUANTUM_M,
+    ) -> None:
+        self.memory = records(SERVICE, 1)
+        super().__init__(self.memory[0], workspace_m)
+        self.state.handle = new_scripted_handle(quantum_m)
+        self.state.handle.stop_m = STOPS_M
+        self._tremble(random, tremor_m)
+        self.config = config()
+        self.status = dict(STATUS)
+        self.force_scale: float | None = 1.0
+        self.version = "3.5"
+        self.obeys = True
+        quoted = np.frombuffer(f'"{DEVICE_ID}"'.encode(), np.uint8)
+        self.state.id[: quoted.size] = quoted
+        self.state.id_size = quoted.size
+        self._upgraded = False
+        self._asked = b""
+        self._fault: tuple[str, int] | None = None
+        self.hold(0.0, 0.0, 0.0)
+
+    @property
+    def handle(self) -> int:
+        """What its ``send`` and ``recv`` take."""
+        return int(self.memory.ctypes.data)
+
+    @property
+    def force_n(self) -> tuple[float, float, float]:
+        """The force on the handle [N, hand frame]."""
+        x, y, z = self.state.handle.force_n
+        return float(x), float(y), float(z)
+
+    def follow_clock(self, address: int) -> None:
+        """Let the int64 [ns] at this address be the time; 0: a millisecond a command."""
+        self.state.clock = address
+
+    def press(self, buttons: int) -> None:
+        """Hold down exactly these buttons of the grip: button 1 (a) is bit 0."""
+        super().press(buttons)
+        self._refresh()
+
+    def take(self, fault: str, after: int = 0) -> None:
+        """Have a fault: at once where it concerns opening, else so many commands from now.
+
+        Raises
+        ------
+        DeviceError
+            There is no such fault.
+        """
+        if fault not in FAULTS:
+            raise DeviceError(f"fault '{fault}' is not known; choose of: {', '.join(FAULTS)}")
+        state = self.state
+        if fault in {"version-3.0", "version-3.1"}:
+            self.version = fault.partition("-")[2]
+        elif fault == "not-websocket":
+            self.version = "http"
+        elif fault == "no-device":
+            self.version = "empty"
+        elif fault in {"off", "uncalibrated", "in-use"}:
+            key = {"off": "power_supply", "uncalibrated": "calibrated", "in-use": "in_use"}[fault]
+            self.status[key] = fault == "in-use"
+            self._refresh()
+        elif fault == "gravity-off":
+            self.config["gravity_compensation"]["enabled"] = False
+        elif fault == "disobeys":
+            self.obeys = False
+        elif fault == "force-scale":
+            self.force_scale = 2.0
+        elif fault == "late":
+            state.lag_ns = 30_000_000
+        elif fault == "slow":
+            state.lag_ns = 1_500_000
+        elif fault == "torn":
+            state.portion = 100
+        else:
+            self._fault = (fault, after)
+            if self._upgraded:
+                self._arm()
+
+    def _arm(self) -> None:
+        """Begin the fault of the stream after its commands."""
+        if self._fault is None:
+            return
+        (fault, after), state = self._fault, self.state
+        data = np.frombuffer(faulty_bytes(fault, self._message()), np.uint8)
+        state.faulty[: data.size] = data
+        state.faulty_size = data.size
+        state.silent = int(fault in {"silent", "drops"})
+        state.ends = int(fault in {"drops", "closes"})
+        state.fault_at = state.commands + 1 + after
+
+    def connected(self) -> None:
+        """Begin a connection."""
+        state = self.state
+        for name in ("in_size", "written", "visible", "read", "queue_first", "queue_next", "complex_size", "ended"):
+            setattr(state, name, 0)
+        self._upgraded, self._asked = False, b""
+        self._refresh()
+
+    def take_bytes(self, data: bytes) -> None:
+        """Take what the client sends while its session is opened, or at any time."""
+        state = self.state
+        if not self._upgraded:
+            self._asked += data
+            if b"\r\n\r\n" in self._asked:
+                self._answer_handshake(self._asked)
+            return
+        came = np.frombuffer(data, np.uint8)
+        state.inbox[state.in_size : state.in_size + came.size] = came
+        state.in_size += came.size
+        self.work()
+
+    def give_bytes(self) -> bytes:
+        """Return all that the client may see by now."""
+        state = self.state
+        let_pass(state)
+        places = np.arange(state.read, state.visible) % state.outbox.size
+        state.read = state.visible
+        return bytes(state.outbox[places].tobytes())
+
+    def disconnected(self) -> None:
+        """See the end of the stream: the session is over, and its device idle."""
+        rest(self.state)
+        self.state.ended = 1
+
+    def work(self) -> None:
+        """Answer what waits in the inbox."""
+        take_frames(self.state)
+        while self.state.complex_size:
+            state = self.state
+            text = state.inbox[state.complex_at : state.complex_at + state.complex_size].tobytes()
+            self._answer_message(json.loads(text))
+            drop(state, int(state.complex_end))
+            state.complex_size = 0
+            take_frames(state)
+
+    def _answer_handshake(self, asked: bytes) -> None:
+        """Answer RFC 6455's opening handshake (§4.2.2), then send the inventory."""
+        lines = asked.decode("latin-1").split("\r\n")
+        fields = {name.strip().lower(): value.strip() for name, _, value in (line.partition(":") for line in lines[1:])}
+        if self.version == "http" or fields.get("upgrade", "").lower() != "websocket":
+            self._send_raw(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n")
+            return
+        digest = hashlib.sha1((fields["sec-websocket-key"] + _GUID).encode()).digest()  # noqa: S324 - RFC 6455
+        accept = base64.b64encode(digest).decode()
+        self._send_raw(
+            b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            b"Sec-WebSocket-Accept: %b\r\n\r\n" % accept.encode()
+        )
+        self._upgraded = True
+        self._send(self._inventory())
+
+    def _inventory(self) -> dict[str, Any]:
+        if self.version == "3.0":
+            return LEGACY_STATE
+        message = self._message(full=True)
+        if self.version == "empty":
+            message["inverse3"] = []
+        if self.version == "3.1":
+            for key in ("filters", "preset", "basis", "mount"):
+                del message["inverse3"][0]["config"][key]
+        return message
+
+    def _message(self, *, full: bool = False) -> dict[str, Any]:
+        return state_message(
+            self.status, int(self.state.buttons), json.loads(json.dumps(self.config)) if full else None
+        )
+
+    def _answer_message(self, message: dict[str, Any]) -> None:
+        """Take settings and the command, and answer with a state; with the configuration where that is asked for."""
+        session = message.get("session", {})
+        for entry in message.get("inverse3", []):
+            if entry.get("device_id") == DEVICE_ID:
+                if self.obeys:
+                    self._configure(entry.get("configure", {}), session.get("configure", {}))
+                go_on(self.state)
+                force = entry.get("commands", {}).get("set_cursor_force", {}).get("vector")
+                if force is not None:
+                    act(self.state, float(force["x"]), float(force["y"]), float(force["z"]))
+        self._send(self._message(full="force_render_full_state" in session))
+        if "configure" in session:
+            self._arm()
+
+    def _configure(self, device: dict[str, Any], session: dict[str, Any]) -> None:
+        """Set what "Device Configuration" lists for WebSocket ``configure``."""
+        filters = self.config["filters"]
+        if "preset" in device:
+            self.config["preset"] = device["preset"]["preset"]
+        if "damping" in device:
+            filters["damping"] |= device["damping"]
+        if "force_gate" in device:
+            filters["force_gate"] |= device["force_gate"]
+        if "basis" in session:
+            self.config["basis"] = session["basis"]
+
+    def _send(self, message: dict[str, Any]) -> None:
+        text, slots = template(message)
+        data, places = np.frombuffer(text, np.uint8).copy(), np.array(slots, np.int64)
+        fill(self.state, data, places)
+        put_frame(self.state, 1, data, data.size, 0)
+        let_pass(self.state)
+
+    def _send_raw(self, data: bytes) -> None:
+        put_bytes(self.state, np.frombuffer(data, np.uint8), len(data))
+        let_pass(self.state)
+
+    def _refresh(self) -> None:
+        """Render the state's text anew."""
+        text, slots = template(self._message())
+        data = np.frombuffer(text, np.uint8)
+        self.state.text[: data.size] = data
+        self.state.slots[:] = slots
+        self.state.text_size = data.size
+
+
+def service_calls(service: Service) -> tuple[int, int, int]:
+    """Return handle and addresses of ``send`` and ``recv`` in place of the system's."""
+    send, receive = stream_functions()
+    return service.handle, int(send.address), int(receive.address)

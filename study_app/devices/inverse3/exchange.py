@@ -1,0 +1,380 @@
+"""The Inverse3's tick, compiled: take the replies to the commands before, give the newest position, send the force.
+
+The service answers each message with one state and pushes nothing (docs.haply.co 3.5.x, "WebSocket Protocol", core
+rule), so `_write` sends the force and asks for the state that `_read` finds at the next tick. Neither waits: the socket
+does not block. A reply that is older than `LONGEST_GAP_NS` counts as none, and where replies stay out the servo ends
+the force after 50 ms. Whatever else goes wrong ends the stream at once: zero force is sent, then a close frame, then
+nothing. Commands are applied once and forgotten, and a device without commands returns to idle ("Control Commands"), so
+silence is what ends the force where this program ends or hangs.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+from numba import types
+
+from study_app.devices.inverse3.frames import (
+    CLOSE,
+    INCOMPLETE,
+    LONGEST_CONTROL,
+    PING,
+    PONG,
+    TEXT,
+    VIOLATION,
+    build_frame,
+    next_key,
+    parse_header,
+)
+from study_app.devices.inverse3.json_scan import (
+    BUTTON,
+    BUTTONS,
+    CALIBRATED,
+    NO_DEVICE,
+    NOT_FINITE,
+    NOT_JSON,
+    POSITION,
+    POWER,
+    READY,
+    SCAN,
+    UNDERSTOOD,
+    scan,
+)
+from study_app.devices.inverse3.number_text import put_fixed, put_text
+from study_app.haptics.kernels.c_functions import (
+    READ,
+    READ_LOST,
+    READ_NEW,
+    READ_NOTHING_NEW,
+    WRITE,
+    c_function,
+    call_at,
+    fence,
+    full_fence,
+    record_at,
+)
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import COMMAND, READING, records
+
+TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
+"""``send`` and ``recv`` of a socket: (handle, address, bytes, flags) -> how many, 0: closed, below 0: none now."""
+
+LONGEST_GAP_NS: Final = 20_000_000
+MOST_UNANSWERED: Final = 4
+"""No further force is sent while so many commands wait for their replies: they would only queue up."""
+INBOX: Final = 1 << 16
+_OUTBOX = 512
+_TEXT = 384
+_LOG = 64  # commands whose time is kept
+_RECEIVES = 8  # a tick asks the socket at most so often
+_NORM_SLACK = 1.001
+
+# Why the stream ended, in INVERSE3.ended.
+RUNS, CLOSED, BROKE_PROTOCOL, NOT_A_STATE, DEVICE_GONE, NO_POSITION, BAD_NUMBER, NOT_READY, UNCALIBRATED, TOO_LONG = (
+    range(10)
+)
+LET_GO: Final = 10  # by the program itself
+
+INVERSE3 = np.dtype(
+    [
+        ("now_ns", np.int64),  # time of the tick; stays first: an emulator reads it here
+        ("handle", np.intp),  # of the connection, and
+        ("send", np.intp),  # addresses of its functions (``TRANSFER``)
+        ("receive", np.intp),
+        ("ended", np.int64),  # RUNS or why the stream ended
+        ("inside", np.int64),  # 1 while a read or write runs, which may use the connection
+        ("force_limit_n", np.float64),
+        # what comes
+        ("inbox", np.uint8, (INBOX,)),
+        ("filled", np.int64),
+        ("header", np.int64, (2,)),
+        ("scan", SCAN),
+        # what goes
+        ("prefix", np.uint8, (_TEXT,)),  # the command up to its first number
+        ("prefix_size", np.int64),
+        ("text", np.uint8, (_TEXT,)),
+        ("outbox", np.uint8, (_OUTBOX,)),
+        ("out_size", np.int64),  # of the frame in it
+        ("out_sent", np.int64),  # how much of that went
+        ("key", np.uint64, (1,)),  # of the masking keys' generator
+        ("held_n", np.float64, (3,)),  # force of the last command sent, hand frame
+        # who owes whom
+        ("sent", np.int64),  # commands
+        ("answered", np.int64),  # replies
+        ("sent_ns", np.int64, (_LOG,)),
+        ("sent_tick", np.int64, (_LOG,)),
+        ("reply_ns", np.int64),  # time of the tick that found the last reply
+        ("age_ns", np.int64),  # since the command whose reply was used last was sent
+        ("buttons", np.int64),
+        # counters
+        ("ticks", np.int64),
+        ("fresh", np.int64),  # ticks that gave a position
+        ("missing", np.int64),  # ticks without a reply
+        ("late", np.int64),  # ticks whose reply was too old
+        ("skipped", np.int64),  # forces that were not sent because replies stayed out
+        ("unasked", np.int64),  # messages that answered no command
+    ],
+    align=True,
+)
+
+COUNTERS: Final = ("ticks", "fresh", "missing", "late", "skipped", "unasked", "sent", "answered")
+
+_device_at = record_at(INVERSE3)
+_reading_at = record_at(READING)
+_command_at = record_at(COMMAND)
+_call = call_at(TRANSFER)
+_fields = INVERSE3.fields
+assert _fields is not None  # noqa: S101 - it is a record
+_INBOX_AT, _OUTBOX_AT = int(_fields["inbox"][1]), int(_fields["outbox"][1])
+
+_Y, _Z, _END = (np.frombuffer(text, np.uint8) for text in (b',"y":', b',"z":', b"}}}}]}"))
+
+
+def new_exchange(device_id: str, force_limit_n: float, seed: int) -> Any:
+    """Return the memory of an exchange, shape (1,), not connected yet: its address is the device's ``context``."""
+    memory = records(INVERSE3, 1)
+    device = memory[0]
+    device.ended = LET_GO
+    device.force_limit_n = force_limit_n
+    device.key[0] = seed | 1
+    prefix = f'{{"inverse3":[{{"device_id":"{device_id}","commands":{{"set_cursor_force":{{"vector":{{"x":'.encode()
+    device.prefix[: len(prefix)] = np.frombuffer(prefix, np.uint8)
+    device.prefix_size = len(prefix)
+    return memory
+
+
+@cache
+def exchange_functions() -> tuple[Any, Any]:
+    """Compile read and write, once for all devices."""
+    return c_function(READ, _read), c_function(WRITE, _write)
+
+
+def _read(context: int, now_ns: int, reading: int) -> int:
+    device = _device_at(context)
+    if not _enter(device):
+        return READ_LOST
+    answer = _take_replies(device, context, now_ns, reading)
+    _leave(device)
+    return answer
+
+
+def _write(context: int, command: int) -> int:
+    device, asked = _device_at(context), _command_at(command)
+    answer = READ_LOST
+    if _enter(device):
+        _send_force(device, context, asked.force_n[0], asked.force_n[1], asked.force_n[2])
+        for axis in range(3):
+            asked.sent_n[axis] = device.held_n[axis]
+        answer = 0
+        _leave(device)
+    else:
+        for axis in range(3):
+            asked.sent_n[axis] = 0.0
+    return answer
+
+
+@kernel
+def _enter(device: Any) -> bool:
+    """Return whether the connection may be used until `_leave`; who closes it sets ``ended``, then reads ``inside``."""
+    device.inside = 1
+    full_fence()
+    if device.ended != RUNS:
+        device.inside = 0
+        return False
+    return True
+
+
+@kernel
+def _leave(device: Any) -> None:
+    fence()
+    device.inside = 0
+
+
+@kernel
+def _take_replies(device: Any, context: int, now_ns: int, reading: int) -> int:
+    """Receive what came; put the newest position into the record at ``reading``."""
+    device.now_ns = now_ns
+    device.ticks += 1
+    answered = device.answered
+    for _ in range(_RECEIVES):
+        room = INBOX - device.filled
+        came = np.int32(
+            _call(device.receive, device.handle, context + _INBOX_AT + device.filled, np.uintp(room), np.int32(0))
+        )
+        if came == 0:
+            return _end(device, context, CLOSED)
+        if came < 0:
+            break
+        device.filled += came
+        ended = _take_frames(device, context)
+        if ended != RUNS:
+            return _end(device, context, ended)
+    if device.answered == answered:
+        device.missing += 1
+        return READ_NOTHING_NEW
+    device.reply_ns = now_ns
+    row = (device.answered - 1) % _LOG
+    device.age_ns = now_ns - device.sent_ns[row]
+    if device.age_ns > LONGEST_GAP_NS:
+        device.late += 1
+        return READ_NOTHING_NEW
+    device.fresh += 1
+    out, value = _reading_at(reading), device.scan.value
+    # The service's basis XYZ has x right, y forward, z up ("Coordinate System Convention").
+    out.position_m[0] = value[POSITION]
+    out.position_m[1] = value[POSITION + 2]
+    out.position_m[2] = -value[POSITION + 1]
+    out.buttons = device.buttons
+    out.delay_ticks = device.ticks - device.sent_tick[row]
+    return READ_NEW
+
+
+@kernel
+def _take_frames(device: Any, context: int) -> int:
+    """Take every whole frame out of the inbox; return `RUNS` or why the stream ends."""
+    begin = 0
+    while True:
+        size = parse_header(device.inbox, begin, device.filled, device.header)
+        if size == VIOLATION:
+            return BROKE_PROTOCOL
+        if size == INCOMPLETE:
+            break
+        opcode, length = device.header[0], device.header[1]
+        if size + length > INBOX:
+            return TOO_LONG
+        at, end = begin + size, begin + size + length
+        if end > device.filled:
+            break
+        begin = end
+        if opcode == CLOSE:
+            return CLOSED
+        if opcode == PING and length <= LONGEST_CONTROL:
+            _answer_ping(device, context, at, length)
+        if opcode == TEXT:
+            ended = _take_state(device, at, end)
+            if ended != RUNS:
+                return ended
+    for k in range(begin, device.filled):
+        device.inbox[k - begin] = device.inbox[k]
+    device.filled -= begin
+    return RUNS
+
+
+@kernel
+def _take_state(device: Any, begin: int, end: int) -> int:
+    said = scan(device.inbox, begin, end, device.scan)
+    if said != UNDERSTOOD:
+        if said == NOT_JSON:
+            return NOT_A_STATE
+        if said == NO_DEVICE:
+            return DEVICE_GONE
+        return BAD_NUMBER if said == NOT_FINITE else NO_POSITION
+    if device.answered < device.sent:
+        device.answered += 1
+    else:
+        device.unasked += 1
+    if _denied(device.scan, READY) or _denied(device.scan, POWER):
+        return NOT_READY
+    if _denied(device.scan, CALIBRATED):
+        return UNCALIBRATED
+    buttons = 0
+    if device.scan.known >> BUTTON & 1 and device.scan.value[BUTTON] != 0.0:
+        buttons |= 1
+    for k in range(3):
+        if device.scan.known >> (BUTTONS + k) & 1 and device.scan.value[BUTTONS + k] != 0.0:
+            buttons |= 1 << k
+    device.buttons = buttons
+    return RUNS
+
+
+@kernel
+def _denied(found: Any, place: int) -> bool:
+    return bool(found.known >> place & 1 and found.value[place] == 0.0)
+
+
+@kernel
+def _send_force(device: Any, context: int, x_n: float, y_n: float, z_n: float) -> None:
+    """Send a force [N, hand frame]; where it cannot go, the last one stays in force and in ``held_n``."""
+    square = x_n * x_n + y_n * y_n + z_n * z_n
+    most_n = _NORM_SLACK * device.force_limit_n
+    if not square <= most_n * most_n:  # nor NaN: the servo sends neither
+        x_n = y_n = z_n = square = 0.0
+    held = device.held_n[0] != 0.0 or device.held_n[1] != 0.0 or device.held_n[2] != 0.0
+    ends_force = square == 0.0 and held
+    if device.sent - device.answered >= MOST_UNANSWERED and not ends_force:
+        device.skipped += 1
+        return
+    if not _flush(device, context):
+        device.skipped += 1
+        return
+    text = device.text
+    at = 0
+    for k in range(device.prefix_size):
+        text[k] = device.prefix[k]
+    at = put_fixed(text, device.prefix_size, x_n)
+    at = put_fixed(text, put_text(text, at, _Y), -z_n)
+    at = put_fixed(text, put_text(text, at, _Z), y_n)
+    at = put_text(text, at, _END)
+    device.out_size = build_frame(device.outbox, TEXT, text, at, next_key(device.key))
+    device.out_sent = 0
+    row = device.sent % _LOG
+    device.sent_ns[row] = device.now_ns
+    device.sent_tick[row] = device.ticks
+    device.sent += 1
+    device.held_n[0], device.held_n[1], device.held_n[2] = x_n, y_n, z_n
+    _flush(device, context)
+
+
+@kernel
+def _flush(device: Any, context: int) -> bool:
+    """Send what is left of the frame in the outbox; return whether none is."""
+    while device.out_sent < device.out_size:
+        went = np.int32(
+            _call(
+                device.send,
+                device.handle,
+                context + _OUTBOX_AT + device.out_sent,
+                np.uintp(device.out_size - device.out_sent),
+                np.int32(0),
+            )
+        )
+        if went <= 0:
+            return False
+        device.out_sent += went
+    return True
+
+
+@kernel
+def _send_control(device: Any, context: int, opcode: int, length: int) -> None:
+    """Send a control frame whose payload is in ``text``, if the frame before went out whole."""
+    if _flush(device, context):
+        device.out_size = build_frame(device.outbox, opcode, device.text, length, next_key(device.key))
+        device.out_sent = 0
+        _flush(device, context)
+
+
+@kernel
+def _answer_ping(device: Any, context: int, at: int, length: int) -> None:
+    """Send what a ping holds back (RFC 6455 §5.5.3)."""
+    for k in range(length):
+        device.text[k] = device.inbox[at + k]
+    _send_control(device, context, PONG, length)
+
+
+@kernel
+def _end(device: Any, context: int, why: int) -> int:
+    """End the stream: zero force, a close frame, and silence."""
+    if why != CLOSED:
+        finish(device, context)
+    device.ended = why
+    return READ_LOST
+
+
+@kernel
+def finish(device: Any, context: int) -> None:
+    """Send zero force and a close frame (RFC 6455 §5.5.1, status 1000)."""
+    _send_force(device, context, 0.0, 0.0, 0.0)
+    device.text[0], device.text[1] = np.uint8(1000 >> 8), np.uint8(1000 & 0xFF)
+    _send_control(device, context, CLOSE, 2)

@@ -1,0 +1,212 @@
+"""How a connection is opened: RFC 6455's handshake, the service's inventory, and the first message's settings."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.devices.inverse3.failures import failure
+from study_app.devices.inverse3.frames import CLOSE, INCOMPLETE, TEXT, VIOLATION, build_frame, parse_header
+from study_app.devices.inverse3.link import Link
+from study_app.devices.inverse3.settings import (
+    DEVICE_GLOBAL,
+    SESSION_SCOPED,
+    differing,
+    first_message,
+    full_state_request,
+    recorded,
+    zero_force,
+)
+
+REPLY_S: Final = 2.0
+ROUND_TRIPS: Final = 50
+_MAGIC: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # RFC 6455 §1.3
+_LONGEST_HEAD: Final = 8192
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """An open session: the device's id, what the receipt says of it, and the round trip [s]."""
+
+    device_id: str
+    described: dict[str, Any]
+    round_trip_s: float
+
+
+class Messages:
+    """Text messages over a link, for the time in which a device is opened."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._came = b""
+        self._header = np.zeros(2, np.int64)
+
+    def upgrade(self, host: str) -> None:
+        """Make a WebSocket of the link (RFC 6455 §4.1).
+
+        Raises
+        ------
+        Inverse3Failure
+            The answer is not that of a WebSocket.
+        """
+        key = base64.b64encode(secrets.token_bytes(16))
+        self._link.send(
+            b"GET / HTTP/1.1\r\nHost: %b\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            b"Sec-WebSocket-Key: %b\r\nSec-WebSocket-Version: 13\r\n\r\n" % (host.encode(), key)
+        )
+        while b"\r\n\r\n" not in self._came:
+            if len(self._came) > _LONGEST_HEAD:
+                raise failure("not-websocket", "no end of the answer's head")
+            self._came += self._link.receive(REPLY_S)
+        head, _, self._came = self._came.partition(b"\r\n\r\n")
+        status, *lines = head.split(b"\r\n")
+        fields = dict(line.lower().partition(b":")[::2] for line in lines)
+        accept = dict(line.partition(b":")[::2] for line in lines if line.lower().startswith(b"sec-websocket-accept"))
+        wanted = base64.b64encode(hashlib.sha1(key + _MAGIC).digest())  # noqa: S324 - what RFC 6455 §4.2.2 asks for
+        if (
+            status.split(b" ")[1:2] != [b"101"]
+            or fields.get(b"upgrade", b"").strip() != b"websocket"
+            or [value.strip() for value in accept.values()] != [wanted]
+        ):
+            raise failure("not-websocket", status.decode("latin-1"))
+
+    def send(self, message: Mapping[str, Any]) -> None:
+        """Send a message as one text frame."""
+        text = np.frombuffer(json.dumps(message, separators=(",", ":")).encode(), np.uint8)
+        out = np.zeros(text.size + 8, np.uint8)
+        size = build_frame(out, TEXT, text, text.size, secrets.randbits(32))
+        self._link.send(out[:size].tobytes())
+
+    def receive(self) -> dict[str, Any]:
+        """Return the next message.
+
+        Raises
+        ------
+        Inverse3Failure
+            None comes, or it is not a JSON object.
+        """
+        while True:
+            data = np.frombuffer(self._came, np.uint8)
+            size = parse_header(data, 0, data.size, self._header)
+            if size == VIOLATION:
+                raise failure("protocol")
+            opcode, length = (int(value) for value in self._header)
+            if size != INCOMPLETE and len(self._came) >= size + length:
+                text, self._came = self._came[size : size + length], self._came[size + length :]
+                if opcode == CLOSE:
+                    raise failure("closed", "while it was opened")
+                if opcode == TEXT:
+                    return _object(text)
+                continue
+            self._came += self._link.receive(REPLY_S)
+
+    def ask(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Send a message and return the answer."""
+        self.send(message)
+        return self.receive()
+
+    @property
+    def left(self) -> bytes:
+        """What came after the last message."""
+        return self._came
+
+
+def _object(text: bytes) -> dict[str, Any]:
+    try:
+        found = json.loads(text, parse_constant=_refuse)
+    except ValueError as error:
+        raise failure("not-json", str(error)) from None
+    if not isinstance(found, dict):
+        raise failure("not-json", "it is not an object")
+    return found
+
+
+def _refuse(word: str) -> None:
+    raise ValueError(f"{word} is not a number in JSON")
+
+
+def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session:
+    """Choose the device, send the neutral settings with the first message, and confirm them.
+
+    Parameters
+    ----------
+    messages : over an upgraded link
+    link : which says the time
+    wanted_id : of the device; "": the first that the service lists
+
+    Raises
+    ------
+    Inverse3Failure
+        There is no such device, it cannot be used, or its settings are not neutral.
+    """
+    entry = find_device(messages.receive(), wanted_id)
+    device_id, config = entry["device_id"], entry["config"]
+    check_status(entry.get("status", {}), at_opening=True)
+    messages.ask(first_message(device_id))
+    entry = find_device(messages.ask(full_state_request(device_id)), device_id, inventory=False)
+    in_force = entry.get("config")
+    snapshot = config if in_force is None else in_force
+    wrong = differing(snapshot, DEVICE_GLOBAL)
+    if in_force is not None:
+        wrong += differing(in_force, SESSION_SCOPED)
+    if wrong:
+        raise failure("settings", "; ".join(wrong))
+    round_trip_s = _measure(messages, link, device_id)
+    described = {
+        "device_id": device_id,
+        "device_info": config.get("device_info"),
+        "firmware": config.get("extended_firmware_version"),
+        "service_settings": {
+            "found": recorded(config),
+            "in_force": recorded(snapshot),
+            "confirmed": in_force is not None,
+        },
+        "round_trip_ms": round(1000 * round_trip_s, 3),
+    }
+    return Session(device_id, described, round_trip_s)
+
+
+def find_device(message: Mapping[str, Any], wanted_id: str, *, inventory: bool = True) -> dict[str, Any]:
+    """Return what a message says of the device with this id, or of the first one.
+
+    Raises
+    ------
+    Inverse3Failure
+        The message is of an older version, or lists no such device.
+    """
+    listed = message.get("inverse3", [])
+    if not isinstance(listed, list):
+        raise failure("version", "format 3.0")
+    names = [str(entry.get("device_id")) for entry in listed if isinstance(entry, dict)]
+    for entry, name in zip(listed, names, strict=False):
+        if not wanted_id or name == wanted_id:
+            if inventory and "filters" not in entry.get("config", {}):
+                raise failure("version", "format 3.1")
+            return dict(entry)
+    raise failure("no-device", f"listed: {', '.join(names) or 'none'}")
+
+
+def check_status(status: Mapping[str, Any], *, at_opening: bool) -> None:
+    """Refuse a device that has no power, is not calibrated, or is used by another program."""
+    for key, mode in (("power_supply", "not-ready"), ("ready", "not-ready"), ("calibrated", "uncalibrated")):
+        if status.get(key) is False:
+            raise failure(mode, f"status.{key} is false")
+    if at_opening and status.get("in_use") is True:
+        raise failure("in-use")
+
+
+def _measure(messages: Messages, link: Link, device_id: str) -> float:
+    """Return the 90th percentile of the round trip of a command of zero force [s]."""
+    taken = []
+    for _ in range(ROUND_TRIPS):
+        began_s = link.now_s()
+        messages.ask(zero_force(device_id))
+        taken.append(link.now_s() - began_s)
+    return sorted(taken)[int(0.9 * len(taken))]
