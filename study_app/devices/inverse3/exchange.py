@@ -40,6 +40,7 @@ from study_app.devices.inverse3.json_scan import (
     READY,
     SCAN,
     UNDERSTOOD,
+    VELOCITY,
     scan,
 )
 from study_app.devices.inverse3.number_text import put_fixed, put_text
@@ -56,7 +57,7 @@ from study_app.haptics.kernels.c_functions import (
     record_at,
 )
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.model.layout import COMMAND, READING, records
+from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, records
 
 TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
 """``send`` and ``recv`` of a socket: (handle, address, bytes, flags) -> how many, 0: closed, below 0: none now."""
@@ -129,6 +130,7 @@ _fields = INVERSE3.fields
 assert _fields is not None  # noqa: S101 - it is a record
 _INBOX_AT, _OUTBOX_AT = int(_fields["inbox"][1]), int(_fields["outbox"][1])
 
+_VELOCITY_BITS = 0b111 << VELOCITY
 _Y, _Z, _END = (np.frombuffer(text, np.uint8) for text in (b',"y":', b',"z":', b"}}}}]}"))
 
 
@@ -222,13 +224,24 @@ def _take_replies(device: Any, context: int, now_ns: int, reading: int) -> int:
         return READ_NOTHING_NEW
     device.fresh += 1
     out, value = _reading_at(reading), device.scan.value
-    # The service's basis XYZ has x right, y forward, z up ("Coordinate System Convention").
-    out.position_m[0] = value[POSITION]
-    out.position_m[1] = value[POSITION + 2]
-    out.position_m[2] = -value[POSITION + 1]
+    _put_vector(value, POSITION, out.position_m)
+    if device.scan.known & _VELOCITY_BITS == _VELOCITY_BITS:
+        _put_vector(value, VELOCITY, out.velocity_mps)
+        out.measured |= MEASURED_VELOCITY
     out.buttons = device.buttons
     out.delay_ticks = device.ticks - device.sent_tick[row]
     return READ_NEW
+
+
+@kernel
+def _put_vector(value: Any, place: int, out: Any) -> None:
+    """Give a vector in the hand frame; the service's basis XYZ has x right, y forward, z up.
+
+    Documented in docs.haply.co 3.1.x, "Haply Inverse Service", Coordinate System Convention.
+    """
+    out[0] = value[place]
+    out[1] = value[place + 2]
+    out[2] = -value[place + 1]
 
 
 @kernel

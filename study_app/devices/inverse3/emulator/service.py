@@ -44,6 +44,7 @@ from study_app.errors import DeviceError
 from study_app.haptics.model.layout import records
 
 STOPS_M: Final = (0.10, 0.10, 0.10)
+_ZERO: Final = {"x": 0.0, "y": 0.0, "z": 0.0}
 _GUID: Final = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
 
@@ -99,6 +100,14 @@ class Service(HandOrders):
         """The force on the handle [N, hand frame]."""
         x, y, z = self.state.handle.force_n
         return float(x), float(y), float(z)
+
+    def compile(self) -> None:
+        """Compile all that answers a client, or load it from the cache: a client waits for seconds only."""
+        self.connected()
+        self._answer_message({"inverse3": [{"device_id": DEVICE_ID, "commands": {"set_cursor_force": {"vector": _ZERO}}}]})
+        take_frames(self.state)
+        self.give_bytes()
+        self.disconnected()
 
     def follow_clock(self, address: int) -> None:
         """Let the int64 [ns] at this address be the time; 0: a millisecond a command."""
@@ -218,9 +227,10 @@ class Service(HandOrders):
             b"Sec-WebSocket-Accept: %b\r\n\r\n" % accept.encode()
         )
         self._upgraded = True
-        self._send(self._inventory())
+        self._send(self.inventory())
 
-    def _inventory(self) -> dict[str, Any]:
+    def inventory(self) -> dict[str, Any]:
+        """Return the first message of a session, with the words of ``SLOTS`` for its numbers."""
         if self.version == "3.0":
             return LEGACY_STATE
         message = self._message(full=True)
