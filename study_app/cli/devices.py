@@ -63,14 +63,14 @@ def list_devices() -> None:
 
 @devices.command(cls=TakesDeviceOptions)
 @DEVICE
-@click.option("--fault", "faults", multiple=True, metavar="NAME", help="Fault of falcon-emulated: frozen, drop=0.01 …")
+@click.option("--fault", "faults", multiple=True, metavar="NAME", help="Fault of an emulated device: drop=0.01, nan …")
 @click.option("--to", type=click.Path(path_type=Path), metavar="FILE", help="Write a zip file for support.")
 def doctor(name: str, faults: tuple[str, ...], to: Path | None, **device_options: str | Path | None) -> None:
-    """Examine a device: find, open, load, home and turn a Falcon without force; say what is wrong, why, and the cure.
+    """Examine a device: find, open and run it without force; say what is wrong, why, and the cure.
 
-    NAME is a device that has a doctor: falcon, falcon:SERIAL, falcon-emulated or falcon-socket:PATH. Exit code 3 where
-    something is wrong. The zip file holds this report, versions, settings, log and last error; no participant's id, no
-    answer, no liquid's value.
+    NAME is a device that has a doctor: falcon, falcon:SERIAL, falcon-emulated, falcon-socket:PATH, inverse3,
+    inverse3:HOST:PORT or inverse3-emulated. Exit code 3 where something is wrong. The zip file holds this report,
+    versions, settings, log and last error; no participant's id, no answer, no liquid's value.
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
     from study_app.devices.doctor_report import lines

@@ -114,7 +114,7 @@ class DeviceDescriptor:
 
     Attributes
     ----------
-    name : for ``--device``, receipts and folders: small letters and hyphens
+    name : for ``--device``, receipts and folders: small letters, digits and hyphens
     title : what people read
     icon : of the theme
     kind : whether its force is felt, the liquid is seen only, or no participant uses it
@@ -147,7 +147,7 @@ class DeviceDescriptor:
 
     def __post_init__(self) -> None:
         if not re.fullmatch(NAME_PATTERN, self.name):
-            raise DeviceError(f"the device name {self.name!r} is not permitted: use small letters and hyphens")
+            raise DeviceError(f"the device name {self.name!r} is not permitted: use small letters, digits and hyphens")
         for called, value, permitted in (("icon", self.icon, get_args(Icon)), ("kind", self.kind, get_args(Kind))):
             if value not in permitted:
                 raise DeviceError(f"{called} {value!r} of device '{self.name}': choose one of {', '.join(permitted)}")

@@ -4,5 +4,5 @@ from __future__ import annotations
 
 from typing import Final
 
-NAME_PATTERN: Final = "[a-z][a-z-]*"
+NAME_PATTERN: Final = "[a-z][a-z0-9-]*"
 DEFAULT_DEVICE: Final = "mouse"

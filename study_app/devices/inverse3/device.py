@@ -150,7 +150,7 @@ class Inverse3Device(Device):
         state = self.exchange
         if state.ended in _ENDED:
             return _ENDED[int(state.ended)]
-        silent = state.now_ns - state.reply_ns > _SILENT_NS
+        silent = state.now_ns - state.fresh_ns > _SILENT_NS
         return "no-reply" if state.ended == exchange.RUNS and state.ticks and silent else None
 
     @property

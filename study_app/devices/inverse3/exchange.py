@@ -106,7 +106,7 @@ INVERSE3 = np.dtype(
         ("answered", np.int64),  # replies
         ("sent_ns", np.int64, (_LOG,)),
         ("sent_tick", np.int64, (_LOG,)),
-        ("reply_ns", np.int64),  # time of the tick that found the last reply
+        ("fresh_ns", np.int64),  # time of the last tick that gave a position
         ("age_ns", np.int64),  # since the command whose reply was used last was sent
         ("buttons", np.int64),
         # counters
@@ -216,13 +216,13 @@ def _take_replies(device: Any, context: int, now_ns: int, reading: int) -> int:
     if device.answered == answered:
         device.missing += 1
         return READ_NOTHING_NEW
-    device.reply_ns = now_ns
     row = (device.answered - 1) % _LOG
     device.age_ns = now_ns - device.sent_ns[row]
     if device.age_ns > LONGEST_GAP_NS:
         device.late += 1
         return READ_NOTHING_NEW
     device.fresh += 1
+    device.fresh_ns = now_ns
     out, value = _reading_at(reading), device.scan.value
     _put_vector(value, POSITION, out.position_m)
     if device.scan.known & _VELOCITY_BITS == _VELOCITY_BITS:

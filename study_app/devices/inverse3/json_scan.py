@@ -187,8 +187,26 @@ def _string_end(data: Any, at: int, end: int) -> int:
     while at < end and data[at] != 34:
         if data[at] < 32:
             return -1
-        at += 2 if data[at] == 92 else 1
+        if data[at] == 92:
+            at += 1
+            if at >= end or not _is_escape(data, at, end):
+                return -1
+        at += 1
     return at if at < end else -1
+
+
+@kernel
+def _is_escape(data: Any, at: int, end: int) -> bool:
+    """Return whether what follows a backslash is an escape: one of ``"\\/bfnrt``, or u and four hexadecimal digits."""
+    if data[at] != 117:
+        return data[at] in (34, 92, 47, 98, 102, 110, 114, 116)
+    if at + 4 >= end:
+        return False
+    for k in range(1, 5):
+        byte = data[at + k]
+        if not (48 <= byte <= 57 or 65 <= byte <= 70 or 97 <= byte <= 102):
+            return False
+    return True
 
 
 @kernel

@@ -23,7 +23,7 @@ OF_OPENING: Final = (
 OF_TIME: Final = (
     "late",  # each state 30 ms late
     "slow",  # each state 1.5 ms late: within what the servo is stable with
-    "torn",  # each state in pieces of 100 bytes
+    "torn",  # each state in pieces of 300 bytes
 )
 OF_STREAM: Final = (
     "silent",  # no more states

@@ -104,7 +104,9 @@ class Service(HandOrders):
     def compile(self) -> None:
         """Compile all that answers a client, or load it from the cache: a client waits for seconds only."""
         self.connected()
-        self._answer_message({"inverse3": [{"device_id": DEVICE_ID, "commands": {"set_cursor_force": {"vector": _ZERO}}}]})
+        self._answer_message(
+            {"inverse3": [{"device_id": DEVICE_ID, "commands": {"set_cursor_force": {"vector": _ZERO}}}]}
+        )
         take_frames(self.state)
         self.give_bytes()
         self.disconnected()
@@ -150,7 +152,7 @@ class Service(HandOrders):
         elif fault == "slow":
             state.lag_ns = 1_500_000
         elif fault == "torn":
-            state.portion = 100
+            state.portion = 300
         else:
             self._fault = (fault, after)
             if self._upgraded:
@@ -192,6 +194,8 @@ class Service(HandOrders):
     def give_bytes(self) -> bytes:
         """Return all that the client may see by now."""
         state = self.state
+        if state.clock == 0 and state.visible == state.read and state.queue_first < state.queue_next:
+            state.now_ns = max(state.now_ns, state.queue_ns[state.queue_first % state.queue_ns.size])  # who asks waits
         let_pass(state)
         places = np.arange(state.read, state.visible) % state.outbox.size
         state.read = state.visible

@@ -1,0 +1,166 @@
+"""The driver over a real TCP connection to the emulated service, in real time."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from study_app.devices.descriptor import NONE, NOT_AVAILABLE
+from study_app.devices.inverse3.device import Inverse3Device
+from study_app.devices.inverse3.emulator.server import ServiceServer
+from study_app.devices.inverse3.emulator.service import Service
+from study_app.devices.inverse3.failures import Inverse3Failure
+from study_app.devices.inverse3.probe import force_scale, probe
+from study_app.errors import DeviceLost
+from study_app.haptics.runtime.servo import Servo
+from study_app.protocol.load import load
+from tests.compiled import needs_servo
+
+pytestmark = [needs_servo, pytest.mark.slow]
+ENOUGH_S = 20.0
+
+
+@pytest.fixture
+def service() -> Service:
+    return Service(tremor_m=0.0)
+
+
+@pytest.fixture
+def server(service: Service) -> Iterator[ServiceServer]:
+    with ServiceServer(service) as serving:
+        yield serving
+
+
+def until(condition: object, seconds: float = ENOUGH_S) -> bool:
+    """Wait until a condition holds; return whether it did."""
+    end = time.monotonic() + seconds
+    waiting = threading.Event()
+    while not condition():  # type: ignore[operator]
+        if time.monotonic() > end:
+            return False
+        waiting.wait(0.002)
+    return True
+
+
+def moved_by(service: Service) -> bool:
+    """Tell whether the hand meets a force; go on reaching from side to side."""
+    if not service.moving:
+        service.reach_to(-0.03 if service.aim_m[0] > 0.0 else 0.03, 0.0, 0.0, duration_s=0.4)
+    return bool(np.linalg.norm(service.force_n) > 0.5)
+
+
+def test_a_servo_reads_positions_and_sends_forces_and_ends_with_zero(service: Service, server: ServiceServer) -> None:
+    with Inverse3Device(f"127.0.0.1:{server.port}") as device:
+        assert device.describe()["force_scale"] == 1.0
+        with Servo(device) as servo:
+            servo.load(load("rek2024").scene_for("honey"))
+            assert until(lambda: moved_by(service))
+            servo.check()
+            counters = device.counters
+            assert counters["fresh"] > 10
+            assert counters["unasked"] == 0
+        assert until(lambda: service.force_n == (0.0, 0.0, 0.0), 1.0)
+    assert until(lambda: service.state.close_frames == 1)
+
+
+def test_a_service_that_is_killed_in_a_stroke_ends_in_its_message(service: Service, server: ServiceServer) -> None:
+    with Inverse3Device(f"127.0.0.1:{server.port}") as device, Servo(device) as servo:
+        servo.load(load("rek2024").scene_for("honey"))
+        assert until(lambda: moved_by(service))
+        server.drop()
+        assert until(lambda: servo.fault is not None)
+        with pytest.raises(DeviceLost, match="closed the connection.*start Haply Hub.*the force is zero"):
+            servo.check()
+        assert until(lambda: service.force_n == (0.0, 0.0, 0.0))
+
+
+def test_a_program_that_is_killed_in_a_stroke_leaves_an_idle_device(service: Service, server: ServiceServer) -> None:
+    program = f"""
+import time
+from study_app.devices.inverse3.device import Inverse3Device
+from study_app.haptics.runtime.servo import Servo
+from study_app.protocol.load import load
+device = Inverse3Device("127.0.0.1:{server.port}")
+device.open()
+servo = Servo(device)
+servo.start()
+servo.load(load("rek2024").scene_for("honey"))
+print("pushes", flush=True)
+time.sleep(600)
+"""
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, env=os.environ.copy()) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == b"pushes\n"
+        try:
+            assert until(lambda: moved_by(service))
+        finally:
+            child.kill()
+    assert until(lambda: service.force_n == (0.0, 0.0, 0.0))
+    commands = int(service.state.commands)
+    assert not until(lambda: service.state.commands > commands, 0.2)
+
+
+def test_a_device_is_probed_without_a_session(service: Service, server: ServiceServer) -> None:
+    found = probe(ports=(server.port,))
+    assert found.state == "connected: EMU1"
+    assert found.why == ""
+    assert force_scale("127.0.0.1", (server.port,)) == 1.0
+    service.take("no-device")
+    assert probe(ports=(server.port,)).state == NONE
+
+
+def test_without_a_service_the_probe_says_what_to_start() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    found = probe(ports=(port,))
+    assert found.state == NOT_AVAILABLE
+    assert "start Haply Hub" in found.why
+
+
+@pytest.mark.parametrize("answer", [b"2.5", b'{"value": 2.5}', b'{"devices/force_scale": 2.5}'])
+def test_a_force_scale_is_understood_in_each_shape(answer: bytes) -> None:
+    with _http(answer) as port:
+        assert force_scale("127.0.0.1", (port,)) == 2.5
+
+
+@pytest.mark.parametrize("answer", [b'{"value": "2.5"}', b"true", b"[]", b"not json"])
+def test_a_force_scale_that_is_no_number_is_not_known(answer: bytes) -> None:
+    with _http(answer) as port:
+        assert force_scale("127.0.0.1", (port,)) is None
+
+
+class _http:
+    """Answers one GET with a body."""
+
+    def __init__(self, body: bytes) -> None:
+        self._body = body
+        self._socket = socket.create_server(("127.0.0.1", 0))
+
+    def __enter__(self) -> int:
+        threading.Thread(target=self._answer, daemon=True).start()
+        return int(self._socket.getsockname()[1])
+
+    def __exit__(self, *_error: object) -> None:
+        self._socket.close()
+
+    def _answer(self) -> None:
+        connection, _ = self._socket.accept()
+        with connection:
+            connection.recv(4096)
+            connection.sendall(
+                b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n%b" % (len(self._body), self._body)
+            )
+
+
+def test_an_http_server_that_is_no_websocket_is_refused() -> None:
+    with _http(json.dumps({}).encode()) as port, pytest.raises(Inverse3Failure, match="something else answers"):
+        Inverse3Device(f"127.0.0.1:{port}").open()
