@@ -197,7 +197,7 @@ def _string_end(data: Any, at: int, end: int) -> int:
 
 @kernel
 def _is_escape(data: Any, at: int, end: int) -> bool:
-    """Return whether what follows a backslash is an escape: one of ``"\\/bfnrt``, or u and four hexadecimal digits."""
+    """Return whether what follows a backslash is an escape (RFC 8259 §7): a letter of these, or u and four digits."""
     if data[at] != 117:
         return data[at] in (34, 92, 47, 98, 102, 110, 114, 116)
     if at + 4 >= end:

@@ -119,7 +119,7 @@ class TestOpening:
             assert Ticks(device).take()[0] == READ_NOTHING_NEW
 
     def test_no_service_is_one_line_with_its_address_and_the_cure(self) -> None:
-        with pytest.raises(DeviceNotFound, match="Inverse Service does not answer.*start Haply Hub") as refused:
+        with pytest.raises(DeviceNotFound, match=r"Inverse Service does not answer.*start Haply Hub") as refused:
             open_device("inverse3:127.0.0.1:9")
         assert "127.0.0.1:9" in str(refused.value)
         assert "\n" not in str(refused.value)

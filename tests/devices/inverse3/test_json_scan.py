@@ -1,4 +1,4 @@
-"""The scanner of states: it agrees with the standard library on what is JSON, and finds the device's numbers anywhere."""
+"""The scanner of states: it agrees with the standard library on what JSON is, and finds the numbers."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def test_a_service_that_is_killed_in_a_stroke_ends_in_its_message(service: Servi
         assert until(lambda: moved_by(service))
         server.drop()
         assert until(lambda: servo.fault is not None)
-        with pytest.raises(DeviceLost, match="closed the connection.*start Haply Hub.*the force is zero"):
+        with pytest.raises(DeviceLost, match=r"closed the connection.*start Haply Hub.*the force is zero"):
             servo.check()
         assert until(lambda: service.force_n == (0.0, 0.0, 0.0))
 
@@ -128,17 +128,17 @@ def test_without_a_service_the_probe_says_what_to_start() -> None:
 
 @pytest.mark.parametrize("answer", [b"2.5", b'{"value": 2.5}', b'{"devices/force_scale": 2.5}'])
 def test_a_force_scale_is_understood_in_each_shape(answer: bytes) -> None:
-    with _http(answer) as port:
+    with HttpAnswer(answer) as port:
         assert force_scale("127.0.0.1", (port,)) == 2.5
 
 
 @pytest.mark.parametrize("answer", [b'{"value": "2.5"}', b"true", b"[]", b"not json"])
 def test_a_force_scale_that_is_no_number_is_not_known(answer: bytes) -> None:
-    with _http(answer) as port:
+    with HttpAnswer(answer) as port:
         assert force_scale("127.0.0.1", (port,)) is None
 
 
-class _http:
+class HttpAnswer:
     """Answers one GET with a body."""
 
     def __init__(self, body: bytes) -> None:
@@ -162,5 +162,5 @@ class _http:
 
 
 def test_an_http_server_that_is_no_websocket_is_refused() -> None:
-    with _http(json.dumps({}).encode()) as port, pytest.raises(Inverse3Failure, match="something else answers"):
+    with HttpAnswer(json.dumps({}).encode()) as port, pytest.raises(Inverse3Failure, match="something else answers"):
         Inverse3Device(f"127.0.0.1:{port}").open()

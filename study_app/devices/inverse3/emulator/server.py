@@ -113,7 +113,7 @@ class ServiceServer:
         service.take_bytes(head)
         connection.sendall(service.give_bytes())
         library = ctypes.CDLL("ws2_32" if sys.platform == "win32" else None)
-        send, receive = (ctypes.cast(one, ctypes.c_void_p).value for one in (library.send, library.recv))
+        send, receive = (ctypes.cast(one, ctypes.c_void_p).value or 0 for one in (library.send, library.recv))
         clock = (self._clock.now.address, self._clock.context)
         while serve(memory, connection.fileno(), send, receive, clock, self._time):
             service.work()
