@@ -79,6 +79,8 @@ class Row:
         Its alternatives, of kind "either" alone.
     instead : str
         The key that is given instead of this one, "" where there is none: exactly one of the two is.
+    model : str
+        The title of the model whose key it is, such as "Block".
     """
 
     path: Path
@@ -94,6 +96,7 @@ class Row:
     choices: tuple[Choice, ...] = ()
     either: tuple[Row, ...] = ()
     instead: str = ""
+    model: str = ""
 
 
 def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
@@ -124,13 +127,17 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
         part = around.get("properties", {}).get(key, {})
         default = part.get("default", None if None in named else part.get("const"))
         required = key in around.get("required", ())
-        return Row(path, "kind", label_of(key), value=value, default=default, required=required, choices=options)
+        return Row(
+            path, "kind", label_of(key), value=value, default=default, required=required, choices=options,
+            model=around.get("title", ""),
+        )  # fmt: skip
     nodes = node_at(document, path)
     if not nodes:
         return None if value is None else Row(path, "unknown", label_of(path[-1]), value=value)
     row = _row(document, path, nodes, value, required=path[-1] in around.get("required", ()))
     pairs = [pair for pair in around.get(ALTERNATIVES, ()) if path[-1] in pair]
-    return replace(row, instead=next((key for pair in pairs for key in pair if key != path[-1]), ""))
+    instead = next((key for pair in pairs for key in pair if key != path[-1]), "")
+    return replace(row, instead=instead, model=around.get("title", ""))
 
 
 def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value: Any, *, required: bool) -> Row:

@@ -16,6 +16,7 @@ from study_app.protocol.source.document import Path, entries, has
 from study_app.protocol.source.line_numbers import Places
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
+from study_app.viewmodels.designer.special import FACTS
 
 DEEPEST: Final = 3
 """So many tables within each other are shown in one form."""
@@ -51,6 +52,8 @@ class FormRow:
         What a reference names.
     number : int or None
         Of alternatives ("either"), which one the value is.
+    facts : object
+        What its special editor shows beyond the value; None where it has none.
     """
 
     row: Row
@@ -60,6 +63,7 @@ class FormRow:
     entries: tuple[Entry, ...] = ()
     target: Path | None = None
     number: int | None = None
+    facts: Any = None
 
     @property
     def removable(self) -> bool:
@@ -232,6 +236,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         tuple(_entries(study, row)),
         named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
         number,
+        facts.of(study, row) if (facts := FACTS.get((row.model, str(path[-1])))) is not None else None,
     )
 
 

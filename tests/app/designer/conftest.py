@@ -57,3 +57,10 @@ def designer(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
     made.window.deleteLater()
     made.controller.deleteLater()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+@pytest.fixture(params=["special editors", "no special editors"])
+def editors(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a test with the special editors and without any."""
+    if request.param == "no special editors":
+        monkeypatch.setattr("study_app.gui.designer.form.form.EDITORS", {})

@@ -41,6 +41,7 @@ def press(qtbot: Any, designer: Any, keys: str) -> None:
     qtbot.keyClick(part, getattr(Qt.Key, f"Key_{key}"), modifiers)
 
 
+@pytest.mark.usefixtures("editors")
 def test_a_small_study_is_edited_by_keys_alone(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.window.activateWindow()
@@ -84,6 +85,7 @@ def test_a_small_study_is_edited_by_keys_alone(qtbot: Any, designer: Any) -> Non
     assert designer.text == before
 
 
+@pytest.mark.usefixtures("editors")
 def test_a_small_study_is_edited_by_mouse_alone(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     before = designer.file.read_text()
@@ -165,6 +167,7 @@ def test_esc_restores_what_was_accepted_last(qtbot: Any, designer: Any) -> None:
     assert designer.editing.opened.study.document["device"]["force_limit_n"] == 5
 
 
+@pytest.mark.usefixtures("editors")
 def test_every_form_fits_its_width(designer: Any) -> None:
     designer.controller.open("kitchen")
     area = designer.place.form.area
@@ -221,6 +224,7 @@ def test_no_part_of_a_form_is_shown_as_a_window(designer: Any) -> None:
     assert not windows
 
 
+@pytest.mark.usefixtures("editors")
 def test_everything_that_takes_the_keyboard_has_a_name(designer: Any) -> None:
     kinds = (QAbstractButton, QLineEdit, QPlainTextEdit, QComboBox, QAbstractItemView)
     designer.controller.open("kitchen")

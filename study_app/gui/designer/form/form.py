@@ -8,6 +8,8 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout
 from study_app.gui.designer.form.form_head import LABEL_PX, FormHead
 from study_app.gui.designer.form.list_fields import field, structure
 from study_app.gui.designer.form.row_fields import add_button
+from study_app.gui.designer.form.special import EDITORS
+from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import Card, Icon, Rule
@@ -27,9 +29,12 @@ class RowWidget(QWidget):
         self.row = row
         self.key = structure(row)
         self.refusal = ""
-        self.field = field(row)
+        special = special_editor_of(row)
+        wide = special is not None and special.wide
+        self.field = field(row) if special is None else special.make(row)
         self.words = label(row.row.label, "label", wraps=True)
-        self.words.setFixedWidth(LABEL_PX)
+        if not wide:
+            self.words.setFixedWidth(LABEL_PX)
         self.words.setMinimumHeight(FIELD_PX)
         self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
         self.words.setBuddy(self.field)
@@ -38,8 +43,9 @@ class RowWidget(QWidget):
         across = QHBoxLayout()
         across.setSpacing(8)
         top = Qt.AlignmentFlag.AlignTop
-        across.addWidget(self.words, 0, top)
-        across.addWidget(self.field, 1)
+        across.addWidget(self.words, int(wide), top)
+        if not wide:
+            across.addWidget(self.field, 1)
         across.addWidget(self.remove, 0, top)
         policy = self.remove.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
@@ -55,6 +61,8 @@ class RowWidget(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
         column.addLayout(across)
+        if wide:
+            column.addWidget(self.field)
         column.addWidget(self.wrong)
         self.remove.setVisible(row.removable)  # in its layout by now: it would be shown as a window before
         self.show_row(row)
@@ -254,6 +262,11 @@ class FormCard(Card):
         self.help_title.setText("" if row is None else row.row.row.label)
         self.help_place.show_text("" if row is None else row.row.place)
         self.help_words.setText("" if row is None else row.help)
+
+
+def special_editor_of(row: FormRow) -> SpecialEditor | None:
+    """Return the special editor of a row, None where its kind's editor is used."""
+    return EDITORS.get((row.row.model, str(row.row.path[-1])))
 
 
 def _shape(form: Form) -> object:

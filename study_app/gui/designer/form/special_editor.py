@@ -1,0 +1,28 @@
+"""What a special editor is: an editor of one key of a model, in place of the one that every key of its kind has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from study_app.gui.designer.form.row_fields import Field
+from study_app.viewmodels.designer.form_rows import FormRow
+
+
+@dataclass(frozen=True, slots=True)
+class SpecialEditor:
+    """An editor of certain keys; bounds, faults, help and removal stay those of the row.
+
+    Attributes
+    ----------
+    keys : tuple of (str, str)
+        Title of the model in the JSON Schema, such as "Block", and the key.
+    make : callable
+        Makes the editor of a row.
+    wide : bool
+        Whether it takes the width of the form, with the label above it.
+    """
+
+    keys: tuple[tuple[str, str], ...]
+    make: Callable[[FormRow], Field]
+    wide: bool = False

@@ -1,0 +1,14 @@
+"""What special editors show beyond the value of their row: one module each, with a `RowFacts` named ``FACTS``."""
+
+from __future__ import annotations
+
+import sys
+from typing import Final
+
+from study_app.discovery import modules_of
+from study_app.viewmodels.designer.row_facts import RowFacts
+
+FACTS: Final[dict[tuple[str, str], RowFacts]] = {
+    key: module.FACTS for module in modules_of(sys.modules[__name__]) for key in module.FACTS.keys
+}
+"""The facts of each (model, key) that has some."""
