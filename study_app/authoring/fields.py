@@ -12,7 +12,7 @@ from study_app.authoring.schema_nodes import OWN, Node, alternatives, node_at, t
 from study_app.haptics.model.ranges import REASON
 from study_app.protocol.source.document import Path, has
 from study_app.protocol.source.problems import rule_of, shown
-from study_app.protocol.table import ALTERNATIVES
+from study_app.protocol.table import ALTERNATIVES, SECTIONS
 
 Kind: TypeAlias = Literal[
     "number", "whole number", "text", "paragraphs", "localised", "switch", "choice", "kind", "reference",
@@ -113,6 +113,12 @@ def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
     keys = list(dict.fromkeys((*filter(None, [tags(nodes)[0]]), *properties, *written)))
     found = (row_at(document, (*path, key)) for key in keys)
     return tuple(row for row in found if row is not None)
+
+
+def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the sections that the model of a table declares: each heading with its keys; keys in none come last."""
+    node = table_of(node_at(document, path), _at(document, path)) or {}
+    return tuple((heading, tuple(keys)) for heading, keys in node.get(SECTIONS, ()))
 
 
 def row_at(document: Mapping[str, Any], path: Path) -> Row | None:

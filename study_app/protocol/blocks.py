@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias
 
 from pydantic import Field, SerializerFunctionWrapHandler, StringConstraints, model_serializer, model_validator
 from pydantic_core import PydanticCustomError
@@ -70,6 +70,18 @@ class Block(Table):
     A condition of a main block is shown under a code, L1 … Ln with ``code_prefix`` L; which condition a code stands for
     is drawn by ``schedule.draw_key``. Practice and baseline are announced for what they are, and have one condition.
     """
+
+    SECTIONS: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = (
+        ("Words", ("title", "setting_label")),
+        (
+            "What is presented",
+            ("conditions", "standard", "stimulus", "standards", "design", "method", "until", "catch", "repetitions",
+             "order", "max_repeats", "min_distance"),
+        ),
+        ("In each trial", ("task", "questionnaire")),
+        ("Part and blinding", ("phase", "part", "code_prefix", "compares", "replicates")),
+        ("Breaks", ("break_every", "break_page")),
+    )  # fmt: skip
 
     id: Id = Field(description="The name of the block's table.")
     phase: Phase = Field(default="main", description="Only main trials are analysed.")

@@ -11,6 +11,9 @@ from pydantic_core import CoreSchema, PydanticCustomError
 ALTERNATIVES: Final = "alternatives"
 """Where the JSON Schema of a table keeps `Table.ONE_OF`, for forms."""
 
+SECTIONS: Final = "sections"
+"""Where it keeps `Table.SECTIONS`, for forms."""
+
 
 class Table(BaseModel):
     """A table of the file: unknown keys are errors, numbers are finite, values never change."""
@@ -19,6 +22,8 @@ class Table(BaseModel):
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = ()
     """Pairs of keys of which exactly one is given."""
+    SECTIONS: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = ()
+    """Headings of a form, each with its keys; keys in none come last."""
 
     @model_validator(mode="after")
     def _gives_one_of_two(self) -> Self:
@@ -31,8 +36,10 @@ class Table(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Return the schema with the pairs of which one is given."""
+        """Return the schema with the pairs of which one is given, and the sections of its form."""
         node = handler(core_schema)
         if cls.ONE_OF:
             handler.resolve_ref_schema(node)[ALTERNATIVES] = [list(pair) for pair in cls.ONE_OF]
+        if cls.SECTIONS:
+            handler.resolve_ref_schema(node)[SECTIONS] = [[words, list(keys)] for words, keys in cls.SECTIONS]
         return node

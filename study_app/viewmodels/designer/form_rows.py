@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from study_app.authoring.additions import singular
-from study_app.authoring.fields import Choice, Row, label_of, row_at, rows
+from study_app.authoring.fields import Choice, Row, label_of, row_at, rows, sections_of
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
@@ -20,6 +20,7 @@ from study_app.viewmodels.designer.special import FACTS
 
 DEEPEST: Final = 3
 """So many tables within each other are shown in one form."""
+LEAST, MOST = "at least ", "at most "
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +75,14 @@ class FormRow:
     def bounds(self) -> str:
         """What is permitted, in one line."""
         return ", ".join(self.row.bounds)
+
+    @property
+    def range(self) -> str:
+        """What numbers are permitted, as short as can be: "1 to 100"."""
+        bounds = self.row.bounds
+        if len(bounds) == 2 and bounds[0].startswith(LEAST) and bounds[1].startswith(MOST):
+            return f"{bounds[0].removeprefix(LEAST)} to {bounds[1].removeprefix(MOST)}"
+        return self.bounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +215,14 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
         elif row.path[-1] != "id" or len(path) < 3:
             shown.append(_form_row(study, row, places))
     title = "" if depth == 0 else label_of(path[-1])
-    yield Section(path, title, tuple(shown), tuple(absent))
+    rest = (title, tuple(row.path[-1] for row in (*(one.row for one in shown), *absent)))
+    for words, keys in (*sections_of(study.document, path), rest):
+        own = tuple(row for key in keys for row in shown if row.row.path[len(path)] == key)
+        missing = tuple(row for key in keys for row in absent if row.path[-1] == key)
+        shown = [row for row in shown if row not in own]
+        absent = [row for row in absent if row not in missing]
+        if own or missing:
+            yield Section(path, words, own, missing)
     for table in below:
         yield from _sections(study, table, places, depth + 1)
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
+from study_app.gui.designer.form.form_foot import FormFoot
 from study_app.gui.designer.form.form_head import LABEL_PX, FormHead
 from study_app.gui.designer.form.list_fields import field, structure
-from study_app.gui.designer.form.row_fields import add_button
+from study_app.gui.designer.form.row_fields import add_button, stacked
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import Card, Icon, Rule
 from study_app.gui.widgets.controls import IconButton
-from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.designer.form_rows import Form, FormRow
+from study_app.gui.widgets.labels import label
+from study_app.viewmodels.designer.form_rows import Form, FormRow, Section
 from study_app.viewmodels.designer.requests import AddKey, RemoveKey
 
 ACROSS = 2
@@ -30,7 +31,7 @@ class RowWidget(QWidget):
         self.key = structure(row)
         self.refusal = ""
         special = special_editor_of(row)
-        wide = special is not None and special.wide
+        wide = row.row.kind == "paragraphs" if special is None else special.wide
         self.field = field(row) if special is None else special.make(row)
         self.words = label(row.row.label, "label", wraps=True)
         if not wide:
@@ -44,8 +45,7 @@ class RowWidget(QWidget):
         across.setSpacing(8)
         top = Qt.AlignmentFlag.AlignTop
         across.addWidget(self.words, int(wide), top)
-        if not wide:
-            across.addWidget(self.field, 1)
+        across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
         across.addWidget(self.remove, 0, top)
         policy = self.remove.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
@@ -131,21 +131,11 @@ class FormCard(Card):
         self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.area.setWidget(self.inside)
-        self.help_title = label("", "label")
-        self.help_place = Elided("small", "text2")
-        self.help_place.setAlignment(Qt.AlignmentFlag.AlignRight)
-        self.help_words = label("", "small", "text2", wraps=True)
-        self.help_words.setMinimumHeight(48)
-        self.help_words.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.foot = FormFoot()
         for part in (self.head, Rule(), self.own):
             self.column.addWidget(part)
         self.column.addWidget(self.area, 1)
-        self.column.addWidget(Rule())
-        top = QHBoxLayout()
-        top.addWidget(self.help_title)
-        top.addWidget(self.help_place, 1)
-        self.column.addLayout(top)
-        self.column.addWidget(self.help_words)
+        self.column.addWidget(self.foot)
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
         """Show a form: in place where its rows stay the same, else anew."""
@@ -177,15 +167,13 @@ class FormCard(Card):
             if number:
                 sections.addWidget(Rule())
             if section.title:
-                heading = QHBoxLayout()
-                heading.addWidget(label(section.title, "label"))
-                heading.addStretch()
-                away = IconButton("cross", f"Remove {section.title} from the file", size=FIELD_PX, role="plain")
-                away.clicked.connect(lambda _checked=False, path=section.path: self.asked.emit(RemoveKey(path)))
-                away.setEnabled(not self.read_only)
-                heading.addWidget(away)
-                sections.addLayout(heading)
+                sections.addLayout(self._heading(section, removable=section.path != form.path))
+            heads: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
+                beside = () if stacked(row) else row.languages
+                if len(beside) > 1 and beside != heads:
+                    sections.addLayout(language_heads(beside))
+                heads = beside
                 sections.addWidget(self._row(row))
             if section.absent and not self.read_only:
                 grid = QGridLayout()
@@ -207,6 +195,17 @@ class FormCard(Card):
         QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(scrolled))
         if focused is not None and stays:
             self.focus(focused)
+
+    def _heading(self, section: Section, *, removable: bool) -> QHBoxLayout:
+        heading = QHBoxLayout()
+        heading.addWidget(label(section.title, "strong"))
+        heading.addStretch()
+        if removable:
+            away = IconButton("cross", f"Remove {section.title} from the file", size=FIELD_PX, role="plain")
+            away.clicked.connect(lambda: self.asked.emit(RemoveKey(section.path)))
+            away.setEnabled(not self.read_only)
+            heading.addWidget(away)
+        return heading
 
     def _row(self, row: FormRow) -> RowWidget:
         made = RowWidget(row)
@@ -259,14 +258,25 @@ class FormCard(Card):
     def show_help(self) -> None:
         """Show the help of the focused field, or of the first one."""
         row = self._focused if self._focused in self.rows else next(iter(self.rows), None)
-        self.help_title.setText("" if row is None else row.row.row.label)
-        self.help_place.show_text("" if row is None else row.row.place)
-        self.help_words.setText("" if row is None else row.help)
+        if row is None:
+            self.foot.show_help("", "", "")
+        else:
+            self.foot.show_help(row.row.row.label, row.row.place, row.help)
 
 
 def special_editor_of(row: FormRow) -> SpecialEditor | None:
     """Return the special editor of a row, None where its kind's editor is used."""
     return EDITORS.get((row.row.model, str(row.row.path[-1])))
+
+
+def language_heads(languages: tuple[tuple[str, str], ...]) -> QHBoxLayout:
+    """Return the names of languages above the columns of their texts."""
+    heads = QHBoxLayout()
+    heads.setContentsMargins(LABEL_PX + 8, 0, FIELD_PX + 8, 0)
+    heads.setSpacing(8)
+    for _code, language in languages:
+        heads.addWidget(label(language, "small", "text2"), 1)
+    return heads
 
 
 def _shape(form: Form) -> object:

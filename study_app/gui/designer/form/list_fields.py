@@ -77,7 +77,7 @@ class EntriesField(Field):
         self.rows: list[EntryRow] = []
         kind, count = row.row.kind, len(row.entries)
         for at, entry in enumerate(row.entries):
-            shown = EntryRow(entry, f"{row.row.label}, {entry.title}, {at + 1} of {count}")
+            shown = self.entry_row(entry, f"{row.row.label}, {entry.title}, {at + 1} of {count}")
             if kind != "tables":
                 for by, icon, word in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
                     button = shown.button(icon, f"Move {entry.title} {word}")
@@ -109,6 +109,11 @@ class EntriesField(Field):
             self.names.setCurrentIndex(-1)
             self.names.setEnabled(bool(row.row.choices))
         self.setFocusProxy(self.names if chooses else self.add)
+        self.show_value()
+
+    def entry_row(self, entry: Entry, words: str) -> EntryRow:
+        """Return the row of an entry, to which its buttons are added."""
+        return EntryRow(entry, words)
 
     def show_value(self) -> None:
         """Do nothing: other entries make another field."""

@@ -24,12 +24,14 @@ _PARTS = re.compile(r",?[;\s]+")
 class Field(QWidget):
     """Edits the value of one row.
 
-    ``asked`` carries a request, ``open_asked`` the path of an element to select, ``came`` says that it is focused.
+    ``asked`` carries a request, ``open_asked`` the path of an element to select, ``came`` says that it is focused;
+    ``caption`` stands above an editor that takes the width of the form.
     """
 
     asked = Signal(object)
     open_asked = Signal(object)
     came = Signal()
+    caption = ""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__()
@@ -73,7 +75,10 @@ class LineField(Field):
         if row.row.unit:
             self.box.addWidget(label(row.row.unit, "label", "text2"))
         if row.row.kind in {"number", "whole number"}:
-            self.box.addStretch()
+            permitted = Elided("small", "text2")
+            permitted.show_text(row.range)
+            permitted.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self.box.addWidget(permitted, 1)
         self.line.typed.connect(self._take)
         self.line.came.connect(self.came)
         self.setFocusProxy(self.line)
@@ -114,8 +119,7 @@ class LanguagesField(Field):
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
-        several = row.row.kind == "paragraphs"
-        down = len(row.languages) > 2 or several
+        several, down = row.row.kind == "paragraphs", stacked(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom if down else QBoxLayout.Direction.LeftToRight)
         self.lines: dict[str, TypedLine | TypedText] = {}
         for code, language in row.languages:
@@ -314,6 +318,11 @@ class UnknownField(Field):
     def show_value(self) -> None:
         """Show the value as it would be written."""
         self.value.show_text(_written(self.row.row.value))
+
+
+def stacked(row: FormRow) -> bool:
+    """Return whether texts in several languages are below each other, each with its language."""
+    return len(row.languages) > 2 or row.row.kind == "paragraphs"
 
 
 def add_button(name: str, words: str = "") -> ActionButton:

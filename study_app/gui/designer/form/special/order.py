@@ -1,0 +1,40 @@
+"""The order of a block's conditions, with the numbers of participants that balance it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from PySide6.QtCore import Qt
+
+from study_app.gui.designer.form.row_fields import ChoiceField
+from study_app.gui.designer.form.special_editor import SpecialEditor
+from study_app.gui.widgets.cards import Chip
+from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.special.order import OrderBalance
+
+LETTERS = 8
+
+
+class OrderField(ChoiceField):
+    """The choice, with a chip beside it."""
+
+    def __init__(self, row: FormRow) -> None:
+        self.chip = Chip(small=True)
+        super().__init__(row)
+        if self.list is not None:
+            self.list.setMinimumContentsLength(LETTERS)
+        self.box.addWidget(self.chip, 0, Qt.AlignmentFlag.AlignVCenter)
+        self.show_value()
+
+    def show_value(self) -> None:
+        """Show what is chosen, and how balanced it is."""
+        super().show_value()
+        found: OrderBalance | None = self.row.facts
+        self.chip.setVisible(found is not None and self.box.indexOf(self.chip) >= 0)
+        if found is not None:
+            self.chip.show_state(found.tone, found.icon, found.words)
+            self.chip.setToolTip(found.sentence)
+            self.chip.setAccessibleDescription(found.sentence)
+
+
+EDITOR: Final = SpecialEditor((("Block", "order"),), OrderField)
