@@ -71,6 +71,7 @@ class Block(Table):
     is drawn by ``schedule.draw_key``. Practice and baseline are announced for what they are, and have one condition.
     """
 
+    ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("conditions", "stimulus"),)
     SECTIONS: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = (
         ("Words", ("title", "setting_label")),
         (
@@ -145,13 +146,6 @@ class Block(Table):
 
     @model_validator(mode="after")
     def _presents_in_one_way(self) -> Self:
-        if self.stimulus is not None and self.conditions:
-            hint = "give one of the two"
-            raise PydanticCustomError("one_of", "has conditions and a stimulus", _at("stimulus", hint=hint))
-        if self.stimulus is None and not self.conditions:
-            raise PydanticCustomError(
-                "one_of", "has neither conditions nor a stimulus", _at("conditions", hint="give one of the two")
-            )
         if self.stimulus is not None:
             self._refuse("a stimulus", "standard", "repetitions", "order", "compares")
         elif self.design is not None:

@@ -31,6 +31,7 @@ from study_app.viewmodels.designer.requests import (
     Request,
     SetText,
     SetValue,
+    SwitchKey,
     SwitchKind,
 )
 
@@ -65,6 +66,8 @@ class Steps:
         """
         if isinstance(asked, SwitchKind):
             return self._switch(study, asked)
+        if isinstance(asked, SwitchKey):
+            return self._switch_key(study, asked)
         if isinstance(asked, SetValue):
             name = label_of(asked.path[-1])
             return Step(f"Change {name}", (Set(asked.path, asked.value),), None, asked.path if asked.typing else None)
@@ -98,6 +101,18 @@ class Steps:
         edits = switched(study, asked.path, asked.kind, kept)
         self._left[asked.path] = {**kept, **left_by(study, asked.path, asked.kind)}
         return Step(f"Switch to {label_of(asked.kind or 'nothing').lower()}", edits)
+
+    def _switch_key(self, study: Study, asked: SwitchKey) -> Step:
+        table, name = asked.path[:-1], str(asked.path[-1])
+        before = value_at(study.document, asked.path)
+        kept = {**self._left.get(table, {}), **({} if before is None else {name: before})}
+        gone: tuple[Edit, ...] = () if before is None else (Unset(asked.path),)
+        after, _ = study.edited(*gone)
+        value = _listed(kept[asked.to]) if asked.to in kept else _first_value(after, (*table, asked.to))
+        if value in ("", []):
+            raise Refused(f"there is nothing that {label_of(asked.to)} can name: add it first")
+        self._left[table] = kept
+        return Step(f"Give {label_of(asked.to)}", (*gone, Set((*table, asked.to), value)))
 
 
 def _text(study: Study, asked: SetText) -> tuple[Edit, ...]:

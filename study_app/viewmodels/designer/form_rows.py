@@ -53,6 +53,8 @@ class FormRow:
         What a reference names.
     number : int or None
         Of alternatives ("either"), which one the value is.
+    instead : tuple of (str, str)
+        Keys of which exactly one is given, with their labels: this row's and the other one.
     facts : object
         What its special editor shows beyond the value; None where it has none.
     """
@@ -64,12 +66,14 @@ class FormRow:
     entries: tuple[Entry, ...] = ()
     target: Path | None = None
     number: int | None = None
+    instead: tuple[tuple[str, str], ...] = ()
     facts: Any = None
 
     @property
     def removable(self) -> bool:
         """Whether the file holds the key and would be complete without it."""
-        return self.row.value is not None and not self.row.required and isinstance(self.row.path[-1], str)
+        given = self.row.value is not None and isinstance(self.row.path[-1], str)
+        return given and not (self.row.required or self.instead)
 
     @property
     def bounds(self) -> str:
@@ -194,7 +198,9 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
     shown: list[FormRow] = []
     absent: list[Row] = []
     below: list[Path] = []
-    for row in rows(study.document, path):
+    of_table = rows(study.document, path)
+    other = {row.path[-1]: row for row in of_table}
+    for row in of_table:
         faulty = any(fault.path[: len(row.path)] == row.path for fault in study.faults)
         if row.kind == "table" and row.value is not None and depth < DEEPEST and isinstance(row.value, Mapping):
             below.append(row.path)
@@ -210,6 +216,11 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
                 for key in row.value
                 if (inner := row_at(study.document, (*row.path, key))) is not None
             ]
+        elif row.instead and not _given(other[row.instead]) and (_given(row) or faulty):
+            both = tuple((str(key), one.label) for key, one in other.items() if key in {row.path[-1], row.instead})
+            shown.append(replace(_form_row(study, row, places), instead=both))
+        elif row.instead and _given(other[row.instead]) and not _given(row):
+            continue
         elif row.value is None and _optional(row) and not (row.required or faulty):
             absent.append(row)
         elif row.path[-1] != "id" or len(path) < 3:
@@ -225,6 +236,10 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
             yield Section(path, words, own, missing)
     for table in below:
         yield from _sections(study, table, places, depth + 1)
+
+
+def _given(row: Row) -> bool:
+    return row.value not in (None, ())
 
 
 def _optional(row: Row) -> bool:
@@ -252,7 +267,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         tuple(_entries(study, row)),
         named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
         number,
-        facts.of(study, row) if (facts := FACTS.get((row.model, str(path[-1])))) is not None else None,
+        facts=facts.of(study, row) if (facts := FACTS.get((row.model, str(path[-1])))) is not None else None,
     )
 
 

@@ -57,6 +57,14 @@ class SwitchKind:
 
 
 @dataclass(frozen=True, slots=True)
+class SwitchKey:
+    """Give one key in place of another one of the same table, of two of which exactly one is given."""
+
+    path: Path
+    to: str
+
+
+@dataclass(frozen=True, slots=True)
 class AddElement:
     """Add an element to a section of tables or a list of tables."""
 
@@ -111,6 +119,6 @@ class RetypeFile:
 
 
 Request: TypeAlias = (
-    SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | AddElement | DuplicateElement | MoveElement
-    | MoveEntry | DeleteElement | RenameElement | RetypeFile
+    SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | DuplicateElement
+    | MoveElement | MoveEntry | DeleteElement | RenameElement | RetypeFile
 )  # fmt: skip

@@ -254,6 +254,28 @@ def test_a_kind_is_switched_and_back_without_losing_values(designer: Any) -> Non
     assert designer.editing.opened.study.document["tasks"]["explore"] == before
 
 
+def test_one_key_is_given_in_place_of_another_and_back_without_losing_its_value(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    task = ("tasks", "reach")
+    designer.editing.select(task)
+    before = designer.text
+    row = designer.row(*task, "count")
+    assert not row.remove.isVisible()
+    assert not [one for one in designer.place.form.rows if one.row.row.path[-1] == "duration_s"]
+    row.keys.buttons[1].click()
+    study = designer.editing.opened.study
+    assert study.faults == ()
+    assert "count" not in study.document["tasks"]["reach"]
+    designer.row(*task, "duration_s").keys.buttons[0].click()
+    assert designer.editing.opened.study.document["tasks"]["reach"]["count"] == 6
+    designer.editing.undo()
+    designer.editing.undo()
+    assert designer.text == before
+    designer.editing.select(("blocks", "liquids"))
+    designer.row("blocks", "liquids", "conditions").keys.buttons[1].click()
+    assert "nothing that Stimulus can name" in designer.row("blocks", "liquids", "conditions").sentence.text()
+
+
 def test_an_optional_key_is_written_and_removed(designer: Any) -> None:
     designer.controller.open("kitchen")
     before = designer.text

@@ -52,8 +52,8 @@ REST = '[pages.rest]\nkind = "break"\ntitle = "Rest"\nbody = "Rest."\n'
         ([('design = "2ifc"', 'design = "2ifx"')], "", "design", 'there is no design "2ifx" (did you mean "2ifc"?)'),
         ([('method = "few"', 'method = "fev"')], "", "method", 'there is no method "fev"'),
         ([(STIMULUS, 'stimulus = "viscosty"')], "", "stimulus", 'there is no stimulus "viscosty"'),
-        ([(STIMULUS, STIMULUS + '\nconditions = ["oil"]')], "", "stimulus", "has conditions and a stimulus"),
-        ([(STIMULUS + "\n", ""), ('method = "few"\n', "")], "", "conditions", "has neither conditions nor a stimulus"),
+        ([(STIMULUS, STIMULUS + '\nconditions = ["oil"]')], "", "conditions", "either conditions or stimulus"),
+        ([(STIMULUS + "\n", ""), ('method = "few"\n', "")], "", "conditions", "either conditions or stimulus"),
         ([(STIMULUS, STIMULUS + "\nrepetitions = 2")], "", "repetitions", "give it in the method's table"),
         ([(STIMULUS, STIMULUS + "\nstandards = [3]")], "", "standards", "has no standard 3 (these: 1, 2)"),
         (

@@ -162,17 +162,17 @@ def study(*edits: tuple[str, str]) -> Protocol:
         ),
         (
             [('stimulus = "damping"', 'stimulus = "damping"\nconditions = ["damper"]')],
-            "blocks.thicker.stimulus",
-            'stimulus = "damping"',
-            "has conditions and a stimulus",
-            "give one of the two",
+            "blocks.thicker.conditions",
+            'conditions = ["damper"]',
+            "give either conditions or stimulus, one of the two",
+            "",
         ),
         (
             [('stimulus = "damping"\n', ""), ('design = "pair"\nmethod = "few"\n', "")],
             "blocks.thicker.conditions",
             "[blocks.thicker]",
-            "has neither conditions nor a stimulus",
-            "give one of the two",
+            "give either conditions or stimulus, one of the two",
+            "",
         ),
         (
             [("[methods.few]\nkind = \"constant\"", "[methods.few]\nkind = \"constant\"\nlevels = [0.1, 0.9]")],

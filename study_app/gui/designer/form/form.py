@@ -12,12 +12,13 @@ from study_app.gui.designer.form.row_fields import add_button, stacked
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import Card, Icon, Rule
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form_rows import Form, FormRow, Section
-from study_app.viewmodels.designer.requests import AddKey, RemoveKey
+from study_app.viewmodels.designer.requests import AddKey, RemoveKey, SwitchKey
 
 ACROSS = 2
 
@@ -33,6 +34,7 @@ class RowWidget(QWidget):
         special = special_editor_of(row)
         wide = row.row.kind == "paragraphs" if special is None else special.wide
         self.field = field(row) if special is None else special.make(row)
+        self.keys = Segments("Which of the two is given") if row.instead else None
         self.words = label(row.row.label, "label", wraps=True)
         if not wide:
             self.words.setFixedWidth(LABEL_PX)
@@ -61,11 +63,22 @@ class RowWidget(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
         column.addLayout(across)
+        if self.keys is not None:
+            self.keys.show_values(row.instead, row.row.path[-1])
+            self.keys.chosen.connect(self._switch)
+            above = QHBoxLayout()
+            above.setContentsMargins(0 if wide else LABEL_PX + 8, 0, 0, 0)
+            above.addWidget(self.keys, 0, Qt.AlignmentFlag.AlignLeft)
+            column.insertLayout(0, above)
         if wide:
             column.addWidget(self.field)
         column.addWidget(self.wrong)
         self.remove.setVisible(row.removable)  # in its layout by now: it would be shown as a window before
         self.show_row(row)
+
+    def _switch(self, key: object) -> None:
+        if key != self.row.row.path[-1]:
+            self.field.asked.emit(SwitchKey(self.row.row.path, str(key)))
 
     def show_row(self, row: FormRow) -> None:
         """Show the row's value and faults."""
@@ -97,7 +110,7 @@ class RowWidget(QWidget):
         reason = f" ({row.reason})" if row.reason else ""
         permitted = f"Permitted: {self.row.bounds}{reason}." if self.row.bounds and not row.choices else ""
         words = " ".join(filter(None, (sentence or row.help, permitted)))
-        return " ".join(words.split())
+        return " ".join(words.replace("`", "").split())
 
 
 class FormCard(Card):

@@ -198,4 +198,4 @@ def structure(row: FormRow) -> object:
     count = len(row.row.value) if isinstance(row.row.value, tuple) and (row.row.kind, inner) != ("", "") else 0
     counted = count if row.row.kind in {"texts", "points"} or inner in {"texts", "points"} else 0
     choices = tuple(choice.value for choice in row.row.choices) if row.row.kind != "reference" else ()
-    return row.row.path, row.row.kind, inner, counted, choices, row.languages, row.entries, row.removable
+    return row.row.path, row.row.kind, inner, counted, choices, row.languages, row.entries, row.removable, row.instead
