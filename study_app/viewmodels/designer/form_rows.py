@@ -17,9 +17,11 @@ from study_app.protocol.source.line_numbers import Places
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
 from study_app.viewmodels.designer.special import FACTS
+from study_app.viewmodels.designer.special.questions import QuestionLines, question_lines
 
 DEEPEST: Final = 3
 """So many tables within each other are shown in one form."""
+NO_QUESTIONS: Final = QuestionLines((), ())
 LEAST, MOST = "at least ", "at most "
 
 
@@ -117,6 +119,8 @@ class Form:
         What is wrong with it that belongs to no row.
     position : tuple of int or None
         Its place in the session or list and how many there are, from 1; None where it has no order.
+    questions : QuestionLines
+        The questions of the questionnaire that it is in, itself included; none where it is no question.
     """
 
     path: Path
@@ -127,6 +131,7 @@ class Form:
     sections: tuple[Section, ...] = ()
     faults: tuple[str, ...] = ()
     position: tuple[int, int] | None = None
+    questions: QuestionLines = NO_QUESTIONS
 
     @property
     def rows(self) -> tuple[FormRow, ...]:
@@ -150,7 +155,7 @@ def form(study: Study, path: Path) -> Form:
         name = str(path[1])
     return Form(
         path, title_of(document, path), icon_of(path), _kind(path), None if name is None else str(name), sections, own,
-        position_of(document, path),
+        position_of(document, path), question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
     )  # fmt: skip
 
 

@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout
 from study_app.gui.designer.form.form_foot import FormFoot
 from study_app.gui.designer.form.form_head import LABEL_PX, FormHead
 from study_app.gui.designer.form.list_fields import field, structure
-from study_app.gui.designer.form.row_fields import add_button, stacked
+from study_app.gui.designer.form.question_rows import Panel, QuestionRow, QuestionRows
+from study_app.gui.designer.form.row_fields import LanguagesField, add_button, stacked
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
@@ -17,8 +18,10 @@ from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import Card, Icon, Rule
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
+from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.form_rows import Form, FormRow, Section
 from study_app.viewmodels.designer.requests import AddKey, RemoveKey, SwitchKey
+from study_app.viewmodels.designer.special.questions import QuestionLine
 
 ACROSS = 2
 
@@ -29,10 +32,9 @@ class RowWidget(QWidget):
     def __init__(self, row: FormRow) -> None:
         super().__init__()
         self.row = row
-        self.key = structure(row)
+        self.key = structure_of(row)
         self.refusal = ""
-        special = special_editor_of(row)
-        wide = row.row.kind == "paragraphs" if special is None else special.wide
+        special, wide = special_editor_of(row), is_wide(row)
         self.field = field(row) if special is None else special.make(row)
         self.keys = Segments("Which of the two is given") if row.instead else None
         self.words = label(row.row.label, "label", wraps=True)
@@ -70,6 +72,8 @@ class RowWidget(QWidget):
             above.setContentsMargins(0 if wide else LABEL_PX + 8, 0, 0, 0)
             above.addWidget(self.keys, 0, Qt.AlignmentFlag.AlignLeft)
             column.insertLayout(0, above)
+        if wide and len(row.languages) > 1 and not stacked(row):
+            column.addLayout(language_heads(row.languages))
         if wide:
             column.addWidget(self.field)
         column.addWidget(self.wrong)
@@ -95,11 +99,13 @@ class RowWidget(QWidget):
         self.wrong.setVisible(bool(found))
         row = self.row.row
         self.field.setAccessibleDescription(". ".join(filter(None, (row.help, self.row.bounds, *found))))
+        some_missing = isinstance(self.field, LanguagesField) and self.field.some_missing
         for part in self.field.findChildren(QWidget):
             if isinstance(part, TypedLine | TypedText):
                 part.setAccessibleDescription(self.field.accessibleDescription())
             if isinstance(part, TypedLine) and not self.field.refusal:
-                part.show_refused(bool(self.row.faults) and part.focusPolicy() != Qt.FocusPolicy.NoFocus)
+                blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
+                part.show_refused(bool(self.row.faults) and blamed)
 
     @property
     def help(self) -> str:
@@ -129,6 +135,7 @@ class FormCard(Card):
         self.form: Form | None = None
         self.read_only = False
         self.rows: list[RowWidget] = []
+        self.others: list[QuestionRow] = []
         self.adds: list[QWidget] = []
         self._focused: RowWidget | None = None
         self.head = FormHead()
@@ -157,7 +164,7 @@ class FormCard(Card):
         self.own.setText("\n".join(form.faults))
         self.own.setVisible(bool(form.faults))
         same = before is not None and before.path == form.path and _shape(before) == _shape(form)
-        if same and [row.key for row in self.rows] == [structure(row) for row in form.rows]:
+        if same and [row.key for row in self.rows] == [structure_of(row) for row in form.rows]:
             for widget, row in zip(self.rows, form.rows, strict=True):
                 widget.show_row(row)
         else:
@@ -172,10 +179,19 @@ class FormCard(Card):
         self._focused = None
         self.flush()
         inside = QWidget()
-        sections = QVBoxLayout(inside)
-        sections.setContentsMargins(0, 2, 8, 2)
-        sections.setSpacing(7)
-        self.rows, self.adds = [], []
+        whole = sections = QVBoxLayout(inside)
+        whole.setContentsMargins(0, 2, 8, 2)
+        whole.setSpacing(7)
+        self.rows, self.adds, self.others = [], [], []
+        if form.questions.lines:
+            panel = Panel()
+            sections = QVBoxLayout(panel)
+            sections.setContentsMargins(10, 8, 4, 8)
+            sections.setSpacing(7)
+            at = next((at for at, line in enumerate(form.questions.lines) if line.path == form.path), 0)
+            whole.addWidget(self._others(form.questions.lines[:at], form.questions.languages))
+            whole.addWidget(panel)
+            whole.addWidget(self._others(form.questions.lines[at + 1 :], ()))
         for number, section in enumerate(form.sections):
             if number:
                 sections.addWidget(Rule())
@@ -183,9 +199,9 @@ class FormCard(Card):
                 sections.addLayout(self._heading(section, removable=section.path != form.path))
             heads: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
-                beside = () if stacked(row) else row.languages
+                beside = () if stacked(row) or is_wide(row) else row.languages
                 if len(beside) > 1 and beside != heads:
-                    sections.addLayout(language_heads(beside))
+                    sections.addLayout(language_heads(beside, (LABEL_PX + 8, FIELD_PX + 8)))
                 heads = beside
                 sections.addWidget(self._row(row))
             if section.absent and not self.read_only:
@@ -198,9 +214,9 @@ class FormCard(Card):
                     grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
                     self.adds.append(made)
                 sections.addLayout(grid)
-        sections.addStretch()
+        whole.addStretch()
         dress(inside, self.theme)
-        self.inside, self.sections = inside, sections
+        self.inside, self.sections = inside, whole
         old = self.area.takeWidget()
         self.area.setWidget(inside)
         if old is not None:
@@ -208,6 +224,17 @@ class FormCard(Card):
         QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(scrolled))
         if focused is not None and stays:
             self.focus(focused)
+
+    def _others(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...]) -> QuestionRows:
+        made = QuestionRows(lines, languages)
+        made.write_asked.connect(self.write)
+        self.others += made.rows
+        return made
+
+    def write(self, path: Path) -> None:
+        """Select a question and give the keyboard to its text."""
+        self.open_asked.emit(path)
+        self.focus((*path, "text"))
 
     def _heading(self, section: Section, *, removable: bool) -> QHBoxLayout:
         heading = QHBoxLayout()
@@ -224,6 +251,7 @@ class FormCard(Card):
         made = RowWidget(row)
         made.field.asked.connect(self.asked)
         made.field.open_asked.connect(self.open_asked)
+        made.field.write_asked.connect(self.write)
         made.field.came.connect(lambda: self._come(made))
         made.field.setEnabled(not self.read_only or row.row.kind in {"list", "tables", "references", "reference"})
         made.remove.setEnabled(not self.read_only)
@@ -242,7 +270,7 @@ class FormCard(Card):
         found = max(inner, key=lambda row: len(row.row.row.path), default=None)
         if found is None:
             return False
-        found.field.setFocus(Qt.FocusReason.OtherFocusReason)
+        found.field.take_keyboard()
         self._come(found)
         self.area.ensureWidgetVisible(found, 0, 40)
         return True
@@ -282,10 +310,22 @@ def special_editor_of(row: FormRow) -> SpecialEditor | None:
     return EDITORS.get((row.row.model, str(row.row.path[-1])))
 
 
-def language_heads(languages: tuple[tuple[str, str], ...]) -> QHBoxLayout:
-    """Return the names of languages above the columns of their texts."""
+def is_wide(row: FormRow) -> bool:
+    """Return whether the editor of a row takes the width of the form."""
+    special = special_editor_of(row)
+    return row.row.kind == "paragraphs" if special is None else special.wide
+
+
+def structure_of(row: FormRow) -> object:
+    """Return what makes another editor of a row necessary."""
+    special = special_editor_of(row)
+    return structure(row), None if special is None else special.structure(row)
+
+
+def language_heads(languages: tuple[tuple[str, str], ...], inset: tuple[int, int] = (0, 0)) -> QHBoxLayout:
+    """Return the names of languages above the columns of their texts; ``inset`` is the room left and right [px]."""
     heads = QHBoxLayout()
-    heads.setContentsMargins(LABEL_PX + 8, 0, FIELD_PX + 8, 0)
+    heads.setContentsMargins(inset[0], 0, inset[1], 0)
     heads.setSpacing(8)
     for _code, language in languages:
         heads.addWidget(label(language, "small", "text2"), 1)
@@ -293,4 +333,9 @@ def language_heads(languages: tuple[tuple[str, str], ...]) -> QHBoxLayout:
 
 
 def _shape(form: Form) -> object:
-    return [(section.path, section.title, tuple(row.path for row in section.absent)) for section in form.sections]
+    others = [line for line in form.questions.lines if line.path != form.path]
+    return (
+        others,
+        form.questions.languages,
+        [(section.path, section.title, tuple(row.path for row in section.absent)) for section in form.sections],
+    )

@@ -8,6 +8,7 @@ from typing import Any
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QWidget
 
+from study_app.authoring.fields import Choice as Choosable
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
@@ -24,12 +25,14 @@ _PARTS = re.compile(r",?[;\s]+")
 class Field(QWidget):
     """Edits the value of one row.
 
-    ``asked`` carries a request, ``open_asked`` the path of an element to select, ``came`` says that it is focused;
+    ``asked`` carries a request, ``open_asked`` the path of an element to select, ``write_asked`` that of one
+    whose text is to be written; ``came`` says that it is focused;
     ``caption`` stands above an editor that takes the width of the form.
     """
 
     asked = Signal(object)
     open_asked = Signal(object)
+    write_asked = Signal(object)
     came = Signal()
     caption = ""
 
@@ -49,6 +52,10 @@ class Field(QWidget):
     def show_value(self) -> None:
         """Show the value."""
         raise NotImplementedError
+
+    def take_keyboard(self) -> None:
+        """Give the keyboard to the editor."""
+        self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def set_value(self, value: Any, *, typing: bool = False) -> None:
         """Ask for a value."""
@@ -126,7 +133,7 @@ class LanguagesField(Field):
             name = row.row.label if len(row.languages) == 1 else f"{row.row.label}, {language}"
             made: TypedLine | TypedText = TypedText(name) if several else TypedLine(name)
             if len(row.languages) > 1:
-                made.setPlaceholderText(language)
+                made.setPlaceholderText(f"Missing in {language}")
                 made.setToolTip(language)
             if code == "ar":
                 made.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
@@ -139,12 +146,23 @@ class LanguagesField(Field):
         self.setFocusProxy(next(iter(self.lines.values())))
         self.show_value()
 
+    @property
+    def some_missing(self) -> bool:
+        """Whether a language has a text and another one has none."""
+        written = [bool(line.words().strip()) for line in self.lines.values()]
+        return any(written) and not all(written)
+
     def show_value(self) -> None:
         """Show each text; a plain one stands for the first language."""
         value = self.row.row.value
         for number, (code, line) in enumerate(self.lines.items()):
             text = value.get(code, "") if isinstance(value, dict) else value if number == 0 else ""
             line.show_text(text if isinstance(text, str) else "")
+
+    def take_keyboard(self) -> None:
+        """Give the keyboard to the first empty text."""
+        first = next((line for line in self.lines.values() if not line.words()), self)
+        first.setFocus(Qt.FocusReason.OtherFocusReason)
 
 
 class SwitchField(Field):
@@ -202,7 +220,7 @@ class ChoiceField(Field):
         """Show what is chosen; a value that cannot be chosen is shown, too, with its fault below."""
         row = self.row.row
         shown = row.default if row.value is None else row.value
-        values = [(choice.value, choice_words(choice, row.default)) for choice in row.choices]
+        values = [(choice.value, self.words(choice)) for choice in row.choices]
         if row.kind == "reference":
             values = [(choice.value, str(choice.value)) for choice in row.choices]
         if self.segments is not None:
@@ -219,6 +237,10 @@ class ChoiceField(Field):
         self.list.setCurrentIndex(self._values.index(shown) if shown in self._values else -1)
         self.list.setPlaceholderText("" if values else "Nothing can be named yet")
         self.arrow.setEnabled(self.row.target is not None)
+
+    def words(self, choice: Choosable) -> str:
+        """Return what a choice is called in the list."""
+        return choice_words(choice, self.row.row.default)
 
     def _choose(self, value: Any) -> None:
         row = self.row.row

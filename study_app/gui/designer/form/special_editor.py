@@ -9,6 +9,10 @@ from study_app.gui.designer.form.row_fields import Field
 from study_app.viewmodels.designer.form_rows import FormRow
 
 
+def _same(_row: FormRow) -> object:
+    return None
+
+
 @dataclass(frozen=True, slots=True)
 class SpecialEditor:
     """An editor of certain keys; bounds, faults, help and removal stay those of the row.
@@ -21,8 +25,11 @@ class SpecialEditor:
         Makes the editor of a row.
     wide : bool
         Whether it takes the width of the form, with the label above it.
+    structure : callable
+        Returns what makes another editor necessary, beyond what does for every row.
     """
 
     keys: tuple[tuple[str, str], ...]
     make: Callable[[FormRow], Field]
     wide: bool = False
+    structure: Callable[[FormRow], object] = _same

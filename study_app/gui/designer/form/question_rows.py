@@ -1,0 +1,136 @@
+"""Questions in lines: number, kind, and the text in each language side by side."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+
+from study_app.gui.theme.theme import RADIUS_CONTROL, TypeRole, font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import Icon, Rule
+from study_app.gui.widgets.controls import ActionButton, IconButton
+from study_app.gui.widgets.labels import Ink, figures, label
+from study_app.viewmodels.designer.special.questions import QuestionLine
+
+NUMBER_PX, ICON_PX, OPEN_PX = 18, 18, 32
+INSET_PX = NUMBER_PX + ICON_PX + 2 * 8
+
+
+class QuestionRow(QWidget):
+    """One question; ``opened`` when it is clicked or its button is pressed."""
+
+    opened = Signal()
+
+    def __init__(self, line: QuestionLine) -> None:
+        super().__init__()
+        self.line = line
+        title = next((text for text in line.texts if text), "without a text")
+        self.setAccessibleName(f"Question {line.number}, {line.kind}: {title}")
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setMinimumHeight(38)
+        number = figures(str(line.number), "label", "bad" if line.faults else "text2")
+        number.setFixedWidth(NUMBER_PX)
+        across = QHBoxLayout(self)
+        across.setContentsMargins(0, 3, 0, 3)
+        across.setSpacing(8)
+        across.addWidget(number)
+        across.addWidget(Icon(line.icon, "text2", ICON_PX))
+        self.write: ActionButton | None = None
+        for at, text in enumerate(line.texts):
+            across.addWidget(self._text(text, line.note if at == 0 else ""), 1)
+        self.open = IconButton("chevron", f"Open question {line.number}, {title}", size=OPEN_PX, role="plain")
+        self.open.clicked.connect(self.opened)
+        across.addWidget(self.open)
+
+    def _text(self, text: str, note: str) -> QWidget:
+        if not text:
+            return self._missing()
+        if not note:
+            return _column_text(text, "label")
+        both = QWidget()
+        column = QVBoxLayout(both)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(_column_text(text, "label"))
+        column.addWidget(_column_text(note, "small", "text2"))
+        both.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
+        return both
+
+    def _missing(self) -> QWidget:
+        made = QWidget()
+        made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
+        across = QHBoxLayout(made)
+        across.setContentsMargins(0, 0, 0, 0)
+        across.setSpacing(6)
+        across.addWidget(Icon("warning", "bad", 16))
+        across.addWidget(label("Missing", "label", "bad"))
+        across.addStretch()
+        self.write = ActionButton("", "Write", height=32)
+        self.write.setProperty("dense", "true")
+        self.write.setFont(font("label"))
+        self.write.setAccessibleName(f"Write the missing text of question {self.line.number}")
+        self.write.clicked.connect(self.opened)
+        across.addWidget(self.write)
+        return made
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        """Open the question."""
+        if event.button() == Qt.MouseButton.LeftButton and self.rect().contains(event.position().toPoint()):
+            self.opened.emit()
+
+
+def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
+    """Return a text as wide as its column, whatever its length."""
+    made = label(text, role, ink, wraps=True)
+    policy = made.sizePolicy()
+    policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)
+    made.setSizePolicy(policy)
+    return made
+
+
+class QuestionRows(QWidget):
+    """Questions above or below the one that is edited; ``write_asked`` carries the path of one."""
+
+    write_asked = Signal(object)
+
+    def __init__(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...] = ()) -> None:
+        super().__init__()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        if len(languages) > 1:
+            column.addWidget(LanguageNames(languages))
+        self.rows: list[QuestionRow] = []
+        for line in lines:
+            made = QuestionRow(line)
+            made.opened.connect(lambda path=line.path: self.write_asked.emit(path))
+            column.addWidget(made)
+            column.addWidget(Rule())
+            self.rows.append(made)
+
+
+class LanguageNames(QWidget):
+    """Names of languages above the columns of questions."""
+
+    def __init__(self, languages: tuple[str, ...], right: int = OPEN_PX) -> None:
+        super().__init__()
+        heads = QHBoxLayout(self)
+        heads.setContentsMargins(INSET_PX, 0, right + 8, 0)
+        heads.setSpacing(8)
+        for language in languages:
+            heads.addWidget(_column_text(language, "small", "text2"), 1)
+
+
+class Panel(Themed, QWidget):
+    """The tinted ground of the question that is edited, with an accent line at its left."""
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the ground."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(self.theme.selected))
+        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+        painter.setBrush(QColor(self.theme.accent))
+        painter.drawRect(QRectF(0, 2, 3, self.height() - 4))

@@ -1,0 +1,23 @@
+"""Sentences: their languages side by side, in the width of the form."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from study_app.gui.designer.form.row_fields import LanguagesField
+from study_app.gui.designer.form.special_editor import SpecialEditor
+
+QUESTIONS: Final = ("Statement", "Rating", "Slider", "Number", "Choice", "Text")
+TASKS: Final = ("Explore", "Reach", "Follow")
+DESIGNS: Final = ("Abx", "Adjusted", "Estimation", "ForcedChoice", "Oddity", "Rated", "SameDifferent", "YesNo")
+
+EDITOR: Final = SpecialEditor(
+    (
+        ("Questionnaire", "intro"),
+        *((kind, "text") for kind in QUESTIONS),
+        *((kind, "instruction") for kind in TASKS),
+        *((kind, "question") for kind in DESIGNS),
+    ),
+    LanguagesField,
+    wide=True,
+)

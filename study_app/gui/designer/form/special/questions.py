@@ -1,0 +1,39 @@
+"""The questions of a questionnaire, with their texts in each language side by side."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QBoxLayout
+
+from study_app.gui.designer.form.question_rows import QuestionRows
+from study_app.gui.designer.form.row_fields import Field, add_button
+from study_app.gui.designer.form.special_editor import SpecialEditor
+from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.requests import AddElement
+
+
+class QuestionsField(Field):
+    """The questions, in their order; each is moved, copied and deleted in its own form."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
+        self.rows = QuestionRows(row.facts.lines, row.facts.languages)
+        self.rows.write_asked.connect(self.write_asked)
+        self.add = add_button(f"Add to {row.row.label}", "Question")
+        self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.row.path)))
+        self.box.addWidget(self.rows)
+        self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
+        self.setFocusProxy(self.rows.rows[0].open if self.rows.rows else self.add)
+
+    def show_value(self) -> None:
+        """Do nothing: other questions make another field."""
+
+
+def _shown(row: FormRow) -> object:
+    return row.facts
+
+
+EDITOR: Final = SpecialEditor((("Questionnaire", "items"),), QuestionsField, wide=True, structure=_shown)

@@ -1,0 +1,122 @@
+"""Special editors in the window: what they show, and that they ask for the same steps as the editors they replace."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QWidget
+
+from study_app.authoring.fields import rows
+from study_app.gui.designer.form.special import EDITORS
+from study_app.haptics.model.steady_state import steady
+from study_app.protocol.load import load
+from study_app.protocol.source.json_schema import schema
+from study_app.viewmodels.designer.special import FACTS
+from tests.authoring.test_fields import every_row
+
+QUESTIONNAIRE = ("questionnaires", "liquid")
+ITEMS = (*QUESTIONNAIRE, "items")
+
+
+def test_every_special_editor_is_for_a_key_of_a_model() -> None:
+    keys = {(row.model, str(row.path[-1])) for row in (*every_row({}), *rows({}, ()))}
+    assert set(EDITORS) <= keys, set(EDITORS) - keys
+    assert set(FACTS) <= set(EDITORS)
+    assert {node["title"] for node in schema()["$defs"].values()} >= {model for model, _ in EDITORS}
+
+
+def press(qtbot: Any, part: QWidget) -> None:
+    qtbot.mouseClick(part, Qt.MouseButton.LeftButton)
+
+
+def test_conditions_say_liquid_delay_and_force(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("blocks", "delays"))
+    protocol = load(designer.file)
+    late = designer.row("blocks", "delays", "conditions").field.rows[1]
+    assert late.note.whole == "Thin, 200 ms late"
+    assert late.force.text() == f"{steady(protocol.scene_for('late')).force_n:.2f} N"
+    field = designer.row("blocks", "delays", "conditions").field
+    designer.file.write_text(designer.file.read_text().replace("density_kg_m3 = 1000", "density_kg_m3 = 1300"))
+    designer.controller.enter()
+    assert field.rows[1].force.text() == f"{steady(load(designer.file).scene_for('late')).force_n:.2f} N"
+    press(qtbot, field.rows[1].liquid)
+    assert designer.place.view.form.path == ("liquids", "thin")
+
+
+@pytest.mark.parametrize(
+    ("order", "repetitions", "words"),
+    [
+        ("shuffled", 1, "even on average"),
+        ("fixed", 1, "same for all"),
+        ("williams", 1, "even at 2, 4, 6 …"),
+        ("latin", 1, "even at 2, 4, 6 …"),
+    ],
+)
+def test_an_order_says_with_how_many_it_is_even(designer: Any, order: str, repetitions: int, words: str) -> None:
+    text = designer.file.read_text().replace('order = "shuffled"', f'order = "{order}"')
+    designer.file.write_text(text.replace("repetitions = 1", f"repetitions = {repetitions}"))
+    designer.controller.open("kitchen")
+    designer.editing.select(("blocks", "liquids"))
+    chip = designer.row("blocks", "liquids", "order").field.chip
+    assert chip.isVisible()
+    assert chip.word == words
+
+
+def two_languages(designer: Any) -> None:
+    text = designer.file.read_text().replace('languages = ["en"]', 'languages = ["en", "nl"]')
+    designer.file.write_text(
+        text.replace('text = "This liquid behaves like honey."', 'text = { en = "Like honey.", nl = "Als honing." }')
+    )
+    designer.controller.open("kitchen")
+
+
+def test_questions_stand_side_by_side_and_a_missing_text_is_written(qtbot: Any, designer: Any) -> None:
+    two_languages(designer)
+    designer.editing.select(QUESTIONNAIRE)
+    first, second = designer.row(*ITEMS).field.rows.rows
+    assert first.write is not None
+    assert second.write is None
+    assert second.line.texts == ("Like honey.", "Als honing.")
+    press(qtbot, first.write)
+    assert designer.place.view.form.path == (*ITEMS, 0)
+    english, dutch = designer.row(*ITEMS, 0, "text").field.lines.values()
+    assert dutch.hasFocus()
+    qtbot.keyClicks(dutch, "Dit voelt vloeibaar.")
+    qtbot.keyClick(dutch, Qt.Key.Key_Return)
+    item = designer.editing.opened.study.document["questionnaires"]["liquid"]["items"][0]
+    assert item["text"]["nl"] == "Dit voelt vloeibaar."
+    assert item["text"]["en"] == english.text() != ""
+    assert [row.line.number for row in designer.place.form.others] == [2]
+    press(qtbot, designer.place.form.others[0])
+    assert designer.place.view.form.path == (*ITEMS, 1)
+
+
+def test_the_keyboard_goes_across_the_languages_then_down(qtbot: Any, designer: Any) -> None:
+    two_languages(designer)
+    designer.editing.select((*ITEMS, 1))
+    lines = list(designer.row(*ITEMS, 1, "text").field.lines.values())
+    lines += list(designer.row(*ITEMS, 1, "short").field.lines.values())
+    lines[0].setFocus()
+    for line in lines:
+        assert QApplication.focusWidget() is line
+        qtbot.keyClick(line, Qt.Key.Key_Tab)
+
+
+@pytest.mark.parametrize("width", [1600, 1024])
+def test_the_kind_of_a_question_is_chosen_and_its_texts_stay(designer: Any, width: int) -> None:
+    designer.window.resize(width, 1000)
+    designer.controller.open("kitchen")
+    designer.editing.select((*ITEMS, 0))
+    QApplication.processEvents()
+    field = designer.row(*ITEMS, 0, "kind").field
+    assert field.all.isVisible() != field.list.isVisible()
+    if field.all.isVisible():
+        next(button for button in field.all.buttons if button.text() == "Slider").click()
+    else:
+        field.list.activated.emit(field.list.findText("Slider"))
+    item = designer.editing.opened.study.document["questionnaires"]["liquid"]["items"][0]
+    assert item["kind"] == "slider"
+    assert item["short"] == "Feels like a liquid"
