@@ -31,6 +31,7 @@ from study_app.viewmodels.designer.requests import (
     Request,
     SetText,
     SetValue,
+    Several,
     SwitchKey,
     SwitchKind,
 )
@@ -94,7 +95,17 @@ class Steps:
             return Step(f"Rename to {asked.name}", edits, after)
         if isinstance(asked, DeleteElement):
             return _delete(study, asked)
+        if isinstance(asked, Several):
+            return self._several(study, asked)
         raise Refused("this cannot be done to a study")
+
+    def _several(self, study: Study, asked: Several) -> Step:
+        edits: tuple[Edit, ...] = ()
+        for one in asked.requests:
+            step = self.step(study, one)
+            study, _ = study.edited(*step.edits)
+            edits += step.edits
+        return Step(asked.words, edits)
 
     def _switch(self, study: Study, asked: SwitchKind) -> Step:
         kept = self._left.get(asked.path, {})

@@ -211,6 +211,7 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
             below.append(row.path)
         elif (
             row.kind == "tables"
+            and (row.model, row.path[-1]) not in FACTS
             and depth < DEEPEST
             and len(row.path) > 1
             and isinstance(row.value, Mapping)

@@ -118,7 +118,15 @@ class RetypeFile:
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class Several:
+    """Several requests, one after the other, as one step."""
+
+    words: str
+    requests: tuple[Request, ...]
+
+
 Request: TypeAlias = (
     SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | DuplicateElement
-    | MoveElement | MoveEntry | DeleteElement | RenameElement | RetypeFile
+    | MoveElement | MoveEntry | DeleteElement | RenameElement | RetypeFile | Several
 )  # fmt: skip

@@ -5,15 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.authoring.fields import rows
 from study_app.gui.designer.form.special import EDITORS
+from study_app.gui.widgets.controls import IconButton
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.load import load
 from study_app.protocol.source.json_schema import schema
 from study_app.viewmodels.designer.special import FACTS
+from tests.authoring.grown import PROTOCOLS
 from tests.authoring.test_fields import every_row
 
 QUESTIONNAIRE = ("questionnaires", "liquid")
@@ -120,3 +123,83 @@ def test_the_kind_of_a_question_is_chosen_and_its_texts_stay(designer: Any, widt
     item = designer.editing.opened.study.document["questionnaires"]["liquid"]["items"][0]
     assert item["kind"] == "slider"
     assert item["short"] == "Feels like a liquid"
+
+
+def test_a_target_is_dragged_moved_by_keys_and_typed(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("tasks", "reach"))
+    before = designer.text
+    field = designer.row("tasks", "reach", "targets_mm").field
+
+    def targets() -> Any:
+        return designer.editing.opened.study.document["tasks"]["reach"]["targets_mm"]
+
+    QApplication.processEvents()
+    view = field.front
+    start, end = (view.place(point).toPoint() for point in ((30.0, 0.0, 0.0), (20.0, 12.0, 0.0)))
+    qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=start)
+    for share in (0.3, 0.6, 1.0):
+        QApplication.sendEvent(view, _drag(view, start + (end - start) * share))
+    assert targets() == ((-30, 0, 0), (30, 0, 0))
+    qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=end)
+    x, y, z = targets()[1]
+    assert (x, z) == (pytest.approx(20, abs=1), 0)
+    assert y == pytest.approx(12, abs=1)
+    assert len(designer.editing.opened.history.done) == 1
+    field.above.setFocus()
+    qtbot.keyClick(field.above, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
+    assert targets()[1] == (x, y, 5)
+    for _ in range(20):
+        qtbot.keyClick(field.above, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
+    assert targets()[1] == (x, y, 24)
+    assert designer.editing.opened.study.faults == ()
+    qtbot.keyClick(field.above, Qt.Key.Key_PageDown)
+    assert "target 1 of 2" in field.above.accessibleDescription()
+    line = field.lines[0][1]
+    line.setFocus()
+    line.selectAll()
+    qtbot.keyClicks(line, "-7.5")
+    qtbot.keyClick(line, Qt.Key.Key_Return)
+    assert targets()[0] == (-30, -7.5, 0)
+    while designer.editing.opened.history.done:
+        designer.editing.undo()
+    assert designer.text == before
+
+
+def _drag(view: QWidget, at: QPoint) -> QMouseEvent:
+    return QMouseEvent(
+        QEvent.Type.MouseMove, QPointF(at), QPointF(view.mapToGlobal(at)), Qt.MouseButton.NoButton,
+        Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
+    )  # fmt: skip
+
+
+def test_points_of_a_scale_are_written_added_and_removed_in_every_language(qtbot: Any, designer: Any) -> None:
+    text = (PROTOCOLS / "rek2024.toml").read_text().replace('name = "rek2024"', 'name = "kitchen"')
+    designer.file.write_text(text)
+    designer.controller.open("kitchen")
+    designer.editing.select(("scales", "agreement"))
+
+    def labels() -> Any:
+        return designer.editing.opened.study.document["scales"]["agreement"]["labels"]
+
+    def field() -> Any:
+        return designer.row("scales", "agreement", "labels").field
+
+    first = labels()
+    line = field().lines[6][1]
+    line.setFocus()
+    line.selectAll()
+    qtbot.keyClicks(line, "Eens")
+    qtbot.keyClick(line, Qt.Key.Key_Return)
+    assert labels()["nl"] == (*first["nl"][:6], "Eens")
+    press(qtbot, field().add)
+    assert [len(words) for words in labels().values()] == [8, 8]
+    designer.editing.undo()
+    assert [len(words) for words in labels().values()] == [7, 7]
+    designer.editing.redo()
+    away = [part for part in field().findChildren(IconButton) if part.accessibleName() == "Remove point 8"]
+    press(qtbot, away[0])
+    designer.editing.undo()
+    designer.editing.undo()
+    designer.editing.undo()
+    assert designer.text == text
