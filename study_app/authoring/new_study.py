@@ -3,18 +3,43 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+from study_app.authoring.changes.languages import languages_of, with_language, without_language
 from study_app.authoring.drafts import save
 from study_app.authoring.study import Study, read
 from study_app.authoring.templates import FOLDER, templates
 from study_app.authoring.writer.edits import Set
 from study_app.authoring.writer.refused import Refused
+from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import shipped
 from study_app.protocol.source.problems import did_you_mean
 from study_app.workspace import workspace
 
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What a new study begins with; what is left out stays as it is in the template.
+
+    Attributes
+    ----------
+    title : str
+        Its title, "" for that of the template.
+    languages : tuple of str
+        Its languages; the texts of those that the template lacks are missing.
+    values : tuple of (tuple of str, object)
+        Answers to the template's own questions: key and value.
+    """
+
+    title: str = ""
+    languages: tuple[str, ...] = ()
+    values: tuple[tuple[Place, Any], ...] = ()
+
+
+NO_ANSWERS: Final = Answers()
 FIRST_VERSION: Final = "0.1"
 _NAME: Final = re.compile(r"[a-z][a-z0-9]{0,39}")
 _SELF: Final = "liquid-study check NAME"
@@ -44,6 +69,39 @@ def copy_of(study: Study, name: str) -> Study:
     _check_name(name)
     named = Study(study.text.replace(_SELF, f"liquid-study check {name}"), study.folder)
     return named.edited(Set(("study", "name"), name), Set(("study", "version"), FIRST_VERSION))[0]
+
+
+def answered(study: Study, answers: Answers) -> Study:
+    """Return a study with the answers to the questions that it begins with.
+
+    Raises
+    ------
+    Refused
+        An answer is not permitted.
+    """
+    for place, value in answers.values:
+        study, _ = study.edited(Set(place, value))
+        fault = next((one for one in study.faults if one.path[: len(place)] == place), None)
+        if fault is not None:
+            raise Refused(f"{fault.message}{f' ({fault.hint})' if fault.hint else ''}")
+    if answers.title:
+        study, _ = study.edited(*_titled(study, answers.title))
+    there = languages_of(study)
+    for code in answers.languages:
+        if code not in there:
+            study, _ = study.edited(*with_language(study, code))
+    for code in there:
+        if answers.languages and code not in answers.languages:
+            study, _ = study.edited(*without_language(study, code))
+    return study
+
+
+def _titled(study: Study, title: str) -> tuple[Set, ...]:
+    head = study.document["study"]
+    before = head.get("title") if isinstance(head, Mapping) else None
+    if isinstance(before, Mapping):
+        return (Set(("study", "title", languages_of(study)[0]), title),)
+    return (Set(("study", "title"), title),)
 
 
 def check_free(name: str) -> Path:

@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from study_app.authoring.new_study import copy_of, template
+from study_app.authoring.fields import row_at
+from study_app.authoring.known_answers import known_answers, simulated
+from study_app.authoring.new_study import Answers, answered, copy_of, template
 from study_app.authoring.study import read
-from study_app.authoring.templates import FOLDER, templates
+from study_app.authoring.templates import FOLDER, QUESTIONS, templates
 from study_app.authoring.writer.refused import Refused
 from study_app.cli import commands
 from study_app.errors import StudyError
@@ -50,6 +52,49 @@ def test_each_template_is_rehearsed(name: str, tmp_path: Path) -> None:
     folder = rehearse(str(FOLDER / f"{name}.toml"), participants=1, seed=1, results=tmp_path / name, recordings=False)
     assert len(StudyFolder(folder).sessions()) == 1
     assert verify(folder).sound
+
+
+@pytest.mark.parametrize("name", templates())
+def test_each_template_asks_at_most_five_questions_about_keys_that_it_has(name: str) -> None:
+    document, asked = template(name).document, QUESTIONS.get(name, ())
+    assert 3 + len(asked) <= 5
+    for _, path in asked:
+        row = row_at(document, path)
+        assert row is not None
+        assert row.kind in {"number", "whole number", "numbers", "vector", "either"}
+
+
+def test_the_answers_are_edits_of_the_template() -> None:
+    before = template("viscosity-jnd")
+    references, trials = (path for _, path in QUESTIONS["viscosity-jnd"])
+    given = Answers("Which is thicker?", ("en", "de"), ((references, [4, 8]), (trials, 60)))
+    after = answered(before, given)
+    document = after.document
+    assert document["study"]["title"] == {"en": "Which is thicker?"}
+    assert document["study"]["languages"] == ("en", "de")
+    assert document["stimuli"]["damping"]["standards"] == (4, 8)
+    assert document["methods"]["adaptive"]["trials"] == 60
+    assert {fault.message for fault in after.faults} == {'is missing in "de"'}
+    assert after.text.count("#") == before.text.count("#")
+    assert answered(before, Answers(languages=("en",))).text == before.text
+    with pytest.raises(Refused, match="must be at least"):
+        answered(before, Answers(values=((trials, 0),)))
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", sorted(ADAPTIVE))
+def test_an_adaptive_template_recovers_its_planted_threshold(name: str) -> None:
+    known, protocol = known_answers()[name], template(name).protocol
+    assert protocol is not None
+    found = simulated(protocol, known.planted, known.unit, known.source)
+    assert found.recovered
+    assert found == known
+
+
+def test_every_adaptive_template_has_a_known_answer_that_is_recovered() -> None:
+    assert set(known_answers()) == ADAPTIVE
+    assert all(known.recovered for known in known_answers().values())
 
 
 def new(*words: str) -> Result:

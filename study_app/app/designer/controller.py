@@ -18,7 +18,7 @@ from study_app.app.designer.steps import delete_prompt
 from study_app.app.designer.studies import header_state, new_choices, studies
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.facts import facts
-from study_app.authoring.new_study import template
+from study_app.authoring.new_study import NO_ANSWERS, Answers, answered, template
 from study_app.authoring.study import read
 from study_app.authoring.writer.refused import Refused
 from study_app.errors import StudyError
@@ -101,7 +101,7 @@ class DesignerController(QObject):
             return
         self._take(opened)
 
-    def begin(self, source: str, name: str) -> None:
+    def begin(self, source: str, name: str, answers: Answers = NO_ANSWERS) -> None:
         """Begin a study under a name, as a copy of a template ("template:NAME") or of another study."""
         try:
             if source.startswith("template:"):
@@ -109,7 +109,7 @@ class DesignerController(QObject):
             else:
                 file = find(source)
                 study = read(file.read_bytes(), file.parent)
-            opened = open_new(study, name)
+            opened = open_new(answered(study, answers), name)
         except StudyError as error:
             self.place.refuse_new(f"{error}.")
             return

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from datetime import datetime
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from study_app.app.designer.open_study import OpenStudy, unsaved_studies
-from study_app.authoring.fields import label_of
 from study_app.authoring.names import Document
 from study_app.authoring.new_study import template
-from study_app.authoring.outline import title_of
 from study_app.authoring.study import read
 from study_app.authoring.templates import templates
 from study_app.errors import StudyError
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import has
 from study_app.protocol.source.files import find, shipped, shipped_file
-from study_app.viewmodels.designer.form_rows import value_at
+from study_app.viewmodels.designer.new_study import TEMPLATES, TemplateChoice, copy_choice, template_choice
 from study_app.viewmodels.designer.outline_rows import FIRST
-from study_app.viewmodels.designer.prompts import TemplateChoice
 from study_app.viewmodels.designer.view import HeaderState, StudyChoice, problems_chip
 from study_app.viewmodels.home import holds_liquids_alone, is_shipped, sources
 
@@ -71,17 +68,19 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
     StudyError
         The study ``source`` cannot be read.
     """
-    choices = [
-        TemplateChoice(f"template:{name}", _template_title(name), _described(template(name).document)[1])
-        for name in templates()
-    ]
-    choices.sort(key=lambda choice: choice.source == "template:empty")
+    in_order = [name for name in TEMPLATES if name in templates()]
+    choices = [_template_choice(name) for name in dict.fromkeys((*in_order, *templates()))]
     copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
     for name in copied:
         file = shipped_file(name) if name in shipped() else find(name)
-        title, description = _described(read(file.read_bytes(), file.parent).document)
-        choices.append(TemplateChoice(name, f"{title} ({file.stem})", description, copy=True))
+        note = "ships with the program" if name in shipped() else str(file.name)
+        choices.append(copy_choice(name, read(file.read_bytes(), file.parent), note))
     return tuple(choices)
+
+
+@cache
+def _template_choice(name: str) -> TemplateChoice:
+    return template_choice(name, template(name))
 
 
 def there(document: Document, path: Place) -> Place:
@@ -102,17 +101,6 @@ def time_words(moment: str) -> str:
         return "an unknown time"
     today = kept.date() == datetime.now().astimezone().date()
     return f"today {kept:%H:%M}" if today else f"{kept:%Y-%m-%d %H:%M}"
-
-
-def _template_title(name: str) -> str:
-    return "Empty study" if name == "empty" else label_of(name.replace("-", "_")).replace(" jnd", " JND")
-
-
-def _described(document: Mapping[str, Any]) -> tuple[str, str]:
-    """Return title and description of a study."""
-    description = value_at(document, ("study", "description"))
-    title = title_of({**document, "one": {"it": document.get("study", {})}}, ("one", "it"))
-    return title, " ".join(description.split()) if isinstance(description, str) else ""
 
 
 def _file(source: str) -> Path | None:

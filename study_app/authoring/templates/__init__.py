@@ -7,6 +7,20 @@ from typing import Final
 
 FOLDER: Final = Path(__file__).parent
 
+QUESTIONS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
+    "compare-liquids": (("Each liquid comes", ("blocks", "liquids", "repetitions")),),
+    "viscosity-jnd": (
+        ("References", ("stimuli", "damping", "standards")),
+        ("Trials for each", ("methods", "adaptive", "trials")),
+    ),
+    "delay-detection": (
+        ("Delays from, to", ("stimuli", "delay", "levels")),
+        ("Trials", ("methods", "adaptive", "trials")),
+    ),
+    "rate-realism": (("Each liquid comes", ("blocks", "liquids", "repetitions")),),
+}
+"""What a template asks beyond title, name and languages: words, and the key that holds the answer."""
+
 
 def templates() -> tuple[str, ...]:
     """Return the names of the templates, sorted."""

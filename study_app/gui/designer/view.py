@@ -22,9 +22,10 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
 from study_app.viewmodels.designer.fact_cards import FactCards
+from study_app.viewmodels.designer.new_study import TemplateChoice
 from study_app.viewmodels.designer.outline_rows import OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
-from study_app.viewmodels.designer.prompts import DeletePrompt, TemplateChoice
+from study_app.viewmodels.designer.prompts import DeletePrompt
 from study_app.viewmodels.designer.requests import AddElement, RetypeFile
 from study_app.viewmodels.designer.view import Banner, DesignerView, HeaderState
 
@@ -36,7 +37,7 @@ class DesignerPlace(Place):
     """Draws a `DesignerView` and says what is asked for.
 
     Signals: ``entered``, ``left``; ``asked`` (a request); ``selected`` (path) and ``back_asked``; ``study_asked``
-    (source), ``new_asked``, ``begin_asked`` (source, name); ``undo_asked``, ``redo_asked``, ``save_asked``,
+    (source), ``new_asked``, ``begin_asked`` (source, name, answers); ``undo_asked``, ``redo_asked``, ``save_asked``,
     ``save_as_version_asked`` (version); ``delete_asked`` (path); ``repair_asked`` (row, words); ``find_changed``;
     ``banner_asked`` (action).
     """
@@ -48,7 +49,7 @@ class DesignerPlace(Place):
     back_asked = Signal()
     study_asked = Signal(str)
     new_asked = Signal()
-    begin_asked = Signal(str, str)
+    begin_asked = Signal(str, str, object)
     undo_asked = Signal()
     redo_asked = Signal()
     save_asked = Signal()

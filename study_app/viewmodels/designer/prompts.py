@@ -27,13 +27,3 @@ class DeletePrompt:
     title: str
     references: tuple[str, ...]
     others: tuple[tuple[str, str], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class TemplateChoice:
-    """What a new study can begin as: its source, title and description; ``copy`` says that it is another study."""
-
-    source: str
-    title: str
-    description: str
-    copy: bool = False

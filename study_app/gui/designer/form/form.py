@@ -18,7 +18,6 @@ from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import Card, Icon, Rule
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
-from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.form_rows import Form, FormRow, Section
 from study_app.viewmodels.designer.requests import AddKey, RemoveKey, SwitchKey
 from study_app.viewmodels.designer.special.questions import QuestionLine
@@ -231,7 +230,7 @@ class FormCard(Card):
         self.others += made.rows
         return made
 
-    def write(self, path: Path) -> None:
+    def write(self, path: tuple[str | int, ...]) -> None:
         """Select a question and give the keyboard to its text."""
         self.open_asked.emit(path)
         self.focus((*path, "text"))

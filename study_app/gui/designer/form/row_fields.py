@@ -8,7 +8,6 @@ from typing import Any
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QWidget
 
-from study_app.authoring.fields import Choice as Choosable
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
@@ -238,7 +237,7 @@ class ChoiceField(Field):
         self.list.setPlaceholderText("" if values else "Nothing can be named yet")
         self.arrow.setEnabled(self.row.target is not None)
 
-    def words(self, choice: Choosable) -> str:
+    def words(self, choice: Any) -> str:
         """Return what a choice is called in the list."""
         return choice_words(choice, self.row.row.default)
 

@@ -7,7 +7,6 @@ from typing import Any, Final
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QResizeEvent
 
-from study_app.authoring.fields import Choice
 from study_app.gui.designer.form.row_fields import ChoiceField
 from study_app.gui.designer.form.special.long_texts import QUESTIONS
 from study_app.gui.designer.form.special_editor import SpecialEditor
@@ -31,7 +30,7 @@ class KindField(ChoiceField):
         self.show_value()
         self._make_room()
 
-    def words(self, choice: Choice) -> str:
+    def words(self, choice: Any) -> str:
         """Return what a kind is called."""
         return STATEMENT.capitalize() if choice.value is None else choice_words(choice, None)
 

@@ -1,0 +1,1 @@
+"""Changes of several elements at once: moves, copies as text, languages."""

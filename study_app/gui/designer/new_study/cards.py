@@ -1,0 +1,116 @@
+"""What a new study can begin as: a card for each template, and a smaller one for each study that can be copied."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QAbstractButton, QSizePolicy
+
+from study_app.gui.designer.new_study.pictures import PICTURES, paint_picture
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import RADIUS_CARD, font
+from study_app.gui.theme.themed import Themed
+from study_app.viewmodels.designer.new_study import TemplateChoice
+
+PICTURE_PX, WORDS_PX, COPY_PX = 150, 132, 76
+
+
+class TemplateButton(Themed, QAbstractButton):
+    """One thing to begin from: its picture or icon, title, description and figures."""
+
+    def __init__(self, choice: TemplateChoice) -> None:
+        super().__init__()
+        self.choice = choice
+        self.setText(choice.title)
+        self.setCheckable(True)
+        self.setAccessibleName(f"{'Copy of' if choice.copy else 'Template'} {choice.title}")
+        words = ", ".join(words for _, words in choice.figures)
+        self.setAccessibleDescription(". ".join(filter(None, (choice.description, choice.note, words))))
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+    @property
+    def picture(self) -> str:
+        """The name of its picture, "" where it has none."""
+        name = self.choice.source.removeprefix("template:")
+        return name if name in PICTURES and not self.choice.copy else ""
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room of a card."""
+        return QSize(200, COPY_PX if self.choice.copy else PICTURE_PX + WORDS_PX)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the card."""
+        t, painter = self.theme, QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        body, marked = QRectF(self.rect()).adjusted(1, 1, -1, -1), self.isChecked() or self.hasFocus()
+        empty = not self.picture and not self.choice.copy
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(t.hover if self.underMouse() or (empty and not marked) else t.surface))
+        painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
+        if self.choice.copy:
+            self._paint_copy(painter)
+        elif empty:
+            self._paint_empty(painter)
+        else:
+            paint_picture(painter, self.picture, QRectF(1, 1, self.width() - 2, PICTURE_PX))
+            self._paint_words(painter, PICTURE_PX)
+        style = Qt.PenStyle.DashLine if empty and not marked else Qt.PenStyle.SolidLine
+        edge = t.accent if marked else t.ctl if empty else t.border
+        painter.setPen(QPen(QColor(edge), 2 if marked else 1, style))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
+
+    def _paint_words(self, painter: QPainter, top: int) -> None:
+        t, wide = self.theme, self.width() - 32
+        painter.setPen(QColor(t.text))
+        painter.setFont(font("strong"))
+        painter.drawText(QRectF(16, top + 10, wide, 24), Qt.AlignmentFlag.AlignVCenter, self._elided(painter, wide))
+        painter.setPen(QColor(t.text2))
+        painter.setFont(font("label", weight=400))
+        words = Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop
+        painter.drawText(QRectF(16, top + 36, wide, 56), words, self.choice.description)
+        self._paint_figures(painter, top + WORDS_PX - 32)
+
+    def _paint_figures(self, painter: QPainter, top: int) -> None:
+        x = 16.0
+        painter.setFont(font("small", weight=500))
+        for icon, words in self.choice.figures:
+            draw_icon(painter, icon, QRectF(x, top, 16, 16), self.theme.text2, 1.8)
+            painter.setPen(QColor(self.theme.text2))
+            painter.drawText(QRectF(x + 22, top - 2, 120, 20), Qt.AlignmentFlag.AlignVCenter, words)
+            x += 22 + QFontMetricsF(painter.font()).horizontalAdvance(words) + 16
+
+    def _paint_copy(self, painter: QPainter) -> None:
+        t = self.theme
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(t.sunk))
+        painter.drawRoundedRect(QRectF(16, 18, 40, 40), 8, 8)
+        draw_icon(
+            painter, "lock" if self.choice.note.startswith("ships") else "layers", QRectF(27, 29, 18, 18), t.text2
+        )
+        painter.setPen(QColor(t.text))
+        painter.setFont(font("strong"))
+        wide = self.width() - 80
+        painter.drawText(QRectF(68, 16, wide, 22), Qt.AlignmentFlag.AlignVCenter, self._elided(painter, wide))
+        painter.setPen(QColor(t.text2))
+        painter.setFont(font("small"))
+        painter.drawText(QRectF(68, 38, wide, 20), Qt.AlignmentFlag.AlignVCenter, self.choice.note)
+
+    def _paint_empty(self, painter: QPainter) -> None:
+        t, middle = self.theme, self.width() / 2
+        painter.setPen(QPen(QColor(t.ctl), 1))
+        painter.setBrush(QColor(t.surface))
+        painter.drawEllipse(QRectF(middle - 22, 78, 44, 44))
+        draw_icon(painter, "plus", QRectF(middle - 9, 91, 18, 18), t.text, 2.0)
+        painter.setPen(QColor(t.text))
+        painter.setFont(font("strong"))
+        painter.drawText(QRectF(16, 134, self.width() - 32, 24), Qt.AlignmentFlag.AlignCenter, self.text())
+        painter.setPen(QColor(t.text2))
+        painter.setFont(font("label", weight=400))
+        words = Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
+        painter.drawText(QRectF(28, 166, self.width() - 56, 80), words, self.choice.description)
+
+    def _elided(self, painter: QPainter, wide: int) -> str:
+        return painter.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, wide)

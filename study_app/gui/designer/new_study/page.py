@@ -1,0 +1,261 @@
+"""A new study: what it can begin as at the left, the chosen one with its questions at the right."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
+
+from study_app.gui.designer.new_study.cards import TemplateButton
+from study_app.gui.designer.new_study.questions import Questions
+from study_app.gui.designer.new_study.recovery_bar import RecoveryBar
+from study_app.gui.theme.themed import Themed, dress, take_away
+from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
+from study_app.gui.widgets.controls import ActionButton, IconButton
+from study_app.gui.widgets.labels import Elided, figures, label
+from study_app.viewmodels.designer.new_study import TemplateChoice
+
+SIDE_PX, SIDE_NARROW_PX, NARROW_BELOW = 400, 330, 1200
+LOW_BELOW = 880
+ACROSS, COPIES_ACROSS = 3, 4
+
+
+class NoStudyCard(Card):
+    """What is shown while no study is open; ``new`` is its button."""
+
+    def __init__(self) -> None:
+        super().__init__("No study is open", padding=28, gap=12)
+        self.column.addWidget(label("Choose a study above, or begin a new one.", "body", "text2"))
+        self.new = ActionButton("plus", "New study …", role="primary")
+        self.column.addWidget(self.new, 0, Qt.AlignmentFlag.AlignLeft)
+        self.column.addStretch()
+
+
+class ChosenCard(Card):
+    """The chosen template: description, session, known answer and questions."""
+
+    def __init__(self) -> None:
+        super().__init__(padding=20, gap=10)
+        self.questions = Questions()
+        self.title = label("", "card")
+        self.refusal = label("", "label", "bad", wraps=True)
+        self.make = ActionButton("plus", "Make study", role="primary", height=44)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        inside = QWidget()
+        self.inside = QVBoxLayout(inside)
+        self.inside.setContentsMargins(0, 0, 8, 0)
+        self.inside.setSpacing(10)
+        self.about, self.details, self.begin = QWidget(), QWidget(), QWidget()
+        column = _column(self.begin)
+        column.addWidget(label("Begin with", "strong"))
+        column.addWidget(self.questions)
+        for part in (self.about, self.details, self.begin):
+            self.inside.addWidget(part)
+        self.inside.addStretch()
+        self.area.setWidget(inside)
+        self.column.addWidget(self.title)
+        self.column.addWidget(self.area, 1)
+        self.column.addWidget(self.refusal)
+        self.column.addWidget(self.make)
+        foot = label("Nothing is written until you save it.", "small", "text2")
+        foot.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.column.addWidget(foot)
+
+    def show_choice(self, choice: TemplateChoice) -> None:
+        """Show a template or a copy."""
+        self.title.setText(choice.title)
+        before = (self.about, self.details)
+        self.about, self.details = QWidget(), QWidget()
+        column = _column(self.about)
+        column.addWidget(label(choice.description, "label", "text2", wraps=True))
+        tags = QHBoxLayout()
+        tags.setSpacing(8)
+        for icon, words in choice.tags:
+            tags.addWidget(Chip("neutral", icon, words, small=True))
+        tags.addStretch()
+        column.addLayout(tags)
+        column.addWidget(Rule())
+        column = _column(self.details)
+        column.addWidget(label("The session", "strong"))
+        for icon, title, time in choice.session:
+            column.addLayout(_step(icon, title, time))
+        column.addWidget(Rule())
+        if choice.recovery is not None:
+            head = QHBoxLayout()
+            head.addWidget(label("Known answer", "strong"))
+            head.addStretch()
+            good = choice.recovery.recovered
+            state = ("ok", "check", "recovered") if good else ("warn", "warning", "not recovered")
+            head.addWidget(Chip(*state, small=True))  # type: ignore[arg-type]  # a tone
+            column.addLayout(head)
+            bar = RecoveryBar()
+            bar.show_recovery(choice.recovery)
+            column.addWidget(bar)
+            column.addWidget(label(choice.recovery.sentence, "small", "text2", wraps=True))
+            column.addWidget(Rule())
+        for old, new in zip(before, (self.about, self.details), strict=True):
+            dress(new, self.theme)
+            self.inside.replaceWidget(old, new)
+            take_away(old)
+        self.questions.show_choice(choice)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Show the questions before the session where there is no room for both."""
+        super().resizeEvent(event)
+        self.inside.removeWidget(self.begin)
+        self.inside.insertWidget(1 if self.height() < LOW_BELOW else 2, self.begin)
+
+    def refuse(self, sentence: str) -> None:
+        """Say why a study cannot begin so."""
+        self.refusal.setText(f"{sentence[:1].upper()}{sentence[1:]}")
+        self.refusal.setVisible(bool(sentence))
+
+
+def _column(of: QWidget) -> QVBoxLayout:
+    made = QVBoxLayout(of)
+    made.setContentsMargins(0, 0, 0, 0)
+    made.setSpacing(8)
+    return made
+
+
+def _step(icon: str, title: str, time: str) -> QHBoxLayout:
+    line = QHBoxLayout()
+    line.setSpacing(10)
+    shown = Elided("label")
+    shown.show_text(title)
+    line.addWidget(Icon(icon, "text2", 16))
+    line.addWidget(shown, 1)
+    line.addWidget(figures(time, "label", "text2"))
+    return line
+
+
+class NewStudyPage(Themed, QWidget):
+    """Signals: ``begin_asked`` (source, name, answers), ``given_up``."""
+
+    begin_asked = Signal(str, str, object)
+    given_up = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.buttons: list[TemplateButton] = []
+        self._choices: tuple[TemplateChoice, ...] = ()
+        self._group = QButtonGroup(self)
+        self.back = IconButton("chevron_left", "Back", role="plain")
+        self.back.clicked.connect(self.given_up)
+        head = QHBoxLayout()
+        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        head.setSpacing(12)
+        head.addWidget(self.back)
+        head.addWidget(label("New study", "title"))
+        aside = Elided("label", "text2")
+        aside.show_text("Choose what you want to find out. Everything can be changed afterwards.")
+        head.addWidget(aside, 1)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.card = ChosenCard()
+        below = QHBoxLayout()
+        below.setSpacing(12)
+        below.addWidget(self.area, 1)
+        below.addWidget(self.card)
+        page = QVBoxLayout(self)
+        page.setContentsMargins(0, 0, 0, 0)
+        page.setSpacing(12)
+        page.addLayout(head)
+        page.addLayout(below, 1)
+        self.card.make.clicked.connect(self._begin)
+        self.card.questions.entered.connect(self._begin)
+        self._group.buttonToggled.connect(lambda _button, on: self._show_choice() if on else None)
+
+    @property
+    def name(self) -> QLineEdit:
+        """The field of the short name."""
+        return self.card.questions.name
+
+    @property
+    def make(self) -> ActionButton:
+        """The button that begins the study."""
+        return self.card.make
+
+    @property
+    def refusal(self) -> QLabel:
+        """What is wrong."""
+        return self.card.refusal
+
+    def show_choices(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
+        """Show what a study can begin from."""
+        self._choices = choices
+        inside = QWidget()
+        column = QVBoxLayout(inside)
+        column.setContentsMargins(SHADOW, 0, 12, 0)
+        column.setSpacing(12)
+        self.buttons = []
+        for heading, aside, copies, across in (
+            ("Templates", "", False, ACROSS),
+            ("Or a copy of a study", "with its comments; the original stays as it is", True, COPIES_ACROSS),
+        ):
+            line = QHBoxLayout()
+            line.setSpacing(10)
+            line.addWidget(label(heading, "card"))
+            line.addWidget(label(aside, "small", "text2"))
+            line.addStretch()
+            column.addLayout(line)
+            grid = QGridLayout()
+            grid.setSpacing(14)
+            columns = across if self.width() >= NARROW_BELOW else 2
+            for at, choice in enumerate(one for one in choices if one.copy == copies):
+                made = TemplateButton(choice)
+                self._group.addButton(made)
+                grid.addWidget(made, at // columns, at % columns)
+                self.buttons.append(made)
+            for one in range(columns):
+                grid.setColumnStretch(one, 1)
+            column.addLayout(grid)
+        column.addStretch()
+        dress(inside, self.theme)
+        self.area.setWidget(inside)
+        self.refuse("")
+        first = next((button for button in self.buttons if button.choice.source == chosen), self.buttons[0])
+        first.setChecked(True)
+
+    def refuse(self, sentence: str) -> None:
+        """Say why a study cannot begin so."""
+        self.card.refuse(sentence)
+
+    def _show_choice(self) -> None:
+        chosen = self._chosen()
+        if chosen is not None:
+            self.refuse("")
+            self.card.show_choice(chosen)
+
+    def _chosen(self) -> TemplateChoice | None:
+        return next((button.choice for button in self.buttons if button.isChecked()), None)
+
+    def _begin(self) -> None:
+        chosen, answers = self._chosen(), self.card.questions.answers()
+        if isinstance(answers, str):
+            self.refuse(f"{answers}.")
+        elif chosen is not None:
+            self.begin_asked.emit(chosen.source, self.name.text().strip(), answers)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Make room: fewer cards side by side in a narrow window."""
+        super().resizeEvent(event)
+        narrow = self.width() < NARROW_BELOW
+        self.card.setFixedWidth(SIDE_NARROW_PX if narrow else SIDE_PX)
+        if self._choices and (event.oldSize().width() < NARROW_BELOW) != narrow:
+            chosen = self._chosen()
+            self.show_choices(self._choices, "" if chosen is None else chosen.source)

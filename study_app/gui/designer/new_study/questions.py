@@ -1,0 +1,111 @@
+"""The questions that a new study begins with: title, short name, languages, and those of the template."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Final
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QWidget
+
+from study_app.gui.designer.form.row_fields import read_number
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import Themed, dress, take_away
+from study_app.gui.widgets.controls import Check
+from study_app.gui.widgets.labels import label
+from study_app.viewmodels.designer.new_study import Answers, OwnQuestion, TemplateChoice, languages_offered
+
+FIELD_PX, WORDS_PX = 36, 112
+_PARTS: Final = re.compile(r"[,;\s]+")
+
+
+class Questions(Themed, QWidget):
+    """Fields for the answers; ``entered`` when Enter is pressed in one."""
+
+    entered = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.title, self.name = self._field("Title"), self._field("Short name of the new study")
+        self.name.setPlaceholderText("small letters and digits")
+        self.languages: dict[str, Check] = {}
+        self.own: dict[OwnQuestion, QLineEdit] = {}
+        self._choice: TemplateChoice | None = None
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setSpacing(8)
+        self._grid.setColumnStretch(1, 1)
+        for row, (words, field) in enumerate((("Title", self.title), ("Short name", self.name))):
+            self._add(row, words, field)
+        box = QWidget()
+        checks = QGridLayout(box)
+        checks.setContentsMargins(0, 0, 0, 0)
+        checks.setSpacing(2)
+        for at, (code, name) in enumerate(languages_offered()):
+            made = Check(name)
+            made.setFont(font("label", weight=400))
+            made.setAccessibleName(f"Language {name}")
+            self.languages[code] = made
+            checks.addWidget(made, at // 2, at % 2)
+        self._grid.addWidget(label("Languages", "label"), 2, 0, 1, 2)
+        self._grid.addWidget(box, 3, 0, 1, 2)
+        self._own: list[QWidget] = []
+
+    def _field(self, name: str) -> QLineEdit:
+        made = QLineEdit()
+        made.setFont(font("label", weight=400))
+        made.setProperty("dense", "true")
+        made.setFixedHeight(FIELD_PX)
+        made.setAccessibleName(name)
+        made.returnPressed.connect(self.entered)
+        return made
+
+    def _add(self, row: int, words: str, field: QWidget) -> QWidget:
+        shown = label(words, "label", wraps=True)
+        shown.setFixedWidth(WORDS_PX)
+        self._grid.addWidget(shown, row, 0)
+        self._grid.addWidget(field, row, 1)
+        return shown
+
+    def show_choice(self, choice: TemplateChoice) -> None:
+        """Ask the questions of a template or copy; what was typed as a name stays."""
+        before, self._choice = self._choice, choice
+        if before is not None and before.source == choice.source:
+            return
+        self.title.setPlaceholderText(choice.study_title)
+        for code, check in self.languages.items():
+            check.setChecked(code in choice.languages)
+        for part in self._own:
+            take_away(part)
+        self._own, self.own = [], {}
+        for row, question in enumerate(choice.questions, start=4):
+            field = self._field(question.words)
+            field.setText(question.value)
+            field.setToolTip(question.bounds)
+            field.setAccessibleDescription(question.bounds)
+            beside = QWidget()
+            across = QHBoxLayout(beside)
+            across.setContentsMargins(0, 0, 0, 0)
+            across.setSpacing(8)
+            across.addWidget(field, 1)
+            if question.unit:
+                across.addWidget(label(question.unit, "label", "text2"))
+            self._own += [self._add(row, question.words, beside), beside]
+            self.own[question] = field
+            dress(beside, self.theme)
+
+    def answers(self) -> Answers | str:
+        """Return the answers, or a sentence about one that cannot be taken."""
+        chosen = tuple(code for code, check in self.languages.items() if check.isChecked())
+        if not chosen:
+            return "choose at least one language"
+        values: list[tuple[Any, Any]] = []
+        for question, field in self.own.items():
+            text = field.text().strip()
+            if not text or text == question.value:
+                continue
+            numbers = [read_number(part) for part in _PARTS.split(text)]
+            if None in numbers or (len(numbers) > 1 and not question.several):
+                return f"{question.words}: “{text}” is not {'numbers' if question.several else 'a number'}"
+            values.append((question.path, numbers if question.several else numbers[0]))
+        return Answers(self.title.text().strip(), chosen, tuple(values))

@@ -1,0 +1,88 @@
+"""The page of a new study in the window: templates, their questions, and copies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLineEdit
+
+from study_app.authoring.templates import templates
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.protocol.source.files import shipped
+
+
+def button(page: Any, source: str) -> Any:
+    return next(one for one in page.buttons if one.choice.source == source)
+
+
+def own(page: Any, words: str) -> QLineEdit:
+    return next(field for question, field in page.card.questions.own.items() if question.words == words)
+
+
+def test_every_template_and_shipped_study_can_be_begun_from(designer: Any) -> None:
+    designer.controller.ask_for_new()
+    sources = {one.choice.source for one in designer.place.new_page.buttons}
+    assert sources == {*(f"template:{name}" for name in templates()), *shipped()}
+    for one in designer.place.new_page.buttons:
+        one.setChecked(True)
+        choice = one.choice
+        assert choice.session
+        assert choice.description
+        assert (choice.recovery is not None) == (
+            choice.source in {"template:viscosity-jnd", "template:delay-detection"}
+        )
+
+
+def test_a_study_begins_with_the_answers_and_nothing_is_on_disk(qtbot: Any, designer: Any) -> None:
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    qtbot.mouseClick(button(page, "template:viscosity-jnd"), Qt.MouseButton.LeftButton)
+    assert page.name.hasFocus() or page.name.isVisible()
+    qtbot.keyClicks(page.card.questions.title, "Which liquid is thicker?")
+    qtbot.keyClicks(page.name, "thicker")
+    references = own(page, "References")
+    references.setText("4, 8")
+    page.card.questions.languages["nl"].click()
+    qtbot.keyClick(references, Qt.Key.Key_Return)
+    document = designer.editing.opened.study.document
+    assert document["study"]["name"] == "thicker"
+    assert document["study"]["title"] == {"en": "Which liquid is thicker?"}
+    assert document["study"]["languages"] == ("en", "nl")
+    assert document["stimuli"]["damping"]["standards"] == (4, 8)
+    assert not (designer.file.parent / "thicker.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "words"),
+    [
+        ("References", "thick", "is not numbers"),
+        ("Trials for each", "0", "at least"),
+        ("Trials for each", "1 2", "is not"),
+    ],
+)
+def test_an_answer_that_is_not_permitted_is_refused_in_place(designer: Any, field: str, text: str, words: str) -> None:
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    button(page, "template:viscosity-jnd").click()
+    page.name.setText("mine")
+    own(page, field).setText(text)
+    page.make.click()
+    assert words in page.refusal.text()
+    assert designer.editing.opened is None
+
+
+@pytest.mark.parametrize("size", [(1600, 1000), (1366, 768), (1024, 640)])
+@pytest.mark.parametrize("theme", [LIGHT, DARK])
+def test_the_page_fits_its_window(qtbot: Any, designer: Any, size: tuple[int, int], theme: Any) -> None:
+    designer.window.show_theme(theme)
+    designer.window.resize(*size)
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    for one in page.buttons:
+        one.setChecked(True)
+        qtbot.wait(1)
+        inner = page.card.area.widget()
+        assert inner.minimumSizeHint().width() <= page.card.area.viewport().width(), one.choice.source
+    assert (designer.window.width(), designer.window.height()) == size
