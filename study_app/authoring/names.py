@@ -18,7 +18,17 @@ ITEMS = "items"
 
 def named_at(document: Document, place: Path) -> Path | None:
     """Return the path of what the text at ``place`` names; None where it names nothing that is there."""
-    return next((thing for found, thing in _references(document) if found == place), None)
+    name = _value(document, place)
+    if not isinstance(name, str):
+        return None
+    for pattern, sections in CHOICES.items():
+        if _matches(place, pattern):
+            found = next((section for section in sections if has(document.get(section), name)), None)
+            if found is not None:
+                return found, name
+    if any(_matches(place, pattern) for pattern in ITEM_REFERENCES):
+        return next((path for path, item in _items(document) if item["id"] == name and _in_reach(place, path)), None)
+    return None
 
 
 def references_to(document: Document, thing: Path) -> tuple[Path, ...]:
@@ -162,6 +172,14 @@ def _siblings(document: Document, thing: Path) -> Iterable[str]:
     for step in thing[:-1]:
         node = node[step] if has(node, step) else {}
     return tuple(node) if isinstance(node, Mapping) else ()
+
+
+def _value(document: Any, path: Path) -> Any:
+    for step in path:
+        if not has(document, step):
+            return None
+        document = document[step]
+    return document
 
 
 def _matches(place: Path, pattern: str) -> bool:

@@ -23,6 +23,7 @@ class ChipButton(Themed, PressedByEnter):
     def __init__(self) -> None:
         super().__init__()
         self.setProperty("role", "plain")
+        self.setProperty("dense", "true")
         self._state: tuple[Tone, str, str] = ("ok", "check", "")
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
+from functools import lru_cache
 
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.notation import scan
@@ -30,3 +31,9 @@ class Places:
             if (line := self._lines.get(path[:length])) is not None:
                 return line
         return None
+
+
+@lru_cache(maxsize=2)
+def places_of(text: str) -> Places:
+    """Return the lines of a TOML text, which may end its lines as it likes."""
+    return Places(text.replace("\r\n", "\n"))

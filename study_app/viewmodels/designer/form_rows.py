@@ -13,12 +13,13 @@ from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.protocol.groups.group import sequences_in
 from study_app.protocol.source.document import Path, entries, has
-from study_app.protocol.source.line_numbers import Places
+from study_app.protocol.source.line_numbers import Places, places_of
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
 from study_app.viewmodels.designer.special import FACTS
 from study_app.viewmodels.designer.special.questions import QuestionLines, question_lines
 
+ENTRIES: Final = "Entries"
 DEEPEST: Final = 3
 """So many tables within each other are shown in one form."""
 NO_QUESTIONS: Final = QuestionLines((), ())
@@ -74,8 +75,10 @@ class FormRow:
     @property
     def removable(self) -> bool:
         """Whether the file holds the key and would be complete without it."""
-        given = self.row.value is not None and isinstance(self.row.path[-1], str)
-        return given and not (self.row.required or self.instead)
+        path = self.row.path
+        given = self.row.value is not None and isinstance(path[-1], str)
+        section = len(path) == 1 and self.row.kind == "tables"
+        return given and not (self.row.required or self.instead or section)
 
     @property
     def bounds(self) -> str:
@@ -141,8 +144,13 @@ class Form:
 
 def form(study: Study, path: Path) -> Form:
     """Return the form of the element at ``path``."""
-    document, places = study.document, Places(study.text.replace("\r\n", "\n"))
-    sections = tuple(_sections(study, path, places, 0))
+    document, places = study.document, places_of(study.text)
+    own_row = row_at(document, path) if len(path) == 1 else None
+    if own_row is not None and own_row.kind == "tables":
+        own_row = replace(own_row, label=ENTRIES)
+        sections: tuple[Section, ...] = (Section(path, "", (_form_row(study, own_row, places),)),)
+    else:
+        sections = tuple(_sections(study, path, places, 0))
     shown = {row.row.path for section in sections for row in section.rows}
     own = tuple(
         _sentence(study, fault.message, fault.hint)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.protocol.source.document import Path, has
-from study_app.protocol.source.line_numbers import Places
+from study_app.protocol.source.line_numbers import places_of
 from study_app.protocol.source.problems import Fault
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
 
@@ -41,6 +42,7 @@ class ProblemRow:
     line: int | None
 
 
+@lru_cache(maxsize=2)
 def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
     """Return the problems of a study, in the order of their lines."""
     if not study.is_toml:
@@ -48,7 +50,7 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
             ProblemRow(fault, (), "The file", "file", "", problem.message, problem.hint, problem.line)
             for fault, problem in zip(study.faults, study.problems, strict=True)
         )
-    places = Places(study.text.replace("\r\n", "\n"))
+    places = places_of(study.text)
     found = [_row(study, fault, places.line(fault.path)) for fault in study.faults]
     return tuple(sorted(found, key=lambda row: row.line or 0))
 
