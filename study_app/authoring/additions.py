@@ -23,7 +23,14 @@ _ROUNDS: Final = 12
 _LETTER: Final = "^[A-Z]$"
 
 
-def added(study: Study, section: Path, kind: Mapping[str, Any] | None = None) -> tuple[tuple[Edit, ...], Path]:
+def added(
+    study: Study,
+    section: Path,
+    kind: Mapping[str, Any] | None = None,
+    *,
+    name: str = "",
+    behind: str | int | None = None,
+) -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that add an element to a section or list, as one step, and the path of the element.
 
     Parameters
@@ -34,6 +41,10 @@ def added(study: Study, section: Path, kind: Mapping[str, Any] | None = None) ->
         A section of tables, as ``("liquids",)``, or a list of tables, as ``("questionnaires", "load", "items")``.
     kind : mapping, optional
         Keys that the element begins with, such as its kind.
+    name : str
+        What a table is called if that is free; "" for what its section holds.
+    behind : str or int, optional
+        The table or entry of the section that it is written after; the last one without.
 
     Raises
     ------
@@ -48,11 +59,12 @@ def added(study: Study, section: Path, kind: Mapping[str, Any] | None = None) ->
     path: Path
     first: Edit
     if several:
-        path = (*section, len(row.value or ()))
+        count = len(row.value or ())
+        path = (*section, behind + 1 if isinstance(behind, int) and behind < count else count)
         first = Insert(path, value) if row.value else Set(section, [value])
     else:
-        path = (*section, free_name(names(study.document, str(section[0])), singular(section[-1])))
-        first = Set(path, value)
+        path = (*section, free_name(names(study.document, str(section[0])), name or singular(section[-1])))
+        first = Set(path, value, behind if isinstance(behind, str) else None)
     others: list[Edit] = []
     tried = {(fault.path, fault.message) for fault in study.faults}
     for _ in range(_ROUNDS):
@@ -98,16 +110,29 @@ def duplicated(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:
     else:
         copy = (*path[:-1], free_name(names(study.document, str(path[0])), str(name)))
         edits = [Duplicate(path, str(copy[-1]))]
-    after, _ = study.edited(*edits)
-    letters = [
-        row.path for row in rows(after.document, copy) if row.value is not None and rule_of(_LETTER) in row.bounds
-    ]
-    edits += [Set(place, initial(after.document, place)) for place in letters]
-    after, _ = study.edited(*edits)
+    return (*edits, *fitted(study, study.edited(*edits)[0], copy)), copy
+
+
+def fitted(before: Study, after: Study, path: Path) -> tuple[Edit, ...]:
+    """Return the edits that a copied element needs besides: a free code letter, and a place in the session.
+
+    Parameters
+    ----------
+    before, after : Study
+        The study without and with the copy.
+    path : tuple of str or int
+        The copy.
+    """
+    edits: list[Edit] = []
+    for row in rows(after.document, path):
+        if row.value is not None and rule_of(_LETTER) in row.bounds:
+            letters = [letter for _, letter in entries(after.document, f"{path[0]}.*.{row.path[-1]}")]
+            edits += [Set(row.path, initial(after.document, row.path))] if letters.count(row.value) > 1 else []
+    after, _ = after.edited(*edits)
     for fault in after.faults:
-        if fault.path == copy and fault not in study.faults:
+        if fault.path == path and fault not in before.faults:
             edits += _outside(after, fault)
-    return tuple(edits), copy
+    return tuple(edits)
 
 
 def _outside(study: Study, fault: Fault) -> tuple[Edit, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from study_app.authoring.fields import label_of, rows
@@ -18,13 +18,28 @@ TITLES: Final = ("title", "short", "text")
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """One line of the outline; ``faults`` counts those within it, ``depth`` how far it is indented."""
+    """One line of the outline.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        Where it is.
+    title, id : str
+        What it is called, and its name in the file.
+    depth : int
+        How far it is indented.
+    faults : int
+        How many faults are within it.
+    step : tuple of str or int
+        Its entry in the list that orders it: the session's or a questionnaire's; () without an order.
+    """
 
     path: Path
     title: str
     id: str
     depth: int = 0
     faults: int = 0
+    step: Path = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,19 +101,21 @@ def found(document: Mapping[str, Any], path: Path, words: str) -> bool:
 def _session(study: Study) -> Iterator[Element]:
     """Yield every step of every sequence, blocks with what they name, questionnaires with their items."""
     document = study.document
-    steps = [(*place, index) for place, listed in sequences_in(document) for index in range(len(listed))]
-    things = (
-        [named_at(document, step) for step in steps] if steps else [path for path, _ in entries(document, "blocks.*")]
-    )
-    for thing in things:
+    steps: list[Path] = [(*place, index) for place, listed in sequences_in(document) for index in range(len(listed))]
+    things = [(named_at(document, step), step) for step in steps]
+    for thing, step in things or [(path, ()) for path, _ in entries(document, "blocks.*")]:
         if thing is not None:
-            yield element(study, thing)
             inner = [named_at(document, (*thing, row.path[-1])) for row in rows(document, thing)]
-            for part in [thing, *(path for path in inner if path is not None)]:
+            below: list[Element] = []
+            for part in dict.fromkeys((thing, *(path for path in inner if path is not None))):
                 items = [path for path, _ in entries(document, f"{part[0]}.{part[1]}.items.*")]
                 if items or (part != thing and part[0] == "tasks"):
-                    yield element(study, part, 1)
-                yield from (element(study, item, 2) for item in items)
+                    below.append(element(study, part, 1))
+                below += [replace(element(study, item, 2), step=item) for item in items]
+            own = element(study, thing)
+            contained = sum(one.faults for one in below if one.depth == 1 and one.path != thing)
+            yield replace(own, step=step, faults=own.faults + contained)
+            yield from below
 
 
 def _texts(value: Any) -> Iterator[str]:

@@ -11,10 +11,10 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer
 
 from study_app.app.designer.editing import Editing
+from study_app.app.designer.element_steps import Step, delete_prompt
 from study_app.app.designer.open_study import OpenStudy, open_file, open_new, open_unsaved
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.app.designer.saving import Saving
-from study_app.app.designer.steps import delete_prompt
 from study_app.app.designer.studies import header_state, new_choices, studies
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.facts import facts
@@ -25,13 +25,14 @@ from study_app.errors import StudyError
 from study_app.gui.designer.view import DesignerPlace
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import find
+from study_app.viewmodels.designer.addable import addable
 from study_app.viewmodels.designer.fact_cards import fact_cards
 from study_app.viewmodels.designer.file_text import file_text
 from study_app.viewmodels.designer.form_rows import form
 from study_app.viewmodels.designer.outline_rows import outline_rows
 from study_app.viewmodels.designer.problem_rows import ProblemRow, problem_rows
 from study_app.viewmodels.designer.requests import DeleteElement, RenameElement, Request
-from study_app.viewmodels.designer.view import DesignerView, HeaderState, StudyChoice, addable
+from study_app.viewmodels.designer.view import DesignerView, HeaderState, StudyChoice
 
 REST_MS: Final = 200
 
@@ -74,6 +75,7 @@ class DesignerController(QObject):
         editing.changed.connect(self.show)
         editing.edited.connect(self._resting.start)
         editing.refused.connect(self._refuse)
+        editing.made.connect(self._show_step)
         self.saving.kept.connect(self._show_header)
         self.saving.copy_asked.connect(self.ask_for_new)
         self._repairs.found.connect(place.show_repairs)
@@ -139,16 +141,16 @@ class DesignerController(QObject):
 
     # steps that ask first
 
-    def ask_to_delete(self, path: Place) -> None:
-        """Delete an element, or show what refers to it and ask what to do with that."""
+    def ask_to_delete(self, path: Place, also: tuple[Place, ...] = ()) -> None:
+        """Delete elements, or show what refers to them and ask what to do with that."""
         opened = self.editing.writable
         if opened is None or len(path) < 2:
             return
-        prompt = delete_prompt(opened.study, path)
+        prompt = delete_prompt(opened.study, (path, *also))
         if prompt.references:
             self.place.ask_to_delete(prompt)
         else:
-            self.editing.ask(DeleteElement(path))
+            self.editing.ask(DeleteElement(path, also=also))
 
     def repair(self, row: ProblemRow, words: str) -> None:
         """Make a repair, as one step."""
@@ -162,6 +164,11 @@ class DesignerController(QObject):
 
     def _refuse(self, path: Place, sentence: str, asked: Request) -> None:
         self.place.refuse(path, sentence, renaming=isinstance(asked, RenameElement))
+
+    def _show_step(self, step: Step) -> None:
+        if step.several or step.fresh or step.said:
+            self._show_outline()
+        self.place.show_step(step.several, step.said, fresh=step.fresh)
 
     # what is shown
 

@@ -10,8 +10,9 @@ from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 
+from study_app.app.designer.element_steps import Step
 from study_app.app.designer.open_study import OpenStudy
-from study_app.app.designer.steps import Step, Steps
+from study_app.app.designer.steps import Steps
 from study_app.app.designer.studies import there
 from study_app.authoring.history import History
 from study_app.authoring.writer.edits import Edit
@@ -33,13 +34,14 @@ class Editing(QObject):
 
     ``opened_other`` is emitted when another study is open, ``changed`` after each step of the study or of its
     selection, ``edited`` after each step of the study alone; ``refused`` carries the path that a refused request
-    concerns, the sentence that says why, and the request.
+    concerns, the sentence that says why, and the request; ``made`` the `Step` of a request, after ``edited``.
     """
 
     opened_other = Signal()
     changed = Signal()
     edited = Signal()
     refused = Signal(object, str, object)
+    made = Signal(object)
 
     def __init__(self, results: Path, parent: QObject) -> None:
         super().__init__(parent)
@@ -48,6 +50,7 @@ class Editing(QObject):
         self._steps = Steps()
         self._joins: tuple[object, float] = (None, 0.0)
         self._back: list[Place] = []
+        self._made: Step | None = None
 
     @property
     def writable(self) -> OpenStudy | None:
@@ -105,18 +108,24 @@ class Editing(QObject):
                     return
                 opened.history = opened.history.typed("Edit the file", text, joins=self._joined("file"))
             else:
-                self._make(opened, self._steps.step(opened.study, asked))
+                self._make(opened, self._steps.step(opened.study, asked, opened.history.selected))
         except Refused as refusal:
             path = asked.path if hasattr(asked, "path") else opened.history.selected
             self.refused.emit(path, f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.", asked)
             return
         self._note()
+        if (step := self._made) is not None:
+            self._made = None
+            self.made.emit(step)
 
     def _make(self, opened: OpenStudy, step: Step) -> None:
         joins = step.continues is not None and self._joined(step.continues)
         if step.continues is None:
             self._joins = (None, 0.0)
-        opened.history = opened.history.edited(step.words, *step.edits, select=step.select, joins=joins)
+        history = opened.history.typed(step.words, step.text) if step.text else opened.history
+        joins = joins or bool(step.text)
+        opened.history = history.edited(step.words, *step.edits, select=step.select, joins=joins)
+        self._made = step
 
     def _joined(self, key: object) -> bool:
         """Return whether an edit continues the last step, and remember it."""

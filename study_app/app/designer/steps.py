@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
-from study_app.authoring.additions import added, duplicated, initial, singular
+from study_app.app.designer.element_steps import Step, add, add_named, delete, duplicate, move, move_to, paste
+from study_app.authoring.additions import added, initial, singular
 from study_app.authoring.conversions import left_by, switched
 from study_app.authoring.fields import label_of, row_at, rows
-from study_app.authoring.names import deletions, references_to, renamed, replaced, with_references
-from study_app.authoring.outline import title_of
+from study_app.authoring.names import renamed
 from study_app.authoring.study import Study
-from study_app.authoring.writer.edits import Edit, Insert, Move, Set, Unset
+from study_app.authoring.writer.edits import Edit, Insert, Set, Unset
 from study_app.authoring.writer.refused import Refused
-from study_app.protocol.source.document import Path, entries, names
-from study_app.viewmodels.designer.form_rows import step_of, value_at
-from study_app.viewmodels.designer.problem_rows import element_of
-from study_app.viewmodels.designer.prompts import DeletePrompt
+from study_app.protocol.source.document import Path, entries
+from study_app.viewmodels.designer.form_rows import value_at
 from study_app.viewmodels.designer.requests import (
     AddElement,
     AddEntry,
     AddKey,
+    AddNamed,
     DeleteElement,
     DuplicateElement,
     MoveElement,
     MoveEntry,
+    MoveTo,
+    Paste,
     RemoveKey,
     RenameElement,
     Request,
@@ -35,16 +36,6 @@ from study_app.viewmodels.designer.requests import (
     SwitchKey,
     SwitchKind,
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """The edits of one step: its words, what is selected after it (None: the same), and what it may continue."""
-
-    words: str
-    edits: tuple[Edit, ...]
-    select: Path | None = None
-    continues: object = None
 
 
 class Steps:
@@ -57,8 +48,8 @@ class Steps:
         """Forget what switches removed: another element is selected."""
         self._left.clear()
 
-    def step(self, study: Study, asked: Request) -> Step:
-        """Return the step that is asked for.
+    def step(self, study: Study, asked: Request, selected: Path = ()) -> Step:
+        """Return the step that is asked for while an element is selected.
 
         Raises
         ------
@@ -80,29 +71,21 @@ class Steps:
             return Step(f"Add {label_of(asked.path[-1])}", (Set(asked.path, _first_value(study, asked.path)),))
         if isinstance(asked, AddEntry):
             return _add_entry(study, asked)
-        if isinstance(asked, AddElement):
-            edits, path = added(study, asked.section)
-            return Step(f"Add {singular(asked.section[-1])}", edits, path)
-        if isinstance(asked, DuplicateElement):
-            return _duplicate(study, asked.path)
-        if isinstance(asked, MoveElement):
-            return _move(study, asked)
         if isinstance(asked, MoveEntry):
-            return Step(f"Move entry {_index(asked.path) + 1}", (Move(asked.path, asked.to),))
+            to = asked.to + (asked.to > int(asked.path[-1]))
+            return replace(move_to(study, MoveTo((asked.path,), to)), select=None, several=())
         if isinstance(asked, RenameElement):
             edits = renamed(study.document, asked.path, asked.name)
             after = asked.path if isinstance(asked.path[-1], int) else (*asked.path[:-1], asked.name)
             return Step(f"Rename to {asked.name}", edits, after)
-        if isinstance(asked, DeleteElement):
-            return _delete(study, asked)
         if isinstance(asked, Several):
-            return self._several(study, asked)
-        raise Refused("this cannot be done to a study")
+            return self._several(study, asked, selected)
+        return _of_elements(study, asked, selected)
 
-    def _several(self, study: Study, asked: Several) -> Step:
+    def _several(self, study: Study, asked: Several, selected: Path) -> Step:
         edits: tuple[Edit, ...] = ()
         for one in asked.requests:
-            step = self.step(study, one)
+            step = self.step(study, one, selected)
             study, _ = study.edited(*step.edits)
             edits += step.edits
         return Step(asked.words, edits)
@@ -124,6 +107,24 @@ class Steps:
             raise Refused(f"there is nothing that {label_of(asked.to)} can name: add it first")
         self._left[table] = kept
         return Step(f"Give {label_of(asked.to)}", (*gone, Set((*table, asked.to), value)))
+
+
+def _of_elements(study: Study, asked: Request, selected: Path) -> Step:
+    if isinstance(asked, AddElement):
+        return add(study, asked, selected)
+    if isinstance(asked, AddNamed):
+        return add_named(study, asked)
+    if isinstance(asked, DuplicateElement):
+        return duplicate(study, asked)
+    if isinstance(asked, MoveElement):
+        return move(study, asked)
+    if isinstance(asked, MoveTo):
+        return move_to(study, asked)
+    if isinstance(asked, Paste):
+        return paste(study, asked)
+    if isinstance(asked, DeleteElement):
+        return delete(study, asked)
+    raise Refused("this cannot be done to a study")
 
 
 def _text(study: Study, asked: SetText) -> tuple[Edit, ...]:
@@ -161,69 +162,6 @@ def _add_entry(study: Study, asked: AddEntry) -> Step:
         value = _listed(first[0] if not there and isinstance(first, list | tuple) else first)
     edit: Edit = Insert((*asked.path, len(there)), value) if there else Set(asked.path, [value])
     return Step(f"Add to {label_of(asked.path[-1])}", (edit,))
-
-
-def _duplicate(study: Study, path: Path) -> Step:
-    """Return the step that copies an element; its step in the session comes right after that of the original."""
-    edits, copy = duplicated(study, path)
-    after, _ = study.edited(*edits)
-    original, step = step_of(after.document, path), step_of(after.document, copy)
-    if original is not None and step is not None and step != copy and step[:-1] == original[:-1]:
-        to = _index(original) + (_index(step) > _index(original))
-        edits = edits if _index(step) == to else (*edits, Move(step, to))
-    return Step(f"Duplicate {title_of(study.document, path)}", edits, copy)
-
-
-def _move(study: Study, asked: MoveElement) -> Step:
-    step = step_of(study.document, asked.path)
-    title = title_of(study.document, asked.path)
-    if step is None:
-        raise Refused(f"{title} has no place in an order: it is not moved")
-    to, count = _index(step) + asked.by, len(value_at(study.document, step[:-1]))
-    if not 0 <= to < count:
-        raise Refused(f"{title} is the {'first' if asked.by < 0 else 'last'} already")
-    select = (*step[:-1], to) if step == asked.path else asked.path
-    return Step(f"Move {title} {'up' if asked.by < 0 else 'down'}", (Move(step, to),), select)
-
-
-def _delete(study: Study, asked: DeleteElement) -> Step:
-    path, document = asked.path, study.document
-    words = f"Delete {title_of(document, path)}"
-    if asked.how == "other":
-        return Step(words, replaced(document, path, asked.other), (*path[:-1], asked.other))
-    if isinstance(path[-1], int):
-        select: Path = path[:2]
-    else:
-        others = [name for name in names(document, str(path[0])) if name != path[-1]]
-        select = (path[0], others[0]) if others else path[:1]
-    if asked.how == "all":
-        gone = with_references(document, path, study.needs)
-        if any(select[: len(one)] == one for one in gone):
-            select = ("study",)
-        return Step(words, deletions(gone), select)
-    return Step(words, (Unset(path),), select)
-
-
-def delete_prompt(study: Study, path: Path) -> DeletePrompt:
-    """Return what names an element, and what could be named in its place."""
-    document = study.document
-    places = references_to(document, path)
-    references = (f"{title_of(document, element_of(study, place))}: {_field(study, place)}" for place in places)
-    others = (name for name in names(document, str(path[0])) if name != path[-1] and len(path) == 2)
-    titles = tuple((name, title_of(document, (path[0], name))) for name in others)
-    return DeletePrompt(path, title_of(document, path), tuple(dict.fromkeys(references)), titles)
-
-
-def _field(study: Study, place: Path) -> str:
-    inside = [label_of(step) for step in place[len(element_of(study, place)) :]]
-    return ", ".join(inside) or f"entry {_index(place) + 1}"
-
-
-def _index(path: Path) -> int:
-    last = path[-1]
-    if not isinstance(last, int):
-        raise Refused(f"{label_of(last)} is not an entry of a list")
-    return last
 
 
 def _listed(value: Any) -> Any:

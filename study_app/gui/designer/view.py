@@ -4,33 +4,30 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QMenu, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QStackedWidget, QVBoxLayout, QWidget
 
+from study_app.gui.designer.arrangement import Arrangement
+from study_app.gui.designer.banner import BannerCard
 from study_app.gui.designer.form.form import FormCard
 from study_app.gui.designer.header import DesignerHeader
 from study_app.gui.designer.new_study import NewStudyPage, NoStudyCard
-from study_app.gui.designer.outline import OutlineCard
+from study_app.gui.designer.outline.add_list import AddList
+from study_app.gui.designer.outline.card import OutlineCard
 from study_app.gui.designer.pane.file_editor import FileCard
 from study_app.gui.designer.pane.right_pane import PanePage, RightPane
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt, VersionCard
-from study_app.gui.designer.segments import Segments
-from study_app.gui.theme.theme import font
+from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import dress, take_away
-from study_app.gui.widgets.cards import SHADOW, Card
-from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
+from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.fact_cards import FactCards
 from study_app.viewmodels.designer.new_study import TemplateChoice
-from study_app.viewmodels.designer.outline_rows import OutlineRow
+from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.prompts import DeletePrompt
-from study_app.viewmodels.designer.requests import AddElement, RetypeFile
-from study_app.viewmodels.designer.view import Banner, DesignerView, HeaderState
-
-OUTLINE_PX, OUTLINE_NARROW_PX, WIDE_FROM = 284, 244, 1400
-ONE_PANE_BELOW = 1130
+from study_app.viewmodels.designer.requests import DuplicateElement, MoveElement, MoveTo, RetypeFile
+from study_app.viewmodels.designer.view import DesignerView, HeaderState
 
 
 class DesignerPlace(Place):
@@ -38,7 +35,8 @@ class DesignerPlace(Place):
 
     Signals: ``entered``, ``left``; ``asked`` (a request); ``selected`` (path) and ``back_asked``; ``study_asked``
     (source), ``new_asked``, ``begin_asked`` (source, name, answers); ``undo_asked``, ``redo_asked``, ``save_asked``,
-    ``save_as_version_asked`` (version); ``delete_asked`` (path); ``repair_asked`` (row, words); ``find_changed``;
+    ``save_as_version_asked`` (version); ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``;
+    ``question_asked`` ("language", "instrument"); ``repair_asked`` (row, words); ``find_changed``;
     ``banner_asked`` (action).
     """
 
@@ -54,7 +52,10 @@ class DesignerPlace(Place):
     redo_asked = Signal()
     save_asked = Signal()
     save_as_version_asked = Signal(str)
-    delete_asked = Signal(object)
+    delete_asked = Signal(object, object)
+    copy_asked = Signal(object)
+    paste_asked = Signal()
+    question_asked = Signal(str)
     repair_asked = Signal(object, str)
     find_changed = Signal(str)
     banner_asked = Signal(str)
@@ -63,55 +64,28 @@ class DesignerPlace(Place):
         super().__init__()
         self.view = DesignerView()
         self.prompt: Prompt | None = None
-        self.menu: QMenu | None = None
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
-        self._side = "form"
         self.header = DesignerHeader()
-        self.banner = Card(padding=10, gap=6)
-        self.banner_words = label("", "label", wraps=True)
-        self._banner_row = QHBoxLayout()
-        self._banner_row.addWidget(self.banner_words, 1)
-        self.banner.column.addLayout(self._banner_row)
-        self.banner_buttons: list[ActionButton] = []
+        self.banner = BannerCard()
+        self.banner_words = self.banner.words
         self.outline = OutlineCard()
         self.form = FormCard()
         self.file = FileCard()
         self.problems = ProblemsCard()
         self.new_page = NewStudyPage()
-        self.sides = Segments("Side")
         self.pane = RightPane()
         self.pane.add_page(PanePage("file", "File", self.file))
+        self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
+        self.sides = self.parts.sides
+        self.adding = AddList(self)
         self.nothing = NoStudyCard()
         self._lay_out()
         self._connect()
         self._take_keys()
-        self.banner.hide()
         self.problems.hide()
         self.show_view(DesignerView())
 
     def _lay_out(self) -> None:
-        self._prompts = QVBoxLayout()
-        right = QVBoxLayout()
-        right.setSpacing(12 - 2 * SHADOW)
-        across = QHBoxLayout()
-        across.setSpacing(14 - 2 * SHADOW)
-        across.addWidget(self.form, 44)
-        across.addWidget(self.pane, 56)
-        sides = QHBoxLayout()
-        sides.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        sides.addWidget(self.sides)
-        sides.addStretch()
-        right.addLayout(sides)
-        right.addLayout(self._prompts)
-        right.addLayout(across, 1)
-        right.addWidget(self.problems)
-        whole = QHBoxLayout()
-        whole.setSpacing(14 - 2 * SHADOW)
-        whole.addWidget(self.outline)
-        whole.addLayout(right, 1)
-        self._editing = QWidget()
-        self._editing.setLayout(whole)
-        whole.setContentsMargins(0, 0, 0, 0)
         main = QWidget()
         column = QVBoxLayout(main)
         column.setContentsMargins(0, 0, 0, 0)
@@ -119,7 +93,7 @@ class DesignerPlace(Place):
         column.addWidget(self.header)
         column.addWidget(self.banner)
         column.addWidget(self.nothing, 1)
-        column.addWidget(self._editing, 1)
+        column.addWidget(self.parts, 1)
         self.stack = QStackedWidget()
         self.stack.addWidget(main)
         self.stack.addWidget(self.new_page)
@@ -137,30 +111,35 @@ class DesignerPlace(Place):
         header.redo_asked.connect(self._redo)
         header.save_asked.connect(self._save)
         self.nothing.new.clicked.connect(self.new_asked)
+        self.banner.asked.connect(self.banner_asked)
         outline.chosen.connect(self._select)
         outline.find_changed.connect(self.find_changed)
         outline.add_asked.connect(self.ask_to_add)
-        outline.duplicate_asked.connect(form.head.duplicate)
-        outline.delete_asked.connect(form.head.ask_to_delete)
+        outline.duplicate_asked.connect(self._duplicate)
+        outline.delete_asked.connect(self._delete)
+        outline.copy_asked.connect(lambda: self.copy_asked.emit(outline.selected))
+        outline.paste_asked.connect(self.paste_asked)
+        outline.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
+        self.adding.chosen.connect(self._add)
+        self.parts.path.open_asked.connect(self._select)
         form.asked.connect(self.asked)
         form.open_asked.connect(self._select)
-        form.delete_asked.connect(self.delete_asked)
+        form.delete_asked.connect(lambda path: self.delete_asked.emit(path, ()))
         self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
         self.problems.opened.connect(self._open_problem)
         self.problems.repair_asked.connect(self.repair_asked)
         self.problems.close_asked.connect(self.problems.hide)
         self.new_page.begin_asked.connect(self.begin_asked)
         self.new_page.given_up.connect(self.close_new)
-        self.sides.chosen.connect(lambda side: self._show_side(str(side)))
 
     def _take_keys(self) -> None:
         for keys, act in (
             ("Ctrl+Z", self._undo), ("Ctrl+Shift+Z", self._redo), ("Ctrl+Y", self._redo), ("Ctrl+S", self._save),
-            ("F8", self._next_problem), ("Ctrl+D", self.form.head.duplicate), ("Ctrl+F", self.outline.words.setFocus),
-            ("Alt+Up", lambda: self.form.head.move_by(-1)), ("Alt+Down", lambda: self.form.head.move_by(1)),
+            ("F8", self._next_problem), ("Ctrl+D", self._duplicate), ("Ctrl+F", self.parts.focus_find),
+            ("Alt+Up", lambda: self._move_by(-1)), ("Alt+Down", lambda: self._move_by(1)),
             ("Alt+Left", self.back_asked.emit), ("F2", self._rename), ("Ctrl+E", self._switch_to_file),
             ("F6", lambda: self._cycle(1)), ("Shift+F6", lambda: self._cycle(-1)),
-            ("Ctrl+1", self.outline.tree.setFocus), ("Ctrl+2", self._focus_form), ("Ctrl+3", self._focus_pane),
+            ("Ctrl+1", self.parts.focus_outline), ("Ctrl+2", self._focus_form), ("Ctrl+3", self._focus_pane),
             ("Ctrl+4", self._focus_problems),
         ):  # fmt: skip
             made = QShortcut(QKeySequence(keys), self)
@@ -174,8 +153,8 @@ class DesignerPlace(Place):
         before, self.view = self.view, view
         self.show_header(view.header)
         self.nothing.setVisible(view.form is None)
-        self._editing.setVisible(view.form is not None)
-        self._show_banner(view.banner)
+        self.parts.setVisible(view.form is not None)
+        self.banner.show_banner(view.banner)
         if view.form is None:
             return
         elsewhere = before.form is None or before.form.path != view.form.path
@@ -189,6 +168,8 @@ class DesignerPlace(Place):
         self.outline.add.setEnabled(not view.header.read_only)
         if not view.problems and before.problems:
             self.problems.hide()
+        self.outline.tree.rows.movable = not view.header.read_only
+        self.parts.path.show_form(view.form)
         if self.outline.rows:
             self.outline.mark(view.form.path)
 
@@ -205,21 +186,6 @@ class DesignerPlace(Place):
         """Offer the repairs of a problem."""
         self._repairs[row] = words
         self.problems.show_repairs(row, words)
-
-    def _show_banner(self, banner: Banner | None) -> None:
-        self.banner.setVisible(banner is not None)
-        if banner is None or banner.words == self.banner_words.text():
-            return
-        self.banner_words.setText(banner.words)
-        for button in self.banner_buttons:
-            take_away(button)
-        self.banner_buttons = []
-        for action, words in banner.actions:
-            made = ActionButton("", words, height=36)
-            made.clicked.connect(lambda _checked=False, action=action: self.banner_asked.emit(action))
-            dress(made, self.theme)
-            self._banner_row.addWidget(made)
-            self.banner_buttons.append(made)
 
     def show_new(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
         """Show what a new study can begin from."""
@@ -260,7 +226,7 @@ class DesignerPlace(Place):
         prompt.answered.connect(lambda _answer: self.close_prompt())
         prompt.given_up.connect(self.close_prompt)
         dress(prompt, self.theme)
-        self._prompts.addWidget(prompt)
+        self.parts.prompts.addWidget(prompt)
         first.setFocus()
 
     def close_prompt(self) -> None:
@@ -293,18 +259,51 @@ class DesignerPlace(Place):
         self.save_asked.emit()
 
     def ask_to_add(self) -> None:
-        """Show what can be added: an element of each kind."""
-        if self.view.form is None or self.view.header.read_only:
-            return
-        menu = QMenu(self)
-        menu.setFont(font("label"))
-        for section, words in self.view.addable:
-            action = menu.addAction(words)
-            action.triggered.connect(lambda _checked=False, section=section: self.asked.emit(AddElement(section)))
-            if section == self.view.form.path[: len(section)]:
-                menu.setActiveAction(action)
-        self.menu = menu
-        menu.popup(self.outline.add.mapToGlobal(self.outline.add.rect().topLeft()))
+        """Show what can be added."""
+        if self.view.form is not None and not self.view.header.read_only:
+            self.flush()
+            button = self.outline.add if self.outline.add.isVisible() else self.header
+            self.adding.open(self.view.addable, button.mapToGlobal(button.rect().topLeft()))
+
+    def _add(self, one: Addable) -> None:
+        if isinstance(one.asks, str):
+            self.question_asked.emit(one.asks)
+        else:
+            self.asked.emit(one.asks)
+
+    def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
+        """Return the element of the form, and those that are selected with it."""
+        form = self.view.form
+        path = () if form is None else form.path
+        return path, tuple(one for one in self.outline.selected if one != path)
+
+    def _duplicate(self) -> None:
+        path, also = self._several()
+        if self.form.head.copy.isEnabled():
+            self.flush()
+            self.asked.emit(DuplicateElement(path, also))
+
+    def _delete(self) -> None:
+        path, also = self._several()
+        if self.form.head.delete.isEnabled():
+            self.flush()
+            self.delete_asked.emit(path, also)
+
+    def _move_by(self, by: int) -> None:
+        path, also = self._several()
+        if path and not self.view.header.read_only:
+            self.flush()
+            self.asked.emit(MoveElement(path, by, also))
+
+    def show_step(self, several: tuple[ElementPath, ...], said: str, *, fresh: bool) -> None:
+        """Select the elements of a step together, say what it did, and lead to the first text of a new element."""
+        if len(several) > 1:
+            self.outline.select_several(several)
+        if said:
+            say(self, said)
+        if fresh:
+            self.parts.show_side("form")
+            self.form.focus_first_text()
 
     def _open_file(self) -> None:
         chosen, _ = QFileDialog.getOpenFileName(self, "Open study", "", "Protocols (*.toml)")
@@ -334,11 +333,11 @@ class DesignerPlace(Place):
     # parts of the place
 
     def _focus_form(self) -> None:
-        self._show_side("form")
+        self.parts.show_side("form")
         self.form.focus_first()
 
     def _focus_pane(self) -> None:
-        self._show_side("pane")
+        self.parts.show_side("pane")
         page = next(one for one in self.pane.pages if one.name == self.pane.tab)
         (page.body.focusProxy() or self.pane.tabs).setFocus(Qt.FocusReason.ShortcutFocusReason)
 
@@ -359,7 +358,7 @@ class DesignerPlace(Place):
     def _cycle(self, by: int) -> None:
         stops = [
             (self.header, self.header.study.setFocus),
-            (self.outline, self.outline.tree.setFocus),
+            (self.outline, self.parts.focus_outline),
             (self.form, self._focus_form),
             (self.pane, self._focus_pane),
         ]
@@ -368,19 +367,6 @@ class DesignerPlace(Place):
         focused = self.focusWidget()
         here = next((at for at, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -by)
         stops[(here + by) % len(stops)][1]()
-
-    def _show_side(self, side: str) -> None:
-        self._side = side
-        self._arrange()
-
-    def _arrange(self) -> None:
-        one = self.width() < ONE_PANE_BELOW
-        self.outline.setFixedWidth(OUTLINE_PX if self.width() >= WIDE_FROM else OUTLINE_NARROW_PX)
-        self.sides.setVisible(one)
-        self.sides.show_values((("form", "Form"), ("pane", "Views")), self._side)
-        self.form.setVisible(not one or self._side == "form")
-        self.pane.setVisible(not one or self._side == "pane")
-        self.pane.make_room()
 
     def enter(self) -> None:
         """Look again at what there is."""
@@ -398,4 +384,4 @@ class DesignerPlace(Place):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Make room."""
         super().resizeEvent(event)
-        self._arrange()
+        self.parts.arrange(self.width())

@@ -124,6 +124,8 @@ class Form:
         Its place in the session or list and how many there are, from 1; None where it has no order.
     questions : QuestionLines
         The questions of the questionnaire that it is in, itself included; none where it is no question.
+    around : tuple of (path, str)
+        The section and the elements that it is in, with their titles, and itself.
     """
 
     path: Path
@@ -135,6 +137,7 @@ class Form:
     faults: tuple[str, ...] = ()
     position: tuple[int, int] | None = None
     questions: QuestionLines = NO_QUESTIONS
+    around: tuple[tuple[Path, str], ...] = ()
 
     @property
     def rows(self) -> tuple[FormRow, ...]:
@@ -164,6 +167,7 @@ def form(study: Study, path: Path) -> Form:
     return Form(
         path, title_of(document, path), icon_of(path), _kind(path), None if name is None else str(name), sections, own,
         position_of(document, path), question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
+        tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
     )  # fmt: skip
 
 

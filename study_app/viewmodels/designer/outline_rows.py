@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, TypeAlias
 
+from study_app.authoring.additions import singular
 from study_app.authoring.outline import Element, found, outline
 from study_app.authoring.study import Study
 from study_app.protocol.source.document import Path, names
@@ -20,6 +21,10 @@ ICONS: Final = {
 SECTIONS: Final = ("Session, in order", "Parts it is made of", "The study itself")
 FIRST: Final = ("study",)
 """What is selected where nothing else is."""
+
+
+ElementPath: TypeAlias = Path
+"""The path of an element, as windows hand it on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +43,8 @@ class OutlineRow:
         How many faults are within it.
     name : str
         What a screen reader says of it.
+    step : tuple of str or int
+        Its entry in the list that orders it; () where it cannot be moved.
     """
 
     path: Path
@@ -47,6 +54,7 @@ class OutlineRow:
     depth: int = 0
     faults: int = 0
     name: str = ""
+    step: Path = ()
 
 
 def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
@@ -87,9 +95,28 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
         count = len(names(study.document, kind))
         note = str(count) if count else "none"
     faults = f"{element.faults} problem{'s' * (element.faults > 1)}" if element.faults else ""
-    sort = kind.removesuffix("s") if len(path) == 2 else "question" if "items" in path else ""
-    name = ", ".join(filter(None, (element.title, sort, note, faults)))
-    return OutlineRow(path, element.title, icon_of(path), note, element.depth + 1, element.faults, name)
+    sort = singular(kind) if len(path) == 2 else "question" if "items" in path else ""
+    spoken, at = _spoken(note) if in_session else note, ""
+    if element.step and isinstance(element.step[-1], int):
+        count = len(_at(study.document, element.step[:-1]))
+        at = f"{'question' if 'items' in path else 'step'} {element.step[-1] + 1} of {count}"
+        sort = "" if "items" in path else sort
+    name = ", ".join(filter(None, (element.title, sort, spoken, at, faults)))
+    title, step = element.title, element.step
+    return OutlineRow(path, title, icon_of(path), note, element.depth + 1, element.faults, name, step)
+
+
+def _spoken(time: str) -> str:
+    """Return "10:12" as "10 minutes 12"."""
+    parts = [int(part) for part in time.split(":")] if time else []
+    units = ("hours", "minutes")[-(len(parts) - 1) :] if len(parts) > 1 else ()
+    return " ".join([*(f"{part} {unit}" for part, unit in zip(parts, units, strict=False)), *map(str, parts[-1:])])
+
+
+def _at(document: Any, path: Path) -> Any:
+    for step in path:
+        document = document[step]
+    return document
 
 
 SECTIONS_OF_TABLES: Final = frozenset(ICONS) - {"study", "device", "scene", "limits", "analysis"}

@@ -21,9 +21,12 @@ class DeletePrompt:
         The places that name it, in words.
     others : tuple of (str, str)
         Id and title of what could be named in its place.
+    also : tuple of path
+        Others that are deleted with it.
     """
 
     path: Path
     title: str
     references: tuple[str, ...]
     others: tuple[tuple[str, str], ...] = ()
+    also: tuple[Path, ...] = ()

@@ -66,24 +66,54 @@ class SwitchKey:
 
 @dataclass(frozen=True, slots=True)
 class AddElement:
-    """Add an element to a section of tables or a list of tables."""
+    """Add an element to a section of tables or a list of tables, of a kind where there are several.
+
+    ``kind`` is the key that tells kinds apart with its value; () leaves it out.
+    """
 
     section: Path
+    kind: tuple[()] | tuple[str, str] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class AddNamed:
+    """Add an element to a section and name it: in the reference at ``path``, or at the end of the list there."""
+
+    path: Path
+    section: str
 
 
 @dataclass(frozen=True, slots=True)
 class DuplicateElement:
-    """Copy an element right after itself."""
+    """Copy an element right after itself; ``also`` are others that are copied with it."""
 
     path: Path
+    also: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class MoveElement:
-    """Move an element among its neighbours, by so many places."""
+    """Move an element among its neighbours, by so many places; ``also`` are others that move with it."""
 
     path: Path
     by: int
+    also: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class MoveTo:
+    """Move entries of a list together before the one at the index ``to``; its length stands for the end."""
+
+    entries: tuple[Path, ...]
+    to: int
+
+
+@dataclass(frozen=True, slots=True)
+class Paste:
+    """Paste a text after an element: elements as TOML, or lines that become questions."""
+
+    path: Path
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +126,15 @@ class MoveEntry:
 
 @dataclass(frozen=True, slots=True)
 class DeleteElement:
-    """Delete an element: with all that needs it, with another one in its place, or leaving gaps."""
+    """Delete an element: with all that needs it, with another one in its place, or leaving gaps.
+
+    ``also`` are others that are deleted with it.
+    """
 
     path: Path
     how: Literal["all", "other", "gaps"] = "gaps"
     other: str = ""
+    also: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +161,6 @@ class Several:
 
 
 Request: TypeAlias = (
-    SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | DuplicateElement
-    | MoveElement | MoveEntry | DeleteElement | RenameElement | RetypeFile | Several
+    SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | AddNamed
+    | DuplicateElement | MoveElement | MoveTo | MoveEntry | Paste | DeleteElement | RenameElement | RetypeFile | Several
 )  # fmt: skip

@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
-from study_app.authoring.additions import singular
-from study_app.authoring.fields import label_of, rows
-from study_app.authoring.study import Study
-from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.file_text import FileText
 from study_app.viewmodels.designer.form_rows import Form
 from study_app.viewmodels.designer.problem_rows import ProblemRow
@@ -76,14 +73,7 @@ class DesignerView:
     file: FileText = NO_FILE
     problems: tuple[ProblemRow, ...] = ()
     banner: Banner | None = None
-    addable: tuple[tuple[Path, str], ...] = ()
-
-
-def addable(study: Study, selected: Path) -> tuple[tuple[Path, str], ...]:
-    """Return what an element can be added to, with the word for one: lists of the selected element, then sections."""
-    lists = [row.path for row in rows(study.document, selected[:2]) if row.kind == "list"] if len(selected) > 1 else []
-    sections = lists + [row.path for row in rows(study.document, ()) if row.kind == "tables"]
-    return tuple((path, label_of(singular(path[-1]))) for path in sections)
+    addable: tuple[Addable, ...] = ()
 
 
 def problems_chip(count: int, warnings: int) -> tuple[Tone, str, str]:

@@ -7,6 +7,7 @@ import os
 from typing import Any
 
 import pytest
+from PySide6.QtCore import Qt
 
 from study_app.authoring.drafts import draft_of
 from study_app.protocol.source.files import shipped, shipped_file
@@ -224,15 +225,23 @@ def test_a_copy_comes_right_after_its_original(designer: Any, path: tuple[str | 
     assert position_of(study.document, designer.editing.opened.history.selected) == (at[0] + 1, at[1] + 1)
 
 
-def test_what_can_be_added_begins_with_the_lists_of_the_selected_element(designer: Any) -> None:
+def test_what_can_be_added_is_filtered_by_typing_and_comes_after_the_selected_element(
+    designer: Any, qtbot: Any
+) -> None:
     designer.controller.open("kitchen")
-    assert "Question" not in [words for _, words in designer.place.view.addable]
-    designer.editing.select(("questionnaires", "liquid", "items", 0))
-    assert designer.place.view.addable[0] == (("questionnaires", "liquid", "items"), "Question")
+    assert not [one for one in designer.place.view.addable if one.words.startswith("Question")][1:]
+    designer.controller.begin("template:questionnaire-only", "asked")
+    form = next(iter(designer.editing.opened.study.document["questionnaires"]))
+    items = ("questionnaires", form, "items")
+    designer.editing.select((*items, 0))
+    assert designer.place.view.addable[0].asks.section == items
     designer.place.ask_to_add()
-    designer.place.menu.actions()[0].trigger()
-    designer.place.menu.close()
-    assert designer.place.view.form.path == ("questionnaires", "liquid", "items", 2)
+    adding = designer.place.adding
+    adding.words.setText("questi slid")
+    assert adding.list.count() == 1
+    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
+    assert designer.place.view.form.path == (*items, 1)
+    assert designer.editing.opened.study.document["questionnaires"][form]["items"][1]["kind"] == "slider"
     assert designer.editing.opened.study.faults == ()
 
 

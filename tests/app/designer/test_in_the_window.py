@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 )
 
 from study_app.authoring.drafts import draft_of
-from study_app.gui.designer.outline import ROW_ROLE
+from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.gui.theme.theme import DARK, LIGHT
 
 KILLS = 5

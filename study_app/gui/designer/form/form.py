@@ -279,6 +279,20 @@ class FormCard(Card):
         if self.rows:
             self.focus(self.rows[0].row.row.path)
 
+    def focus_first_text(self) -> None:
+        """Give the keyboard to the first empty text, else to the first text, marked, else to the first row."""
+        texts = [part for row in self.rows for part in row.field.findChildren(QWidget)]
+        lines = [part for part in texts if isinstance(part, TypedLine | TypedText)]
+        words = [part for part in lines if isinstance(part.parent(), LanguagesField)]
+        found = next((part for part in lines if not part.words() and not part.placeholderText()), None)
+        found = found or next(iter(words), None)
+        if found is None:
+            self.focus_first()
+            return
+        found.setFocus(Qt.FocusReason.OtherFocusReason)
+        found.selectAll()
+        self.area.ensureWidgetVisible(found, 0, 60)
+
     def refuse(self, path: tuple[str | int, ...], sentence: str) -> None:
         """Say at the field of a place why it was not changed."""
         inner = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]

@@ -1,0 +1,188 @@
+"""Where the parts of the designer are: side by side, and in small windows the outline as a drawer, then one column."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QRect, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from study_app.gui.designer.form.form import FormCard
+from study_app.gui.designer.outline.card import OutlineCard
+from study_app.gui.designer.pane.right_pane import RightPane
+from study_app.gui.designer.problems import ProblemsCard
+from study_app.gui.designer.segments import Segments
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.widgets.cards import SHADOW, Icon
+from study_app.gui.widgets.controls import ActionButton
+from study_app.viewmodels.designer.form_rows import Form
+
+OUTLINE_PX, DRAWER_PX = 284, 320
+DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
+GAP = 14 - 2 * SHADOW
+
+
+class PathBar(QWidget):
+    """The way to the element of the form, where the outline is a drawer; ``open_asked`` carries a path."""
+
+    outline_asked = Signal()
+    open_asked = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Path of the element")
+        self.outline = ActionButton("layers", "Outline", height=40)
+        self.outline.setProperty("dense", "true")
+        self.outline.setAccessibleName("Outline (Ctrl+1)")
+        self.outline.setToolTip("Outline (Ctrl+1)")
+        self.outline.clicked.connect(self.outline_asked)
+        self.steps: list[ActionButton] = []
+        self._parts: list[QWidget] = []
+        self._shown: object = None
+        self.row = QHBoxLayout(self)
+        self.row.setContentsMargins(0, 0, 0, 0)
+        self.row.setSpacing(4)
+        self.row.addWidget(self.outline)
+        self._steps = QHBoxLayout()
+        self._steps.setSpacing(0)
+        self.row.addLayout(self._steps)
+        self.row.addStretch()
+
+    def show_form(self, form: Form) -> None:
+        """Show the way to an element."""
+        if form.around == self._shown:
+            return
+        self._shown = form.around
+        for part in self._parts:
+            take_away(part)
+        self.steps, self._parts = [], []
+        for path, title in form.around:
+            sign = Icon("chevron", "text2", 14)
+            made = ActionButton("", title, role="plain", height=40)
+            made.setProperty("dense", "true")
+            made.setFont(font("label"))
+            made.clicked.connect(lambda _checked=False, path=path: self.open_asked.emit(path))
+            for part in (sign, made):
+                self._steps.addWidget(part)
+                dress(part, self.outline.theme)
+            self.steps.append(made)
+            self._parts += [sign, made]
+
+
+class Arrangement(QWidget):
+    """Places outline, form, pane and problems."""
+
+    def __init__(self, outline: OutlineCard, form: FormCard, pane: RightPane, problems: ProblemsCard) -> None:
+        super().__init__()
+        self.outline, self.form, self.pane = outline, form, pane
+        self.side = "form"
+        self.drawer = False
+        self._width = DRAWER_BELOW
+        self.path = PathBar()
+        self.path.outline_asked.connect(self.toggle_drawer)
+        self.sides = Segments("Side")
+        self.sides.chosen.connect(lambda side: self.show_side(str(side)))
+        self.prompts = QVBoxLayout()
+        across = QHBoxLayout()
+        across.setSpacing(GAP)
+        self._left = QVBoxLayout()
+        self._left.setSpacing(12 - 2 * SHADOW)
+        self._left.addWidget(form, 1)
+        across.addLayout(self._left, 44)
+        across.addWidget(pane, 56)
+        self.top = QWidget()
+        top = QHBoxLayout(self.top)
+        top.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        top.addWidget(self.path, 1)
+        top.addWidget(self.sides)
+        self._right = right = QVBoxLayout()
+        right.setSpacing(12 - 2 * SHADOW)
+        right.addWidget(self.top)
+        right.addLayout(self.prompts)
+        right.addLayout(across, 1)
+        right.addWidget(problems)
+        self._whole = QHBoxLayout(self)
+        self._whole.setContentsMargins(0, 0, 0, 0)
+        self._whole.setSpacing(GAP)
+        self._whole.addWidget(outline)
+        self._whole.addLayout(right, 1)
+        outline.setFixedWidth(OUTLINE_PX)
+        outline.settled.connect(self.close_drawer)
+        for part in (outline.tree, outline.words):
+            part.installEventFilter(self)
+
+    def show_side(self, side: str) -> None:
+        """Show form or pane where they share a column."""
+        self.side = side
+        self.arrange(self._width)
+
+    def arrange(self, width: int) -> None:
+        """Place the parts for so wide a place."""
+        self._width = width
+        one, drawer = width < ONE_PANE_BELOW, width < DRAWER_BELOW
+        if drawer != self.drawer:
+            self.drawer = drawer
+            if drawer:
+                self._whole.removeWidget(self.outline)
+                self.outline.setFixedWidth(DRAWER_PX)
+                self.outline.hide()
+                self._place_drawer()
+            else:
+                self.outline.setFixedWidth(OUTLINE_PX)
+                self.outline.setMinimumHeight(0)
+                self._whole.insertWidget(0, self.outline)
+                self.outline.show()
+        self.path.setVisible(drawer)
+        self.top.setVisible(drawer)
+        (self._right if one else self._left).insertWidget(0, self.top)
+        self.sides.setVisible(one)
+        self.sides.show_values((("form", "Form"), ("pane", "Views")), self.side)
+        self.form.setVisible(not one or self.side == "form")
+        self.pane.setVisible(not one or self.side == "pane")
+        self.pane.make_room()
+
+    def focus_outline(self) -> None:
+        """Give the keyboard to the outline; a drawer opens."""
+        if self.drawer:
+            self._place_drawer()
+            self.outline.show()
+            self.outline.raise_()
+        self.outline.tree.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def focus_find(self) -> None:
+        """Give the keyboard to the field that finds; a drawer opens."""
+        self.focus_outline()
+        self.outline.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def toggle_drawer(self) -> None:
+        """Open the drawer, or close it."""
+        if self.outline.isVisible():
+            self.close_drawer()
+        else:
+            self.focus_outline()
+
+    def close_drawer(self) -> None:
+        """Close the drawer, where there is one; the form takes the keyboard that it had."""
+        if self.drawer and self.outline.isVisible():
+            had = self.outline.isAncestorOf(self.window().focusWidget() or self)
+            self.outline.hide()
+            if had:
+                self.path.outline.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _place_drawer(self) -> None:
+        self.outline.setGeometry(QRect(0, 46, DRAWER_PX, max(200, self.height() - 46)))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Keep the drawer as high as the place."""
+        super().resizeEvent(event)
+        if self.drawer:
+            self._place_drawer()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+        """Close the drawer at Esc and Enter."""
+        if self.drawer and event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
+            closes = event.key() == Qt.Key.Key_Escape and not self.outline.tree.dragged
+            if closes or (watched is self.outline.tree and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}):
+                self.close_drawer()
+                return True
+        return super().eventFilter(watched, event)

@@ -1,0 +1,43 @@
+"""One line above the parts of the designer: why a study is read-only, a draft that was found, a file that changed."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout
+
+from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import label
+from study_app.viewmodels.designer.view import Banner
+
+
+class BannerCard(Card):
+    """Draws a `Banner`; ``asked`` carries the action of a button."""
+
+    asked = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__(padding=10, gap=6)
+        self.words = label("", "label", wraps=True)
+        self.buttons: list[ActionButton] = []
+        self._row = QHBoxLayout()
+        self._row.addWidget(self.words, 1)
+        self.column.addLayout(self._row)
+        self.hide()
+
+    def show_banner(self, banner: Banner | None) -> None:
+        """Show another banner; None hides it."""
+        self.setVisible(banner is not None)
+        if banner is None or banner.words == self.words.text():
+            return
+        self.words.setText(banner.words)
+        for button in self.buttons:
+            take_away(button)
+        self.buttons = []
+        for action, words in banner.actions:
+            made = ActionButton("", words, height=36)
+            made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
+            dress(made, self.theme)
+            self._row.addWidget(made)
+            self.buttons.append(made)

@@ -1,0 +1,96 @@
+"""The list of what can be added, filtered by typing."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QPoint, QSize, Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, QVBoxLayout, QWidget
+
+from study_app.gui.theme.icons import icon
+from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.themed import Themed
+from study_app.viewmodels.designer.addable import Addable
+
+WIDTH, HIGHEST, ROW_PX = 320, 420, 34
+MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
+
+
+class AddList(Themed, QFrame):
+    """A list over the place; ``chosen`` carries an `Addable`."""
+
+    chosen = Signal(object)
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent, Qt.WindowType.Popup)
+        self.setAccessibleName("Add")
+        self.setProperty("role", "card")
+        self._every: tuple[Addable, ...] = ()
+        self.words = QLineEdit()
+        self.words.setFont(font("label", weight=400))
+        self.words.setProperty("dense", "true")
+        self.words.setFixedHeight(36)
+        self.words.setPlaceholderText("Type to filter")
+        self.words.setAccessibleName("Filter what can be added")
+        self.list = QListWidget()
+        self.list.setAccessibleName("What can be added")
+        self.list.setFont(font("label"))
+        self.list.setFrameShape(QFrame.Shape.NoFrame)
+        self.list.setIconSize(QSize(18, 18))
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(10, 10, 10, 10)
+        column.setSpacing(8)
+        column.addWidget(self.words)
+        column.addWidget(self.list, 1)
+        self.words.textChanged.connect(self._filter)
+        self.words.installEventFilter(self)
+        self.list.itemClicked.connect(lambda _item: self._choose())
+        self.list.itemActivated.connect(lambda _item: self._choose())
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        row = f"border-radius: 6px; color: {theme.text};"
+        chosen = f"background: {theme.selected}; color: {theme.accent};"
+        self.list.setStyleSheet(f"QListWidget::item {{ {row} }} QListWidget::item:selected {{ {chosen} }}")
+
+    def open(self, every: tuple[Addable, ...], above: QPoint) -> None:
+        """Show what can be added, with its lower left corner at a place of the screen."""
+        self._every = every
+        self.words.clear()
+        self._filter("")
+        height = min(HIGHEST, 64 + ROW_PX * len(every) + 10)
+        screen = self.screen().availableGeometry()
+        at = QPoint(min(above.x(), screen.right() - WIDTH), max(screen.top(), above.y() - height))
+        self.setGeometry(at.x(), at.y(), WIDTH, height)
+        self.show()
+        self.words.setFocus(Qt.FocusReason.PopupFocusReason)
+
+    def _filter(self, words: str) -> None:
+        wanted = words.casefold().split()
+        self.list.clear()
+        for one in self._every:
+            if all(part in f"{one.words} {one.help}".casefold() for part in wanted):
+                item = QListWidgetItem(icon(one.icon, self.theme.text2, 18), one.words)
+                item.setData(Qt.ItemDataRole.UserRole, one)
+                item.setToolTip(one.help)
+                item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, one.help)
+                item.setSizeHint(QSize(WIDTH - 40, ROW_PX))
+                self.list.addItem(item)
+        self.list.setCurrentRow(0)
+
+    def _choose(self) -> None:
+        if (item := self.list.currentItem()) is not None:
+            self.close()
+            self.chosen.emit(item.data(Qt.ItemDataRole.UserRole))
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+        """Let arrows and Enter in the field act on the list."""
+        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
+            if event.key() in MOVES:
+                self.list.keyPressEvent(event)
+                return True
+            if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+                self._choose()
+                return True
+        return super().eventFilter(watched, event)

@@ -1,0 +1,165 @@
+"""The outline: what the study is made of, as a tree to choose from, with a field to find."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, Signal
+from PySide6.QtGui import QStandardItem, QStandardItemModel
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit
+
+from study_app.gui.designer.outline.rows import ROW_ROLE, Index
+from study_app.gui.designer.outline.tree import Tree
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.controls import ActionButton
+from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
+
+
+class OutlineCard(Card):
+    """Draws outline rows.
+
+    Signals: ``chosen`` (path), ``settled`` (an element was clicked), ``find_changed`` (words), ``add_asked``,
+    ``duplicate_asked``, ``delete_asked``, ``copy_asked``, ``paste_asked``, ``dropped`` (entries of a list, and the
+    index of the one that they come before).
+    """
+
+    chosen = Signal(object)
+    find_changed = Signal(str)
+    add_asked = Signal()
+    duplicate_asked = Signal()
+    delete_asked = Signal()
+    settled = Signal()
+    copy_asked = Signal()
+    paste_asked = Signal()
+    dropped = Signal(object, int)
+
+    def __init__(self) -> None:
+        super().__init__(padding=12, gap=8)
+        self.setAccessibleName("Outline")
+        self.rows: tuple[OutlineRow, ...] = ()
+        self._opened: set[object] = set()
+        self._filling = False
+        self.words = QLineEdit()
+        self.words.setAccessibleName("Find in the study")
+        self.words.setPlaceholderText("Find in the study (Ctrl+F)")
+        self.words.setFont(font("label", weight=400))
+        self.words.setProperty("dense", "true")
+        self.words.setFixedHeight(36)
+        self.words.setClearButtonEnabled(True)
+        self.tree = Tree()
+        self.items = QStandardItemModel(self.tree)
+        self.tree.setModel(self.items)
+        self.add = ActionButton("plus", "Add", height=40)
+        self.add.setAccessibleName("Add an element (Insert)")
+        self.duplicate = ActionButton("copy", "Duplicate", height=40)
+        self.duplicate.setAccessibleName("Duplicate the selected element (Ctrl+D)")
+        self.column.addWidget(self.words)
+        self.column.addWidget(self.tree, 1)
+        buttons = QHBoxLayout()
+        buttons.setSpacing(8)
+        buttons.addWidget(self.add, 1)
+        buttons.addWidget(self.duplicate, 1)
+        self.column.addLayout(buttons)
+        self.words.textChanged.connect(self.find_changed)
+        self.tree.selectionModel().currentChanged.connect(self._choose)
+        self.tree.clicked.connect(self._click)
+        self.tree.expanded.connect(lambda index: self._opened.add(self._key(index)))
+        self.tree.collapsed.connect(lambda index: self._opened.discard(self._key(index)))
+        self.tree.key_pressed.connect(self._key_pressed)
+        self.tree.copy_asked.connect(self.copy_asked)
+        self.tree.paste_asked.connect(self.paste_asked)
+        self.tree.dropped.connect(self.dropped)
+        self.add.clicked.connect(self.add_asked)
+        self.duplicate.clicked.connect(self.duplicate_asked)
+
+    @property
+    def selected(self) -> tuple[ElementPath, ...]:
+        """The selected elements, in the order of the outline."""
+        order = {row.path: at for at, row in reversed([*enumerate(self.rows)])}
+        found = {row.path for row in self.tree.selected_rows()}
+        return tuple(sorted(found, key=lambda path: order.get(path, 0)))
+
+    def select_several(self, paths: tuple[ElementPath, ...]) -> None:
+        """Select elements together, beside the current one."""
+        flags = QItemSelectionModel.SelectionFlag
+        self._filling = True
+        for index in self._indexes():
+            if index.data(ROW_ROLE).path in paths and index.data(ROW_ROLE).path:
+                if index.parent().isValid():
+                    self.tree.expand(index.parent())
+                self.tree.selectionModel().select(index, flags.Select)
+        self._filling = False
+
+    def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
+        """Show rows; what was open stays open."""
+        if rows != self.rows:
+            several = self.selected
+            self.rows = rows
+            self._filling = True
+            scrolled = self.tree.verticalScrollBar().value()
+            self.items.clear()
+            above: list[QStandardItem] = [self.items.invisibleRootItem()]
+            for row in rows:
+                item = QStandardItem(row.title)
+                item.setData(row, ROW_ROLE)
+                item.setData(row.name, Qt.ItemDataRole.AccessibleTextRole)
+                if not row.path:
+                    item.setFlags(Qt.ItemFlag.ItemIsEnabled)
+                depth = max(row.depth - 1, 0)
+                del above[depth + 1 :]
+                above[-1].appendRow(item)
+                above.append(item)
+            for index in self._indexes():
+                if self._key(index) in self._opened or self.words.text().strip():
+                    self.tree.expand(index)
+            self.tree.verticalScrollBar().setValue(scrolled)
+            self._filling = False
+            self.mark(selected)
+            if selected in several and len(several) > 1:
+                self.select_several(several)
+        self.mark(selected)
+
+    def mark(self, path: object) -> None:
+        """Mark the row of an element, the nearest to the one that is marked."""
+        current = self.tree.currentIndex()
+        if current.isValid() and current.data(ROW_ROLE).path == path:
+            return
+        found = next((index for index in self._indexes() if index.data(ROW_ROLE).path == path), None)
+        self._filling = True
+        if found is None:
+            self.tree.clearSelection()
+            self.tree.setCurrentIndex(QModelIndex())
+        else:
+            if found.parent().isValid():
+                self.tree.expand(found.parent())
+            if "blocks" in path[:1]:  # type: ignore[index]  # a path
+                self.tree.expand(found)
+            flags = QItemSelectionModel.SelectionFlag
+            self.tree.selectionModel().setCurrentIndex(found, flags.ClearAndSelect)
+            self.tree.scrollTo(found)
+        self._filling = False
+
+    def _indexes(self) -> list[QModelIndex]:
+        found: list[QModelIndex] = []
+        waiting = [self.items.index(row, 0) for row in range(self.items.rowCount())]
+        while waiting:
+            index = waiting.pop(0)
+            found.append(index)
+            waiting[:0] = [self.items.index(row, 0, index) for row in range(self.items.rowCount(index))]
+        return found
+
+    def _key(self, index: Index) -> object:
+        row, parent = index.data(ROW_ROLE), index.parent()
+        return row.path, row.depth, parent.data(ROW_ROLE).path if parent.isValid() else None
+
+    def _choose(self, index: QModelIndex) -> None:
+        if not self._filling and index.isValid() and index.data(ROW_ROLE).path:
+            self.chosen.emit(index.data(ROW_ROLE).path)
+
+    def _click(self, index: QModelIndex) -> None:
+        if self.items.hasChildren(index):
+            self.tree.setExpanded(index, not self.tree.isExpanded(index))
+        elif index.data(ROW_ROLE).path:
+            self.settled.emit()
+
+    def _key_pressed(self, key: int) -> None:
+        (self.add_asked if key == Qt.Key.Key_Insert else self.delete_asked).emit()

@@ -1,0 +1,61 @@
+"""What can be added to a study where one is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from study_app.authoring.additions import singular
+from study_app.authoring.fields import label_of, rows
+from study_app.authoring.outline import title_of
+from study_app.authoring.schema_nodes import node_at, tags
+from study_app.authoring.study import Study
+from study_app.protocol.formats import TABLES, is_second
+from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.outline_rows import icon_of
+from study_app.viewmodels.designer.requests import AddElement
+
+
+@dataclass(frozen=True, slots=True)
+class Addable:
+    """One thing that can be added: its words, icon and help, and what is asked for: a step, or a question first."""
+
+    words: str
+    icon: str
+    asks: AddElement | Literal["language", "instrument"]
+    help: str = ""
+
+
+def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
+    """Return what can be added: to lists of the selected element, to its section, then to the other sections."""
+    document = study.document
+    around = selected[:2] if len(selected) > 1 else ()
+    lists = [row.path for row in rows(document, around) if row.kind == "list"] if around else []
+    second = is_second(document)
+    sections = [
+        row.path for row in rows(document, ()) if row.kind == "tables" and (second or row.path[0] not in TABLES)
+    ]
+    sections.sort(key=lambda path: path[:1] != selected[:1])
+    found = [one for path in lists for one in _of_list(study, path)]
+    found += [
+        Addable(label_of(singular(path[0])), icon_of(path), AddElement(path), f"To {label_of(path[0]).lower()}")
+        for path in sections
+    ]
+    if second:
+        help_ = "A standard questionnaire with its source and scores"
+        found.append(Addable("Instrument …", "list", "instrument", help_))
+    return (*found, Addable("Language …", "info", "language", "In every text of the study"))
+
+
+def _of_list(study: Study, path: Path) -> Iterator[Addable]:
+    """Yield what can be added to a list: where its tables are of several kinds, one of each."""
+    words = label_of(singular(path[-1]))
+    to = f"To {title_of(study.document, path[:2])}"
+    key, kinds = tags(node_at(study.document, (*path, 0)))
+    if not kinds or not is_second(study.document):
+        yield Addable(words, icon_of(path), AddElement(path), to)
+        return
+    for kind in kinds:
+        named = f"{words}: {label_of(kind).lower()}" if kind is not None else words
+        yield Addable(named, icon_of(path), AddElement(path, (key, kind) if kind is not None else ()), to)
