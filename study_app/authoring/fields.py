@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias
 
-from study_app.authoring.names import choices_at
+from study_app.authoring.names import choices_at, sections_at
 from study_app.authoring.schema_nodes import OWN, Node, alternatives, node_at, table_of, tags
 from study_app.haptics.model.ranges import REASON
 from study_app.protocol.source.document import Path, has
@@ -81,6 +81,8 @@ class Row:
         The key that is given instead of this one, "" where there is none: exactly one of the two is.
     model : str
         The title of the model whose key it is, such as "Block".
+    sections : tuple of str
+        The sections whose tables are named, of references alone.
     """
 
     path: Path
@@ -97,6 +99,7 @@ class Row:
     either: tuple[Row, ...] = ()
     instead: str = ""
     model: str = ""
+    sections: tuple[str, ...] = ()
 
 
 def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
@@ -161,13 +164,15 @@ def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value
     if len(nodes) > 1 and not tags(nodes)[0]:
         either = tuple(_row(document, path, (node,), value, required=required) for node in nodes)
         return Row(path, "either", **common, either=either)
-    references = choices_at(document, (*path, 0) if first.get("type") == "array" else path)
+    named = (*path, 0) if first.get("type") == "array" else path
+    references = choices_at(document, named)
     kind = _kind(first, isinstance(references, tuple))
     words = first.get("items", first) if kind == "choices" else first
     names = references if kind in {"reference", "references"} and references is not None else _enum(words)
     sentences = _sentences(first.get("description", ""))
     options = tuple(Choice(name, sentences.get(name, "")) for name in names)
     limits = _numbers_in(first) if kind in {"vector", "numbers", "points"} else first
+    common["sections"] = sections_at(named) if kind in {"reference", "references"} else ()
     return Row(path, kind, **common, choices=options, bounds=_bounds(first, limits), reason=limits.get(REASON, ""))
 
 

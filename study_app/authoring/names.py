@@ -47,6 +47,11 @@ def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
     return None
 
 
+def sections_at(place: Path) -> tuple[str, ...]:
+    """Return the sections whose tables a text at ``place`` may name; none where it names no table."""
+    return next((sections for pattern, sections in CHOICES.items() if _matches(place, pattern)), ())
+
+
 def renamed(document: Document, thing: Path, name: str) -> tuple[Edit, ...]:
     """Return the edits that rename a table or item, and every text that names it.
 

@@ -10,6 +10,7 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer
 
+from study_app.app.designer.clipboard import Clipboard
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.element_steps import Step, delete_prompt
 from study_app.app.designer.open_study import OpenStudy, open_file, open_new, open_unsaved
@@ -18,6 +19,7 @@ from study_app.app.designer.saving import Saving
 from study_app.app.designer.studies import header_state, new_choices, studies
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.facts import facts
+from study_app.authoring.names import renamed
 from study_app.authoring.new_study import NO_ANSWERS, Answers, answered, template
 from study_app.authoring.study import read
 from study_app.authoring.writer.refused import Refused
@@ -51,6 +53,7 @@ class DesignerController(QObject):
         self.place = place = DesignerPlace()
         self.editing = editing = Editing(results, self)
         self.saving = Saving(editing, place)
+        Clipboard(editing, place)
         self._others: dict[Path, OpenStudy] = {}
         self._warnings: tuple[str, ...] = ()
         self._find = ""
@@ -72,6 +75,7 @@ class DesignerController(QObject):
         place.delete_asked.connect(self.ask_to_delete)
         place.repair_asked.connect(self.repair)
         place.find_changed.connect(self.find)
+        place.id_typed.connect(self._judge_id)
         editing.changed.connect(self.show)
         editing.edited.connect(self._resting.start)
         editing.refused.connect(self._refuse)
@@ -164,6 +168,18 @@ class DesignerController(QObject):
 
     def _refuse(self, path: Place, sentence: str, asked: Request) -> None:
         self.place.refuse(path, sentence, renaming=isinstance(asked, RenameElement))
+
+    def _judge_id(self, path: Place, name: str) -> None:
+        """Say at once why an id cannot be taken."""
+        opened, why = self.editing.writable, ""
+        if opened is None:
+            return
+        try:
+            if name != str(path[-1]):
+                renamed(opened.study.document, path, name)
+        except Refused as refusal:
+            why = f"{str(refusal)[:1].upper()}{str(refusal)[1:]}."
+        self.place.form.head.refuse(why)
 
     def _show_step(self, step: Step) -> None:
         if step.several or step.fresh or step.said:

@@ -4,23 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from study_app.authoring.additions import added, duplicated, fitted, singular
 from study_app.authoring.changes.fragments import pasted
+from study_app.authoring.changes.languages import filled_in, languages_of, with_language, without_language
 from study_app.authoring.changes.moves import moved
 from study_app.authoring.fields import label_of, row_at
-from study_app.authoring.names import deletions, named_at, references_to, replaced, with_references
+from study_app.authoring.names import deletions, free_name, named_at, references_to, replaced, with_references
 from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Insert, Move, Set
 from study_app.authoring.writer.refused import Refused
+from study_app.protocol.instruments.instrument import instrument
 from study_app.protocol.source.document import Path, names
+from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.form_rows import step_of, value_at
 from study_app.viewmodels.designer.problem_rows import element_of
 from study_app.viewmodels.designer.prompts import DeletePrompt
 from study_app.viewmodels.designer.requests import (
     AddElement,
+    AddInstrument,
     AddNamed,
+    ChangeLanguage,
     DeleteElement,
     DuplicateElement,
     MoveElement,
@@ -84,6 +90,24 @@ def add_named(study: Study, asked: AddNamed) -> Step:
     else:
         edits = (*edits, Set(asked.path, path[1]))
     return Step(f"Add {singular(asked.section)}", edits, path, fresh=True)
+
+
+def add_instrument(study: Study, asked: AddInstrument) -> Step:
+    """Return the step that adds a standard questionnaire; its questions are listed where the study writes texts."""
+    source, languages = instrument(asked.name), languages_of(study)
+    table: dict[str, Any] = {"instrument": asked.name}
+    if not set(languages) <= set(source["languages"]):
+        table["items"] = [{"id": item["id"]} for item in source["items"]]
+    path = ("questionnaires", free_name(names(study.document, "questionnaires"), asked.name.replace("-", "_")))
+    return Step(f"Add {asked.name}", (Set(path, table),), path)
+
+
+def change_language(study: Study, asked: ChangeLanguage) -> Step:
+    """Return the step that adds a language, fills in its texts or takes it away."""
+    code = asked.language
+    words = {"add": "Add", "copy": "Fill in", "remove": "Remove"}[asked.how]
+    edits = {"add": with_language, "copy": filled_in, "remove": without_language}[asked.how](study, code)
+    return Step(f"{words} {LANGUAGES[code].name if code in LANGUAGES else code}", edits)
 
 
 def duplicate(study: Study, asked: DuplicateElement) -> Step:

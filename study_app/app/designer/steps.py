@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
-from study_app.app.designer.element_steps import Step, add, add_named, delete, duplicate, move, move_to, paste
+from study_app.app.designer.element_steps import (
+    Step,
+    add,
+    add_instrument,
+    add_named,
+    change_language,
+    delete,
+    duplicate,
+    move,
+    move_to,
+    paste,
+)
 from study_app.authoring.additions import added, initial, singular
 from study_app.authoring.conversions import left_by, switched
 from study_app.authoring.fields import label_of, row_at, rows
@@ -19,8 +30,10 @@ from study_app.viewmodels.designer.form_rows import value_at
 from study_app.viewmodels.designer.requests import (
     AddElement,
     AddEntry,
+    AddInstrument,
     AddKey,
     AddNamed,
+    ChangeLanguage,
     DeleteElement,
     DuplicateElement,
     MoveElement,
@@ -109,21 +122,17 @@ class Steps:
         return Step(f"Give {label_of(asked.to)}", (*gone, Set((*table, asked.to), value)))
 
 
+_OF_ELEMENTS: Final[Mapping[type, Callable[[Study, Any], Step]]] = {
+    AddNamed: add_named, AddInstrument: add_instrument, ChangeLanguage: change_language, DuplicateElement: duplicate,
+    MoveElement: move, MoveTo: move_to, Paste: paste, DeleteElement: delete,
+}  # fmt: skip
+
+
 def _of_elements(study: Study, asked: Request, selected: Path) -> Step:
     if isinstance(asked, AddElement):
         return add(study, asked, selected)
-    if isinstance(asked, AddNamed):
-        return add_named(study, asked)
-    if isinstance(asked, DuplicateElement):
-        return duplicate(study, asked)
-    if isinstance(asked, MoveElement):
-        return move(study, asked)
-    if isinstance(asked, MoveTo):
-        return move_to(study, asked)
-    if isinstance(asked, Paste):
-        return paste(study, asked)
-    if isinstance(asked, DeleteElement):
-        return delete(study, asked)
+    if type(asked) in _OF_ELEMENTS:
+        return _OF_ELEMENTS[type(asked)](study, asked)
     raise Refused("this cannot be done to a study")
 
 

@@ -20,7 +20,6 @@ from study_app.gui.designer.prompts import DeleteCard, Prompt, VersionCard
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.main_view import Place
-from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.fact_cards import FactCards
 from study_app.viewmodels.designer.new_study import TemplateChoice
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
@@ -36,8 +35,7 @@ class DesignerPlace(Place):
     Signals: ``entered``, ``left``; ``asked`` (a request); ``selected`` (path) and ``back_asked``; ``study_asked``
     (source), ``new_asked``, ``begin_asked`` (source, name, answers); ``undo_asked``, ``redo_asked``, ``save_asked``,
     ``save_as_version_asked`` (version); ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``;
-    ``question_asked`` ("language", "instrument"); ``repair_asked`` (row, words); ``find_changed``;
-    ``banner_asked`` (action).
+    ``repair_asked`` (row, words); ``find_changed``; ``banner_asked`` (action); ``id_typed`` (path, id).
     """
 
     entered = Signal()
@@ -55,10 +53,10 @@ class DesignerPlace(Place):
     delete_asked = Signal(object, object)
     copy_asked = Signal(object)
     paste_asked = Signal()
-    question_asked = Signal(str)
     repair_asked = Signal(object, str)
     find_changed = Signal(str)
     banner_asked = Signal(str)
+    id_typed = Signal(object, str)
 
     def __init__(self) -> None:
         super().__init__()
@@ -120,11 +118,12 @@ class DesignerPlace(Place):
         outline.copy_asked.connect(lambda: self.copy_asked.emit(outline.selected))
         outline.paste_asked.connect(self.paste_asked)
         outline.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
-        self.adding.chosen.connect(self._add)
+        self.adding.chosen.connect(lambda one: self.asked.emit(one.asks))
         self.parts.path.open_asked.connect(self._select)
         form.asked.connect(self.asked)
         form.open_asked.connect(self._select)
         form.delete_asked.connect(lambda path: self.delete_asked.emit(path, ()))
+        form.head.id_typed.connect(self.id_typed)
         self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
         self.problems.opened.connect(self._open_problem)
         self.problems.repair_asked.connect(self.repair_asked)
@@ -140,7 +139,7 @@ class DesignerPlace(Place):
             ("Alt+Left", self.back_asked.emit), ("F2", self._rename), ("Ctrl+E", self._switch_to_file),
             ("F6", lambda: self._cycle(1)), ("Shift+F6", lambda: self._cycle(-1)),
             ("Ctrl+1", self.parts.focus_outline), ("Ctrl+2", self._focus_form), ("Ctrl+3", self._focus_pane),
-            ("Ctrl+4", self._focus_problems),
+            ("Ctrl+4", self._focus_problems), ("Ctrl+5", self.header.study.setFocus),
         ):  # fmt: skip
             made = QShortcut(QKeySequence(keys), self)
             made.setContext(Qt.ShortcutContext.WindowShortcut)
@@ -264,12 +263,6 @@ class DesignerPlace(Place):
             self.flush()
             button = self.outline.add if self.outline.add.isVisible() else self.header
             self.adding.open(self.view.addable, button.mapToGlobal(button.rect().topLeft()))
-
-    def _add(self, one: Addable) -> None:
-        if isinstance(one.asks, str):
-            self.question_asked.emit(one.asks)
-        else:
-            self.asked.emit(one.asks)
 
     def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
         """Return the element of the form, and those that are selected with it."""

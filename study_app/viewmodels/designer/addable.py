@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from functools import cache
 
 from study_app.authoring.additions import singular
+from study_app.authoring.changes.languages import languages_of
 from study_app.authoring.fields import label_of, rows
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import node_at, tags
 from study_app.authoring.study import Study
 from study_app.protocol.formats import TABLES, is_second
+from study_app.protocol.instruments.instrument import instrument, instruments
 from study_app.protocol.source.document import Path
+from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.outline_rows import icon_of
-from study_app.viewmodels.designer.requests import AddElement
+from study_app.viewmodels.designer.requests import AddElement, AddInstrument, ChangeLanguage
 
 
 @dataclass(frozen=True, slots=True)
 class Addable:
-    """One thing that can be added: its words, icon and help, and what is asked for: a step, or a question first."""
+    """One thing that can be added: its words and icon, what is asked for, and a line of help."""
 
     words: str
     icon: str
-    asks: AddElement | Literal["language", "instrument"]
+    asks: AddElement | AddInstrument | ChangeLanguage
     help: str = ""
 
 
@@ -42,10 +45,27 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
         Addable(label_of(singular(path[0])), icon_of(path), AddElement(path), f"To {label_of(path[0]).lower()}")
         for path in sections
     ]
-    if second:
-        help_ = "A standard questionnaire with its source and scores"
-        found.append(Addable("Instrument …", "list", "instrument", help_))
-    return (*found, Addable("Language …", "info", "language", "In every text of the study"))
+    found += _instruments() if second else ()
+    there = languages_of(study)
+    found += [
+        Addable(f"Language: {words.name}", "info", ChangeLanguage("add", code), "To every text of the study")
+        for code, words in LANGUAGES.items()
+        if code not in there
+    ]
+    return tuple(found)
+
+
+@cache
+def _instruments() -> tuple[Addable, ...]:
+    """Return the standard questionnaires, with who published each and under which licence its texts are."""
+    found = []
+    for name in instruments():
+        source = instrument(name)
+        texts = "" if source["languages"] else ". Its texts are not shipped: the study writes them"
+        help_ = f"{source['source']}. Licence: {source['licence']}{texts}"
+        words = f"Instrument: {name.upper()}, {len(source['items'])} questions"
+        found.append(Addable(words, "list", AddInstrument(name), help_))
+    return tuple(found)
 
 
 def _of_list(study: Study, path: Path) -> Iterator[Addable]:

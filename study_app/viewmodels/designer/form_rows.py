@@ -19,6 +19,7 @@ from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
 from study_app.viewmodels.designer.special import FACTS
 from study_app.viewmodels.designer.special.questions import QuestionLines, question_lines
 
+STUDY_LANGUAGES: Final = ("study", "languages")
 ENTRIES: Final = "Entries"
 DEEPEST: Final = 3
 """So many tables within each other are shown in one form."""
@@ -77,7 +78,7 @@ class FormRow:
         """Whether the file holds the key and would be complete without it."""
         path = self.row.path
         given = self.row.value is not None and isinstance(path[-1], str)
-        section = len(path) == 1 and self.row.kind == "tables"
+        section = (len(path) == 1 and self.row.kind == "tables") or path == STUDY_LANGUAGES
         return given and not (self.row.required or self.instead or section)
 
     @property
@@ -273,6 +274,8 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     faults = tuple(
         _sentence(study, fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path
     )
+    if path == STUDY_LANGUAGES:
+        row = replace(row, choices=tuple(Choice(code, _language(code)) for code in LANGUAGES))
     codes = [str(code) for _, code in entries(document, "study.languages.*")] or ["en"]
     number = None
     if row.kind == "either":
@@ -290,6 +293,11 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
 
 
 def _entries(study: Study, row: Row) -> Iterator[Entry]:
+    if row.path == STUDY_LANGUAGES:
+        for at, code in enumerate(row.value or ()):
+            missing = sum(fault.message == f'is missing in "{code}"' for fault in study.faults)
+            note = f"{missing} texts missing" if missing > 1 else "1 text missing" if missing else "every text"
+            yield Entry((*row.path, at), _language(str(code)), note, missing)
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))
         for key in keys:
@@ -321,8 +329,18 @@ def _sentence(_study: Study, message: str, hint: str) -> str:
     return f"{sentence} ({hint})" if hint else sentence
 
 
+def is_right_to_left(code: str) -> bool:
+    """Return whether a language is written from right to left."""
+    return code in LANGUAGES and LANGUAGES[code].right_to_left
+
+
 def _language(code: str) -> str:
     return LANGUAGES[code].name if code in LANGUAGES else code
+
+
+def new_words(section: str) -> str:
+    """Return what the choice is called that adds an element to a section and names it."""
+    return f"New {singular(section)} …"
 
 
 def choice_words(choice: Choice, default: object) -> str:

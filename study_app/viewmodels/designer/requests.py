@@ -84,6 +84,21 @@ class AddNamed:
 
 
 @dataclass(frozen=True, slots=True)
+class AddInstrument:
+    """Add a questionnaire that is a standard one."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeLanguage:
+    """Add a language to every text, copy the first language's texts where it has none, or take it away."""
+
+    how: Literal["add", "copy", "remove"]
+    language: str
+
+
+@dataclass(frozen=True, slots=True)
 class DuplicateElement:
     """Copy an element right after itself; ``also`` are others that are copied with it."""
 
@@ -161,6 +176,7 @@ class Several:
 
 
 Request: TypeAlias = (
-    SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | AddNamed
-    | DuplicateElement | MoveElement | MoveTo | MoveEntry | Paste | DeleteElement | RenameElement | RetypeFile | Several
+    SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | AddNamed | AddInstrument
+    | ChangeLanguage | DuplicateElement | MoveElement | MoveTo | MoveEntry | Paste | DeleteElement | RenameElement
+    | RetypeFile | Several
 )  # fmt: skip

@@ -38,9 +38,10 @@ class Tile(Themed, QWidget):
 
 
 class FormHead(QWidget):
-    """Signals: ``asked`` (a request), ``delete_asked`` (path)."""
+    """Signals: ``asked`` (a request), ``delete_asked`` (path), ``id_typed`` (path, what is typed so far)."""
 
     asked = Signal(object)
+    id_typed = Signal(object, str)
     delete_asked = Signal(object)
 
     def __init__(self) -> None:
@@ -86,6 +87,7 @@ class FormHead(QWidget):
         grid.addWidget(self.refusal, 2, 0, 1, 6)
         grid.setColumnStretch(1, 1)
         self.id.typed.connect(self._rename)
+        self.id.textEdited.connect(self._type_id)
         self.up.clicked.connect(lambda: self.move_by(-1))
         self.down.clicked.connect(lambda: self.move_by(1))
         self.copy.clicked.connect(self.duplicate)
@@ -135,6 +137,10 @@ class FormHead(QWidget):
         """Ask to delete the element."""
         if self.form is not None and self.delete.isEnabled():
             self.delete_asked.emit(self.form.path)
+
+    def _type_id(self, name: str) -> None:
+        if self.form is not None:
+            self.id_typed.emit(self.form.path, name)
 
     def _rename(self, name: str) -> None:
         if self.form is not None and self.form.id is not None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QWidget
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QBoxLayout
 
+from study_app.gui.designer.form.entry_row import EntryRow
+from study_app.gui.designer.form.language_list import LanguageListField
 from study_app.gui.designer.form.row_fields import (
     ChecksField,
     ChoiceField,
@@ -21,12 +23,10 @@ from study_app.gui.designer.form.row_fields import (
 )
 from study_app.gui.designer.form.typed_fields import FIELD_PX
 from study_app.gui.designer.segments import Segments
-from study_app.gui.theme.theme import RADIUS_CONTROL, font
-from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.controls import Choice, IconButton
-from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.designer.form_rows import Entry, FormRow
-from study_app.viewmodels.designer.requests import AddElement, AddEntry, MoveEntry, RemoveKey
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.controls import Choice
+from study_app.viewmodels.designer.form_rows import STUDY_LANGUAGES, Entry, FormRow, new_words
+from study_app.viewmodels.designer.requests import AddElement, AddEntry, AddNamed, MoveEntry, RemoveKey
 
 KINDS = {
     "numbers": "Numbers", "vector": "Numbers", "number": "One number", "whole number": "One number", "text": "Text",
@@ -34,37 +34,6 @@ KINDS = {
     "table": "Table", "list": "List", "points": "Points", "localised": "Text", "switch": "Yes or no",
 }  # fmt: skip
 """What the kinds of a value that may be of several are called."""
-
-
-class EntryRow(Themed, QWidget):
-    """One entry in an outlined row: title, id, and its buttons."""
-
-    def __init__(self, entry: Entry, words: str) -> None:
-        super().__init__()
-        self.faulty = bool(entry.faults)
-        self.title = Elided("label", "bad" if self.faulty else "text")
-        self.title.show_text(entry.title)
-        self.row = QHBoxLayout(self)
-        self.row.setContentsMargins(12, 0, 2, 0)
-        self.row.setSpacing(2)
-        self.row.addWidget(self.title, 1)
-        if entry.note and entry.note.replace("_", " ") != entry.title.lower():
-            self.row.addWidget(label(entry.note, "small", "text2"))
-        self.setMinimumHeight(FIELD_PX + 2)
-        self.setAccessibleName(words)
-
-    def button(self, icon: str, name: str) -> IconButton:
-        """Add a button at the right."""
-        made = IconButton(icon, name, size=FIELD_PX - 2, role="plain")
-        self.row.addWidget(made)
-        return made
-
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the edge."""
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(self.theme.bad if self.faulty else self.theme.ctl), 2 if self.faulty else 1))
-        painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), RADIUS_CONTROL, RADIUS_CONTROL)
 
 
 class EntriesField(Field):
@@ -77,7 +46,10 @@ class EntriesField(Field):
         self.rows: list[EntryRow] = []
         kind, count = row.row.kind, len(row.entries)
         for at, entry in enumerate(row.entries):
-            shown = self.entry_row(entry, f"{row.row.label}, {entry.title}, {at + 1} of {count}")
+            shown = self.entry_row(entry, f"{row.row.label}, {entry.title}, {at + 1} of {count}", grip=kind != "tables")
+            shown.dragged.connect(lambda y, at=at: self._drag(at, y))
+            shown.dropped.connect(lambda at=at: self._drop(at))
+            shown.moved.connect(lambda by, path=entry.path, at=at: self._move(path, at + by))
             if kind != "tables":
                 for by, icon, word in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
                     button = shown.button(icon, f"Move {entry.title} {word}")
@@ -104,24 +76,51 @@ class EntriesField(Field):
         self.box.addWidget(self.names if chooses else self.add, 0, Qt.AlignmentFlag.AlignLeft)
         (self.add if chooses else self.names).setParent(None)
         self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.row.path)))
+        self._target: int | None = None
         if chooses:
             self.names.addItems([str(choice.value) for choice in row.row.choices])
+            for section in row.row.sections:
+                self.names.addItem(new_words(section), section)
             self.names.setCurrentIndex(-1)
-            self.names.setEnabled(bool(row.row.choices))
+            self.names.setEnabled(bool(self.names.count()))
         self.setFocusProxy(self.names if chooses else self.add)
         self.show_value()
 
-    def entry_row(self, entry: Entry, words: str) -> EntryRow:
+    def entry_row(self, entry: Entry, words: str, *, grip: bool) -> EntryRow:
         """Return the row of an entry, to which its buttons are added."""
-        return EntryRow(entry, words)
+        return EntryRow(entry, words, grip=grip)
 
     def show_value(self) -> None:
         """Do nothing: other entries make another field."""
 
     def _add_name(self, at: int) -> None:
-        name = self.names.itemText(at)
+        name, section = self.names.itemText(at), self.names.itemData(at)
         self.names.setCurrentIndex(-1)
-        self.asked.emit(AddEntry(self.row.row.path, name))
+        path = self.row.row.path
+        self.asked.emit(AddEntry(path, name) if section is None else AddNamed(path, section))
+
+    def _move(self, path: tuple[str | int, ...], to: int) -> None:
+        if 0 <= to < len(self.rows):
+            self.asked.emit(MoveEntry(path, to))
+
+    def _drag(self, _at: int, y: int | None) -> None:
+        """Show where a dragged entry would come; None cancels."""
+        self._target = None if y is None else sum(row.geometry().center().y() < y for row in self.rows)
+        self.update()
+
+    def _drop(self, at: int) -> None:
+        target, self._target = self._target, None
+        self.update()
+        if target is not None and target not in {at, at + 1}:
+            self._move(self.row.entries[at].path, target - (target > at))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the line where a dragged entry would come."""
+        if self._target is not None and self.rows:
+            last = self._target == len(self.rows)
+            row = self.rows[-1 if last else self._target].geometry()
+            y = row.bottom() + 3 if last else row.top() - 3
+            QPainter(self).fillRect(QRectF(0, y - 1, self.width(), 2), QColor(self.rows[0].theme.accent))
 
 
 class EitherField(Field):
@@ -183,6 +182,8 @@ def field(row: FormRow) -> Field:
         return ChoiceField(row)
     if kind == "choices":
         return ChecksField(row)
+    if row.row.path == STUDY_LANGUAGES:
+        return LanguageListField(row)
     if kind in {"texts", "points"}:
         return LinesField(row)
     if kind in {"references", "list", "tables"}:

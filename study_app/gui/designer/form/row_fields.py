@@ -6,15 +6,15 @@ import re
 from typing import Any
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.designer.form_rows import FormRow, choice_words
-from study_app.viewmodels.designer.requests import AddEntry, RemoveKey, SetText, SetValue, SwitchKind
+from study_app.viewmodels.designer.form_rows import FormRow, choice_words, is_right_to_left, new_words
+from study_app.viewmodels.designer.requests import AddEntry, AddNamed, RemoveKey, SetText, SetValue, SwitchKind
 
 MOST_SEGMENTS, SEGMENT_LETTERS = 4, 34
 NUMBER_PX = 96
@@ -87,8 +87,21 @@ class LineField(Field):
             self.box.addWidget(permitted, 1)
         self.line.typed.connect(self._take)
         self.line.came.connect(self.came)
+        if row.row.kind in {"number", "whole number"}:
+            self.line.stepped.connect(self._step)
         self.setFocusProxy(self.line)
         self.show_value()
+
+    def _step(self, by: int) -> None:
+        """Count up or down, in the last digit that is shown."""
+        shown = self.line.text().strip() or str(self.row.row.default or 0)
+        number = read_number(shown)
+        if number is None or self.line.isReadOnly():
+            return
+        digits = len(shown.replace(",", ".").partition(".")[2]) if isinstance(number, float) else 0
+        value = round(number + by * 10.0**-digits, digits)
+        self.line.setText(f"{value:.{digits}f}")
+        self._take(self.line.text())
 
     def show_value(self) -> None:
         """Show the value, or what counts without one in grey."""
@@ -126,7 +139,12 @@ class LanguagesField(Field):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         several, down = row.row.kind == "paragraphs", stacked(row)
-        self.box.setDirection(QBoxLayout.Direction.TopToBottom if down else QBoxLayout.Direction.LeftToRight)
+        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
+        self.box.setSpacing(4)
+        self.outer = self.box
+        self.box = QVBoxLayout() if down else QHBoxLayout()
+        self.box.setSpacing(8)
+        self.outer.addLayout(self.box)
         self.lines: dict[str, TypedLine | TypedText] = {}
         for code, language in row.languages:
             name = row.row.label if len(row.languages) == 1 else f"{row.row.label}, {language}"
@@ -134,7 +152,7 @@ class LanguagesField(Field):
             if len(row.languages) > 1:
                 made.setPlaceholderText(f"Missing in {language}")
                 made.setToolTip(language)
-            if code == "ar":
+            if is_right_to_left(code):
                 made.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
             made.typed.connect(lambda text, code=code: self.asked.emit(SetText(self.row.row.path, code, text)))
             made.came.connect(self.came)
@@ -142,6 +160,8 @@ class LanguagesField(Field):
             if down and len(row.languages) > 1:
                 self.box.addWidget(label(language, "small", "text2"))
             self.box.addWidget(made)
+        self.copied = label("", "small", "warn")
+        self.outer.addWidget(self.copied)
         self.setFocusProxy(next(iter(self.lines.values())))
         self.show_value()
 
@@ -152,8 +172,13 @@ class LanguagesField(Field):
         return any(written) and not all(written)
 
     def show_value(self) -> None:
-        """Show each text; a plain one stands for the first language."""
+        """Show each text; a plain one stands for the first language. A text that is that of the first one is marked."""
         value = self.row.row.value
+        (first, named), *others = self.row.languages
+        texts = value if isinstance(value, dict) else {}
+        copies = [name for code, name in others if texts.get(code) and texts[code] == texts.get(first)]
+        self.copied.setText(f"As in {named}, not translated yet: {', '.join(copies)}")
+        self.copied.setVisible(bool(copies))
         for number, (code, line) in enumerate(self.lines.items()):
             text = value.get(code, "") if isinstance(value, dict) else value if number == 0 else ""
             line.show_text(text if isinstance(text, str) else "")
@@ -205,7 +230,7 @@ class ChoiceField(Field):
             self.list.setAccessibleName(row.row.label)
             self.list.setMinimumContentsLength(12)
             self.list.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-            self.list.activated.connect(lambda at: self._choose(self._values[at]))
+            self.list.activated.connect(self._pick)
             self.box.addWidget(self.list, 1)
         self._values: list[str | None] = []
         self.arrow = IconButton("arrow_right", f"Open what {row.row.label} names", size=FIELD_PX)
@@ -229,17 +254,29 @@ class ChoiceField(Field):
         assert self.list is not None  # noqa: S101 - one of the two is there
         if shown is not None and shown not in [value for value, _ in values]:
             values.append((shown, str(shown)))
+        values += [(section, new_words(section)) for section in row.sections]
         if [words for _, words in values] != [self.list.itemText(at) for at in range(self.list.count())]:
             self.list.clear()
             self.list.addItems([words for _, words in values])
         self._values = [value for value, _ in values]
-        self.list.setCurrentIndex(self._values.index(shown) if shown in self._values else -1)
-        self.list.setPlaceholderText("" if values else "Nothing can be named yet")
+        known = self._values[: len(values) - len(row.sections)]
+        self.list.setCurrentIndex(known.index(shown) if shown in known else -1)
+        self.list.setPlaceholderText("" if known else "Nothing can be named yet")
         self.arrow.setEnabled(self.row.target is not None)
 
     def words(self, choice: Any) -> str:
         """Return what a choice is called in the list."""
         return choice_words(choice, self.row.row.default)
+
+    def _pick(self, at: int) -> None:
+        """Choose a value; one of the last entries adds an element and names it."""
+        sections = self.row.row.sections
+        new = at - (len(self._values) - len(sections))
+        if new < 0:
+            self._choose(self._values[at])
+            return
+        self.show_value()
+        self.asked.emit(AddNamed(self.row.row.path, sections[new]))
 
     def _choose(self, value: Any) -> None:
         row = self.row.row

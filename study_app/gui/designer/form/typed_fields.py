@@ -105,8 +105,9 @@ class _Typed(_Base):
 
 
 class TypedLine(_Typed, QLineEdit):
-    """One line."""
+    """One line; ``stepped`` says that an arrow key counts up (1) or down (-1)."""
 
+    stepped = Signal(int)
     typed = Signal(str)
     came = Signal()
 
@@ -119,6 +120,15 @@ class TypedLine(_Typed, QLineEdit):
         self.setFixedHeight(FIELD_PX)
         self.textEdited.connect(lambda _text: self.note())
         self.returnPressed.connect(self.accept)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Count by the arrow keys."""
+        steps = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}
+        if event.key() in steps and not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier:
+            self.flush()
+            self.stepped.emit(steps[Qt.Key(event.key())])
+        else:
+            super().keyPressEvent(event)
 
     def words(self) -> str:
         """Return the text."""

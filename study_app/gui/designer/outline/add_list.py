@@ -9,9 +9,10 @@ from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, Q
 from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.addable import Addable
 
-WIDTH, HIGHEST, ROW_PX = 320, 420, 34
+WIDTH, HIGHEST, ROW_PX, HELP_PX = 360, 520, 34, 78
 MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
 
@@ -37,13 +38,18 @@ class AddList(Themed, QFrame):
         self.list.setFrameShape(QFrame.Shape.NoFrame)
         self.list.setIconSize(QSize(18, 18))
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.help = label("", "small", "text2", wraps=True)
+        self.help.setMinimumHeight(HELP_PX)
+        self.help.setAlignment(Qt.AlignmentFlag.AlignTop)
         column = QVBoxLayout(self)
         column.setContentsMargins(10, 10, 10, 10)
         column.setSpacing(8)
         column.addWidget(self.words)
         column.addWidget(self.list, 1)
+        column.addWidget(self.help)
         self.words.textChanged.connect(self._filter)
         self.words.installEventFilter(self)
+        self.list.currentItemChanged.connect(lambda item: self.help.setText(item.toolTip() if item else ""))
         self.list.itemClicked.connect(lambda _item: self._choose())
         self.list.itemActivated.connect(lambda _item: self._choose())
 
@@ -59,7 +65,7 @@ class AddList(Themed, QFrame):
         self._every = every
         self.words.clear()
         self._filter("")
-        height = min(HIGHEST, 64 + ROW_PX * len(every) + 10)
+        height = min(HIGHEST, 82 + HELP_PX + ROW_PX * len(every))
         screen = self.screen().availableGeometry()
         at = QPoint(min(above.x(), screen.right() - WIDTH), max(screen.top(), above.y() - height))
         self.setGeometry(at.x(), at.y(), WIDTH, height)
@@ -78,6 +84,8 @@ class AddList(Themed, QFrame):
                 item.setSizeHint(QSize(WIDTH - 40, ROW_PX))
                 self.list.addItem(item)
         self.list.setCurrentRow(0)
+        if not self.list.count():
+            self.help.setText("Nothing that can be added here is called so")
 
     def _choose(self) -> None:
         if (item := self.list.currentItem()) is not None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from study_app.gui.designer.form.list_fields import EntriesField, EntryRow
+from study_app.gui.designer.form.entry_row import EntryRow
+from study_app.gui.designer.form.list_fields import EntriesField
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.widgets.labels import Elided, figures
 from study_app.viewmodels.designer.form_rows import Entry
@@ -17,8 +18,8 @@ FORCE_PX = 52
 class ConditionRow(EntryRow):
     """One condition: title, liquid and delay, force, and a button that opens the liquid."""
 
-    def __init__(self, entry: Entry, words: str) -> None:
-        super().__init__(replace(entry, note=""), words)
+    def __init__(self, entry: Entry, words: str, *, grip: bool) -> None:
+        super().__init__(replace(entry, note=""), words, grip=grip)
         self.note, self.force = Elided("small", "text2"), figures()
         self.force.setMinimumWidth(FORCE_PX)
         self.row.addWidget(self.note, 1)
@@ -37,9 +38,9 @@ class ConditionsField(EntriesField):
 
     caption = CAPTION
 
-    def entry_row(self, entry: Entry, words: str) -> EntryRow:
+    def entry_row(self, entry: Entry, words: str, *, grip: bool) -> EntryRow:
         """Return the row of a condition."""
-        made, at = ConditionRow(entry, words), len(self.rows)
+        made, at = ConditionRow(entry, words, grip=grip), len(self.rows)
         made.liquid.clicked.connect(lambda: self.open_asked.emit(self.row.facts[at].liquid))
         return made
 

@@ -1,0 +1,35 @@
+"""Copying and pasting elements of a study, as TOML on the clipboard."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject
+from PySide6.QtGui import QGuiApplication
+
+from study_app.app.designer.editing import Editing
+from study_app.authoring.changes.fragments import copied
+from study_app.gui.designer.view import DesignerPlace
+from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.requests import Paste
+
+
+class Clipboard(QObject):
+    """Copies selected elements, and pastes after the selected one; copying works in read-only studies too."""
+
+    def __init__(self, editing: Editing, place: DesignerPlace) -> None:
+        super().__init__(editing)
+        self.editing, self.place = editing, place
+        place.copy_asked.connect(self.copy)
+        place.paste_asked.connect(self.paste)
+
+    def copy(self, paths: tuple[Path, ...]) -> None:
+        """Put elements on the clipboard."""
+        opened = self.editing.opened
+        if opened is not None and opened.study.is_toml and (text := copied(opened.study, paths)):
+            QGuiApplication.clipboard().setText(text)
+            self.place.show_step((), "Copied", fresh=False)
+
+    def paste(self) -> None:
+        """Paste what is on the clipboard."""
+        text = QGuiApplication.clipboard().text()
+        if text.strip():
+            self.editing.ask(Paste(self.editing.selected, text))
