@@ -7,6 +7,7 @@ from PySide6.QtGui import QGuiApplication
 
 from study_app.app.designer.editing import Editing
 from study_app.authoring.changes.fragments import copied
+from study_app.authoring.names import named_at
 from study_app.gui.designer.view import DesignerPlace
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.requests import Paste
@@ -22,9 +23,12 @@ class Clipboard(QObject):
         place.paste_asked.connect(self.paste)
 
     def copy(self, paths: tuple[Path, ...]) -> None:
-        """Put elements on the clipboard."""
+        """Put elements on the clipboard; an entry of a list of names stands for what it names."""
         opened = self.editing.opened
-        if opened is not None and opened.study.is_toml and (text := copied(opened.study, paths)):
+        if opened is None or not opened.study.is_toml:
+            return
+        things = [named_at(opened.study.document, path) or path for path in paths]
+        if text := copied(opened.study, things):
             QGuiApplication.clipboard().setText(text)
             self.place.show_step((), "Copied", fresh=False)
 

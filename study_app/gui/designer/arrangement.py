@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QRect, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.form import FormCard
 from study_app.gui.designer.outline.card import OutlineCard
@@ -110,6 +110,9 @@ class Arrangement(QWidget):
         outline.settled.connect(self.close_drawer)
         for part in (outline.tree, outline.words):
             part.installEventFilter(self)
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)  # noqa: S101 - a window has one
+        application.focusChanged.connect(self._follow_focus)
 
     def show_side(self, side: str) -> None:
         """Show form or pane where they share a column."""
@@ -169,6 +172,11 @@ class Arrangement(QWidget):
             if had:
                 self.path.outline.setFocus(Qt.FocusReason.OtherFocusReason)
 
+    def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
+        """Close the drawer when another part of the place takes the keyboard."""
+        if self.drawer and now is not None and self.isAncestorOf(now) and not self.outline.isAncestorOf(now):
+            self.outline.hide()
+
     def _place_drawer(self) -> None:
         self.outline.setGeometry(QRect(0, 46, DRAWER_PX, max(200, self.height() - 46)))
 
@@ -181,8 +189,12 @@ class Arrangement(QWidget):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
         """Close the drawer at Esc and Enter."""
         if self.drawer and event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
-            closes = event.key() == Qt.Key.Key_Escape and not self.outline.tree.dragged
-            if closes or (watched is self.outline.tree and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}):
+            if event.key() == Qt.Key.Key_Escape and not self.outline.tree.dragged:
                 self.close_drawer()
+                return True
+            if watched is self.outline.tree and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+                self.close_drawer()
+                self.show_side("form")
+                self.form.focus_first()
                 return True
         return super().eventFilter(watched, event)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
+from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
@@ -70,7 +71,7 @@ class DesignerHeader(QWidget):
         self.study = Choice()
         self.study.setAccessibleName("Study")
         self.study.setFont(font("body"))
-        self.study.setMinimumWidth(230)
+        self.study.setMinimumWidth(190)
         self.study.setPlaceholderText("Choose a study")
         self.problems = ChipButton()
         self.draft = Chip("neutral", "save", "")
@@ -80,7 +81,8 @@ class DesignerHeader(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(SHADOW, 0, SHADOW, 0)
         row.setSpacing(10)
-        row.addWidget(label("Study designer", "title"))
+        self.title = label("Study designer", "title")
+        row.addWidget(self.title)
         row.addSpacing(6)
         row.addWidget(self.study)
         row.addWidget(self.problems)
@@ -98,6 +100,7 @@ class DesignerHeader(QWidget):
     def show_state(self, state: HeaderState) -> None:
         """Show another state."""
         before, self.state = self.state, state
+        self._announce(before, state)
         if state.studies != before.studies or state.chosen != before.chosen or not self.study.count():
             with QSignalBlocker(self.study):
                 self.study.clear()
@@ -112,7 +115,6 @@ class DesignerHeader(QWidget):
         for part in (self.problems, self.undo, self.redo, self.save):
             part.setVisible(there)
         self.problems.show_state(*state.problems)
-        self.draft.setVisible(there and bool(state.draft))
         self.draft.show_state("neutral", "save", state.draft)
         for button, word, keys, what in (
             (self.undo, "Undo", "Ctrl+Z", state.undo),
@@ -122,6 +124,31 @@ class DesignerHeader(QWidget):
             button.setAccessibleName(f"{word}: {what}" if what else word)
             button.setToolTip(f"{word}: {what} ({keys})" if what else word)
         self.save.setEnabled(state.can_save)
+        self._make_room()
+
+    def _make_room(self) -> None:
+        """Leave out the title, then what is said of the draft, where the window is too narrow for them."""
+        row = self.layout()
+        assert row is not None  # noqa: S101 - it was given one
+        self.title.show()
+        self.draft.setVisible(bool(self.state.chosen and self.state.draft))
+        for part in (self.title, self.draft):
+            row.invalidate()
+            part.setVisible(part.isVisibleTo(self) and row.minimumSize().width() <= self.width())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Make room."""
+        super().resizeEvent(event)
+        self._make_room()
+
+    def _announce(self, before: HeaderState, state: HeaderState) -> None:
+        """Have said once what changes by itself: the problems, and that a draft is kept."""
+        if not state.chosen or state.chosen != before.chosen:
+            return
+        if state.problems != before.problems:
+            say(self, state.problems[2])
+        if state.draft.startswith("Draft") and not before.draft.startswith("Draft"):
+            say(self, state.draft)
 
     def _choose(self, at: int) -> None:
         source = self.study.itemData(at)

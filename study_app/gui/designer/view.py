@@ -124,6 +124,7 @@ class DesignerPlace(Place):
         form.open_asked.connect(self._select)
         form.delete_asked.connect(lambda path: self.delete_asked.emit(path, ()))
         form.head.id_typed.connect(self.id_typed)
+        form.copy_asked.connect(self.copy_asked)
         self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
         self.problems.opened.connect(self._open_problem)
         self.problems.repair_asked.connect(self.repair_asked)

@@ -8,7 +8,7 @@ from functools import cache
 
 from study_app.authoring.additions import singular
 from study_app.authoring.changes.languages import languages_of
-from study_app.authoring.fields import label_of, rows
+from study_app.authoring.fields import label_of, row_at, rows
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import node_at, tags
 from study_app.authoring.study import Study
@@ -76,6 +76,9 @@ def _of_list(study: Study, path: Path) -> Iterator[Addable]:
     if not kinds or not is_second(study.document):
         yield Addable(words, icon_of(path), AddElement(path), to)
         return
-    for kind in kinds:
-        named = f"{words}: {label_of(kind).lower()}" if kind is not None else words
-        yield Addable(named, icon_of(path), AddElement(path, (key, kind) if kind is not None else ()), to)
+    row = row_at(study.document, (*path, 0, key))
+    choices = sorted(() if row is None else row.choices, key=lambda choice: choice.value is not None)
+    for choice in choices:
+        named = words if choice.value is None else f"{words}: {label_of(choice.value).lower()}"
+        asks = AddElement(path, () if choice.value is None else (key, choice.value))
+        yield Addable(named, icon_of(path), asks, f"{to}. {choice.sentence}")

@@ -9,7 +9,7 @@ from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
-from study_app.viewmodels.designer.requests import MoveTo
+from study_app.viewmodels.designer.requests import MoveTo, RemoveKey, SetValue
 
 CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
 LEFT = Qt.MouseButton.LeftButton
@@ -231,6 +231,14 @@ def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: An
     row.setFocus()
     qtbot.keyClick(row, Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier)
     assert listed() == (second, third, first)
+    row = designer.row(*path).field.rows[0]
+    row.setFocus()
+    qtbot.keyClick(row, Qt.Key.Key_C, CONTROL)
+    assert f"[conditions.{second}]" in QGuiApplication.clipboard().text()
+    row.setFocus()
+    qtbot.keyClick(row, Qt.Key.Key_V, CONTROL)
+    assert f"{second}_2" in designer.editing.opened.study.document["conditions"]
+    designer.editing.undo()
     assert designer.editing.selected == path[:2]
 
 
@@ -257,6 +265,40 @@ def test_numbers_are_counted_by_keys_and_taken_ids_refused_while_typing(qtbot: A
     assert not head.refusal.text()
 
 
+def test_rows_say_what_and_where_they_are_and_contain_the_problems_below_them(designer: Any) -> None:
+    designer.controller.open("rek2024")
+    rows = designer.place.outline.rows
+    count = len(sequence(designer))
+    block = next(row for row in rows if row.path == ("blocks", "liquids"))
+    at = sequence(designer).index("liquids") + 1
+    assert block.name == f"{block.title}, block, {block.note.replace(':', ' minutes ')}, step {at} of {count}"
+    designer.controller.begin("rek2024", "mine")
+    designer.editing.ask(RemoveKey(("questionnaires", "liquid", "items", 1, "text")))
+    designer.controller._show_outline()
+    rows = designer.place.outline.rows
+    faulty = {row.path for row in rows if row.faults}
+    assert {("blocks", "liquids"), ("questionnaires", "liquid"), ("questionnaires", "liquid", "items", 1)} <= faulty
+    block = next(row for row in rows if row.path == ("blocks", "liquids"))
+    assert block.name.endswith(f"step {at} of {count}, {block.faults} problem{'s' * (block.faults > 1)}")
+
+
+def test_what_changes_by_itself_is_said_once(designer: Any, monkeypatch: Any) -> None:
+    said: list[str] = []
+    monkeypatch.setattr("study_app.gui.designer.header.say", lambda _widget, words: said.append(words))
+    monkeypatch.setattr("study_app.gui.designer.view.say", lambda _widget, words: said.append(words))
+    designer.controller.open("kitchen")
+    assert said == []
+    designer.editing.ask(MoveTo((("sequence", 1),), 3))
+    assert said[-1].endswith("now 3 of 5")
+    said.clear()
+    designer.editing.ask(SetValue(("device", "force_limit_n"), -1))
+    designer.editing.ask(SetValue(("device", "force_limit_n"), -2))
+    designer.saving.write_draft(at_once=True)
+    designer.saving.write_draft(at_once=True)
+    assert [words for words in said if words == "1 problem"] == ["1 problem"]
+    assert len([words for words in said if words.startswith("Draft kept")]) == 1
+
+
 def test_a_drawer_holds_the_outline_in_a_small_window(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.window.resize(1024, 640)
@@ -270,6 +312,7 @@ def test_a_drawer_holds_the_outline_in_a_small_window(qtbot: Any, designer: Any)
     selected = designer.editing.selected
     qtbot.keyClick(outline.tree, Qt.Key.Key_Return)
     assert not outline.isVisible()
+    assert designer.place.form.isAncestorOf(QApplication.focusWidget())
     assert [step.text() for step in parts.path.steps][-1] == designer.place.view.form.title
     qtbot.mouseClick(parts.path.steps[0], LEFT)
     assert designer.editing.selected == selected[:1]

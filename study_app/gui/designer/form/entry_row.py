@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QWidget
 
 from study_app.gui.designer.form.typed_fields import FIELD_PX
@@ -19,12 +19,14 @@ class EntryRow(Themed, QWidget):
     """One entry in an outlined row: a grip where it can be dragged, title, id, and its buttons.
 
     Signals: ``dragged`` (how far down its parent the pointer is; None cancels), ``dropped``, ``moved`` (by how many
-    places a key moves it).
+    places a key moves it), ``copy_asked``, ``pasted`` (a text).
     """
 
     dragged = Signal(object)
     dropped = Signal()
     moved = Signal(int)
+    copy_asked = Signal()
+    pasted = Signal(str)
 
     def __init__(self, entry: Entry, words: str, *, grip: bool = False) -> None:
         super().__init__()
@@ -54,9 +56,11 @@ class EntryRow(Themed, QWidget):
 
     def event(self, event: QEvent) -> bool:
         """Keep Alt and the arrows while the row has the keyboard; the place would move the whole element."""
-        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and self._by(event):
-            event.accept()
-            return True
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and self.grip:
+            keys = (QKeySequence.StandardKey.Copy, QKeySequence.StandardKey.Paste)
+            if self._by(event) or any(event.matches(key) for key in keys):
+                event.accept()
+                return True
         return super().event(event)
 
     def _by(self, event: QKeyEvent) -> int:
@@ -67,6 +71,11 @@ class EntryRow(Themed, QWidget):
         """Move by Alt and the arrows; cancel a drag at Esc."""
         if by := self._by(event):
             self.moved.emit(by)
+        elif event.matches(QKeySequence.StandardKey.Copy):
+            self.copy_asked.emit()
+        elif event.matches(QKeySequence.StandardKey.Paste):
+            if text := QGuiApplication.clipboard().text().strip():
+                self.pasted.emit(text)
         elif event.key() == Qt.Key.Key_Escape and self._dragging:
             self._let_go()
             self.dragged.emit(None)

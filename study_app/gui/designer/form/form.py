@@ -121,10 +121,11 @@ class RowWidget(QWidget):
 class FormCard(Card):
     """Draws a `Form`.
 
-    Signals: ``asked`` (a request), ``open_asked`` (path), ``delete_asked`` (path).
+    Signals: ``asked`` (a request), ``open_asked`` (path), ``delete_asked`` (path), ``copy_asked`` (paths).
     """
 
     asked = Signal(object)
+    copy_asked = Signal(object)
     open_asked = Signal(object)
     delete_asked = Signal(object)
 
@@ -213,7 +214,7 @@ class FormCard(Card):
                     grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
                     self.adds.append(made)
                 sections.addLayout(grid)
-        whole.addStretch()
+        whole.addStretch(1)
         dress(inside, self.theme)
         self.inside, self.sections = inside, whole
         old = self.area.takeWidget()
@@ -251,6 +252,7 @@ class FormCard(Card):
         made.field.asked.connect(self.asked)
         made.field.open_asked.connect(self.open_asked)
         made.field.write_asked.connect(self.write)
+        made.field.copy_asked.connect(lambda path: self.copy_asked.emit((path,)))
         made.field.came.connect(lambda: self._come(made))
         made.field.setEnabled(not self.read_only or row.row.kind in {"list", "tables", "references", "reference"})
         made.remove.setEnabled(not self.read_only)

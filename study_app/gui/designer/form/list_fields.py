@@ -26,7 +26,7 @@ from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import Choice
 from study_app.viewmodels.designer.form_rows import STUDY_LANGUAGES, Entry, FormRow, new_words
-from study_app.viewmodels.designer.requests import AddElement, AddEntry, AddNamed, MoveEntry, RemoveKey
+from study_app.viewmodels.designer.requests import AddElement, AddEntry, AddNamed, MoveEntry, Paste, RemoveKey
 
 KINDS = {
     "numbers": "Numbers", "vector": "Numbers", "number": "One number", "whole number": "One number", "text": "Text",
@@ -49,6 +49,8 @@ class EntriesField(Field):
             shown = self.entry_row(entry, f"{row.row.label}, {entry.title}, {at + 1} of {count}", grip=kind != "tables")
             shown.dragged.connect(lambda y, at=at: self._drag(at, y))
             shown.dropped.connect(lambda at=at: self._drop(at))
+            shown.copy_asked.connect(lambda path=entry.path: self.copy_asked.emit(path))
+            shown.pasted.connect(lambda text, path=entry.path: self.asked.emit(Paste(path, text)))
             shown.moved.connect(lambda by, path=entry.path, at=at: self._move(path, at + by))
             if kind != "tables":
                 for by, icon, word in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):

@@ -24,12 +24,13 @@ _PARTS = re.compile(r",?[;\s]+")
 class Field(QWidget):
     """Edits the value of one row.
 
-    ``asked`` carries a request, ``open_asked`` the path of an element to select, ``write_asked`` that of one
-    whose text is to be written; ``came`` says that it is focused;
-    ``caption`` stands above an editor that takes the width of the form.
+    ``asked`` carries a request, ``open_asked`` the path of an element to select, ``copy_asked`` that of one to copy,
+    ``write_asked`` that of one whose text is to be written; ``came`` says that it is focused; ``caption`` stands above
+    an editor that takes the width of the form.
     """
 
     asked = Signal(object)
+    copy_asked = Signal(object)
     open_asked = Signal(object)
     write_asked = Signal(object)
     came = Signal()

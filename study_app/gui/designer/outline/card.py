@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit
 
 from study_app.gui.designer.outline.rows import ROW_ROLE, Index
 from study_app.gui.designer.outline.tree import Tree
-from study_app.gui.theme.theme import font
+from study_app.gui.theme.icons import icon
+from study_app.gui.theme.theme import Theme, font
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
@@ -45,6 +46,9 @@ class OutlineCard(Card):
         self.words.setProperty("dense", "true")
         self.words.setFixedHeight(36)
         self.words.setClearButtonEnabled(True)
+        self._sign = self.words.addAction(
+            icon("search", self.theme.text2, 16), QLineEdit.ActionPosition.LeadingPosition
+        )
         self.tree = Tree()
         self.items = QStandardItemModel(self.tree)
         self.tree.setModel(self.items)
@@ -70,6 +74,11 @@ class OutlineCard(Card):
         self.tree.dropped.connect(self.dropped)
         self.add.clicked.connect(self.add_asked)
         self.duplicate.clicked.connect(self.duplicate_asked)
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        self._sign.setIcon(icon("search", theme.text2, 16))
 
     @property
     def selected(self) -> tuple[ElementPath, ...]:
