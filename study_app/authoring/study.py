@@ -61,6 +61,11 @@ class Study:
     @property
     def protocol(self) -> Protocol | None:
         """The protocol, None where there are faults."""
+        return None if self.faults else self._read[1]
+
+    @property
+    def formed(self) -> Protocol | None:
+        """The protocol, also where forces beyond a limit are its only faults; None where there are others."""
         return self._read[1]
 
     @property

@@ -334,11 +334,19 @@ def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:
         yield "Warnings", *(f"  {sentence}" for sentence in sentences)
 
 
-def warnings(protocol: Protocol) -> tuple[str, ...]:
-    """Return what is permitted and may still be a mistake, a sentence each."""
+def warnings(protocol: Protocol, *, simulates: bool = True) -> tuple[str, ...]:
+    """Return what is permitted and may still be a mistake, a sentence each.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study.
+    simulates : bool
+        Whether what takes simulated observers, up to a second a block, is among it.
+    """
     return (
         *liquid_summary.warnings(protocol),
-        *level_warnings(protocol),
+        *level_warnings(protocol, simulates=simulates),
         *delay_warnings(protocol),
         *_incomplete(protocol),
         *from_memory(protocol),

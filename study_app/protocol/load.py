@@ -101,13 +101,17 @@ def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Pro
     """
     document, places = read_document(source, name)
     protocol, faults = examined(document, delay_ticks=delay_ticks)
-    if protocol is None:
+    if protocol is None or faults:
         raise ProtocolError(name, located(faults, places))
     return protocol
 
 
 def examined(document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS) -> tuple[Protocol | None, list[Fault]]:
-    """Return the protocol of a document that `read_document` read, None where it has faults, and these."""
+    """Return the protocol of a document that `read_document` read, and its faults.
+
+    There is a protocol where the only faults are forces beyond a limit, so that these can be shown; else, with faults,
+    None.
+    """
     document, faults = _with_liquids_of_files(document)
     if formats.is_second(document):
         document, missing = with_instruments(formats.completed(document))
@@ -124,8 +128,9 @@ def examined(document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS) -> 
     if faults:
         return None, faults
     protocol = Protocol.model_validate(document, strict=True)
-    faults = list(designs(protocol)) or [*paced(protocol, delay_ticks), *returned(protocol)]
-    return None if faults else protocol, faults
+    if faults := list(designs(protocol)):
+        return None, faults
+    return protocol, [*paced(protocol, delay_ticks), *returned(protocol)]
 
 
 def _outside(broken: Iterable[Path], faults: Iterable[Fault]) -> list[Fault]:

@@ -64,6 +64,10 @@ class Answers:
     levels: Floats
     successes: NDArray[np.bool_]
 
+    def first(self, trials: int) -> Answers:
+        """Return the answers to the first trials of each track."""
+        return Answers(self.levels[:, :trials], self.successes[:, :trials])
+
     def counts(self, places: Sequence[float]) -> Counts:
         """Return how often each track succeeded and failed at each of ``places``, counted at the nearest one.
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from study_app.psychophysics.families import Floats
     from study_app.psychophysics.precision import Estimates, Expected
+    from study_app.psychophysics.simulated_tracks import Answers, Observers
 
 OBSERVERS: Final = 200
 SEED: Final = 1
@@ -34,6 +35,28 @@ CELLS: Final = 41 * 9 * 3
 """Of the grid over which levels are chosen."""
 MOST_TRIALS: Final = 200
 """Of a track that is simulated; beyond it the variance is taken to be inversely proportional to the trials."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answered:
+    """What observers answered in a block, one each.
+
+    Attributes
+    ----------
+    observers : Observers
+        Who answered.
+    tracks : tuple of Answers
+        The tracks of one standard.
+    catch : (2, observers) array
+        Correct and incorrect answers to catch trials, which present the highest level.
+    noise : (2, observers) array or None
+        Successes and failures in trials that present the standard alone; None: there are none.
+    """
+
+    observers: Observers
+    tracks: tuple[Answers, ...]
+    catch: Floats
+    noise: Floats | None
 
 
 @dataclass(frozen=True)
@@ -77,6 +100,65 @@ class ThresholdPlan:
         low, high = self.stimulus.domain
         return low + (high - low) * (0.25 + 0.5 * (np.arange(count) + 0.5) / count)
 
+    def answered(self, thresholds: Floats, random: Generator, lapses: float = LAPSES) -> Answered | None:
+        """Return what observers with these thresholds [u] answer; None: the method's tracks are not simulated.
+
+        Parameters
+        ----------
+        thresholds : (observers,) array
+            In u.
+        random : random.Generator
+            Where answers are drawn from.
+        lapses : float
+            Lapse rate of the observers.
+        """
+        import numpy as np  # noqa: PLC0415
+
+        from study_app.psychophysics.simulated_tracks import Observers  # noqa: PLC0415
+
+        stimulus, design = self.stimulus, self.design
+        assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
+        if guess is None:
+            guess = lapses if guesses_of(stimulus, design) is None else FALSE_ALARMS
+        observers = Observers(assumed.family, thresholds, assumed.width_prior[0], guess, lapses)
+        noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
+        tracks, yes = [], np.zeros(len(thresholds))
+        for number in range(1, self.method.tracks + 1):
+            noise = random.random((len(thresholds), noise_trials)) if noise_trials else None
+            one = self.method.simulated(TrackSetting(stimulus, design, number), observers, random, noise)
+            if one is None:
+                return None
+            tracks.append(one)
+            yes += 0 if noise is None else (noise < guess).sum(axis=1)
+        caught = observers.probability(high) > random.random((self.catch * len(tracks), len(thresholds)))
+        right = caught.sum(axis=0)
+        return Answered(
+            observers, tuple(tracks), np.array([right, len(caught) - right]),
+            np.array([yes, noise_trials * len(tracks) - yes]) if noise_trials else None,
+        )  # fmt: skip
+
+    def estimates(self, answered: Answered, most: int | None = None) -> Estimates:
+        """Return what the analysis estimates from answers, of each track the first ``most`` if that is given."""
+        import numpy as np  # noqa: PLC0415
+
+        from study_app.psychophysics.precision import estimated  # noqa: PLC0415
+
+        stimulus, design = self.stimulus, self.design
+        tracks = [one if most is None else one.first(most) for one in answered.tracks]
+        high = stimulus.domain[1]
+        presented = np.unique(np.concatenate([one.levels[~np.isnan(one.levels)] for one in tracks]))
+        if len(presented) > OBSERVERS:
+            presented = np.linspace(*stimulus.domain, OBSERVERS)
+        places = np.append(presented[presented < high], high)
+        counts = np.sum([one.counts(places.tolist()) for one in tracks], axis=0)
+        if most is None:
+            counts[:, :, -1] += answered.catch
+        if answered.noise is not None:
+            counts = np.concatenate((answered.noise[:, :, None], counts), axis=2)
+            places = np.append(stimulus.coordinate(0.0), places)
+        assumed = self.method.assumed(stimulus, design)
+        return estimated(analysis_grid(stimulus, design, assumed), places, counts[0], counts[1])
+
     def simulate(self, thresholds: Floats, random: Generator) -> Estimates | None:
         """Return what the analysis estimates of observers with these thresholds [u]; None: tracks are not simulated.
 
@@ -87,38 +169,8 @@ class ThresholdPlan:
         random : random.Generator
             Where answers are drawn from.
         """
-        import numpy as np  # noqa: PLC0415
-
-        from study_app.psychophysics.precision import estimated  # noqa: PLC0415
-        from study_app.psychophysics.simulated_tracks import Observers  # noqa: PLC0415
-
-        stimulus, design = self.stimulus, self.design
-        assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
-        if guess is None:
-            guess = LAPSES if guesses_of(stimulus, design) is None else FALSE_ALARMS
-        observers = Observers(assumed.family, thresholds, assumed.width_prior[0], guess, LAPSES)
-        noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
-        tracks, yes = [], np.zeros(len(thresholds))
-        for number in range(1, self.method.tracks + 1):
-            noise = random.random((len(thresholds), noise_trials)) if noise_trials else None
-            one = self.method.simulated(TrackSetting(stimulus, design, number), observers, random, noise)
-            if one is None:
-                return None
-            tracks.append(one)
-            yes += 0 if noise is None else (noise < guess).sum(axis=1)
-        presented = np.unique(np.concatenate([one.levels[~np.isnan(one.levels)] for one in tracks]))
-        if len(presented) > OBSERVERS:
-            presented = np.linspace(*stimulus.domain, OBSERVERS)
-        places = np.append(presented[presented < high], high)
-        counts = np.sum([one.counts(places.tolist()) for one in tracks], axis=0)
-        drawn = random.random((self.catch * len(tracks), len(thresholds)))
-        caught = observers.probability(high) > drawn
-        counts[:, :, -1] += caught.sum(axis=0), (~caught).sum(axis=0)
-        if noise_trials:
-            no = noise_trials * len(tracks) - yes
-            counts = np.concatenate((np.array([yes, no])[:, :, None], counts), axis=2)
-            places = np.append(stimulus.coordinate(0.0), places)
-        return estimated(analysis_grid(stimulus, design, assumed), places, counts[0], counts[1])
+        found = self.answered(thresholds, random)
+        return None if found is None else self.estimates(found)
 
 
 def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:

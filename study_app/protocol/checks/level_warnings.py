@@ -18,8 +18,8 @@ UNPACED_MPS: Final = 0.3
 """A hand that is free moves as fast. [choice]"""
 
 
-def level_warnings(protocol: Protocol) -> Iterator[str]:
-    """Yield what to think over of the blocks with a design."""
+def level_warnings(protocol: Protocol, *, simulates: bool = True) -> Iterator[str]:
+    """Yield what to think over of the blocks with a design; ``simulates``: also what takes simulated observers."""
     yielded: set[str] = set()
     for block in protocol.blocks_in_order:
         if block.design is not None:
@@ -29,7 +29,7 @@ def level_warnings(protocol: Protocol) -> Iterator[str]:
                 *_without_catch(protocol, block),
                 *_seen(protocol, block),
                 *_unpaced(protocol, block),
-                *imprecise(protocol, block),
+                *(imprecise(protocol, block) if simulates else ()),
             ):
                 if sentence not in yielded:
                     yielded.add(sentence)
