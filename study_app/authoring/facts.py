@@ -8,7 +8,8 @@ from typing import Final
 
 from study_app.authoring.study import Study
 from study_app.haptics.model.steady_state import HAND_MPS, steady
-from study_app.protocol.describe import expected_duration_s, step_duration_s, warnings
+from study_app.protocol.describe import warnings
+from study_app.protocol.durations import duration_range_s, expected_duration_s, step_duration_s
 from study_app.protocol.orders.block_orders import orders_of
 
 MOST_PARTICIPANTS: Final = 200
@@ -17,12 +18,14 @@ _MISSING: Final = re.compile(r'is missing in "([a-z]{2})"$')
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What a study is, in numbers; of a study with faults only the texts that are missing are known.
+    """What a study is, in numbers; of a study with faults, other than forces beyond a limit, only the missing texts.
 
     Attributes
     ----------
     expected_s : float or None
         How long a session will take [s].
+    range_s : tuple of float or None
+        How long the shortest and the longest session will take [s].
     steps_s : dict of str to float
         How long each page, form and block will take [s], by its id.
     trials, answers, breaks : int or None
@@ -32,10 +35,11 @@ class Facts:
     missing : dict of str to int
         How many texts each language lacks; none where it lacks none.
     warnings : tuple of str
-        The warnings of ``check``.
+        The warnings of ``check``, but those that take simulated observers.
     """
 
     expected_s: float | None = None
+    range_s: tuple[float, float] | None = None
     steps_s: dict[str, float] = field(default_factory=dict)
     trials: int | None = None
     answers: int | None = None
@@ -51,16 +55,17 @@ def facts(study: Study) -> Facts:
     for fault in study.faults:
         if found := _MISSING.match(fault.message):
             missing[found[1]] = missing.get(found[1], 0) + 1
-    if (protocol := study.protocol) is None:
+    if (protocol := study.formed) is None:
         return Facts(missing=missing)
     orders, language = orders_of(protocol), protocol.study.languages[0]
     return Facts(
         expected_s=expected_duration_s(protocol),
+        range_s=duration_range_s(protocol),
         steps_s={step: step_duration_s(protocol, step, language) for step in protocol.steps},
         trials=sum(block.trials for block in orders.blocks),
         answers=orders.answers,
         breaks=sum(block.breaks for block in orders.blocks),
         forces_n={name: steady(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids},
         missing=missing,
-        warnings=warnings(protocol),
+        warnings=warnings(protocol, simulates=False),
     )

@@ -159,7 +159,7 @@ def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value
         "default": first.get("default", first.get("const")),
         "required": required,
     }
-    if _is_localised(nodes):
+    if is_localised(nodes):
         return Row(path, "paragraphs" if first.get("lines") == "several" else "localised", **common)
     if len(nodes) > 1 and not tags(nodes)[0]:
         either = tuple(_row(document, path, (node,), value, required=required) for node in nodes)
@@ -202,7 +202,8 @@ def _enum(node: Node) -> tuple[Any, ...]:
     return (node["const"],) if "const" in node else tuple(node.get("enum", ()))
 
 
-def _is_localised(nodes: tuple[Node, ...]) -> bool:
+def is_localised(nodes: tuple[Node, ...]) -> bool:
+    """Return whether the value of such nodes is a text, or one for each language."""
     if len(nodes) != 2 or nodes[0].get("type") != "string":
         return False
     return nodes[1].get("additionalProperties") == {"type": "string"}

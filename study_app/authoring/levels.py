@@ -7,9 +7,10 @@ from typing import Literal
 
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.steady_state import steady
+from study_app.protocol.blocks import Block
 from study_app.protocol.checks.pace import FASTER
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.trials.stimuli import DELAY
+from study_app.protocol.trials.stimuli import OF_CONDITION
 from study_app.protocol.trials.tracks import condition_of, method_of, standards_of, stimulus_of
 
 
@@ -24,7 +25,8 @@ class Level:
     level, comparison : float
         The level as it is asked, and the value that it stands for.
     asked_n, sent_n : float or None
-        Force of its drag at the task's fastest point, and of what the limits leave of it [N]; None for a delay.
+        Force of its drag at the task's fastest point, and of what the limits leave of it [N]; None for a number of the
+        condition.
     clipped_by : str or None
         The "norm" (``device.force_limit_n``) or the "slope" limit of the loop (`haptics.model.limits`).
     """
@@ -52,17 +54,21 @@ def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
         return ()
     stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
     asked = sorted({*(stimulus.grid if method.adaptive else ()), *method.asked(stimulus)})
-    scene = protocol.scene_for(condition_of(protocol, stimulus))
-    task = protocol.tasks[block.task]
-    pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
-    hand_mps = FASTER * pace_mps if isinstance(task, Follow) else pace_mps
+    scene, hand_mps = protocol.scene_for(condition_of(protocol, stimulus)), hand_mps_of(protocol, block)
     found: list[Level] = []
     for standard in standards_of(protocol, block):
         for level in asked:
             comparison = stimulus.comparison(standard, level)
-            if stimulus.vary == DELAY or len(scene.liquids) != 1:
+            if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1:
                 found.append(Level(standard, level, comparison))
                 continue
             force = steady(override(scene, stimulus.vary, comparison), hand_mps)
             found.append(Level(standard, level, comparison, force.drag_n, force.force_n, force.limit))
     return tuple(found)
+
+
+def hand_mps_of(protocol: Protocol, block: Block) -> float:
+    """Return the speed of the hand at the fastest point of a block's task [m/s]."""
+    task = protocol.tasks[block.task]
+    pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
+    return FASTER * pace_mps if isinstance(task, Follow) else pace_mps

@@ -10,6 +10,7 @@ from study_app.haptics.model.scene import Scene
 from study_app.protocol import liquid_summary
 from study_app.protocol.checks.delay_warnings import delay_warnings
 from study_app.protocol.checks.level_warnings import level_warnings
+from study_app.protocol.durations import block_duration_s, expected_duration_s
 from study_app.protocol.groups.own_protocol import Variant, variants
 from study_app.protocol.groups.steps import sessions_differ
 from study_app.protocol.instruments.summary import sources
@@ -19,18 +20,8 @@ from study_app.protocol.orders.block_orders import block_codes, order_of, orders
 from study_app.protocol.orders.latin_squares import row_count
 from study_app.protocol.questions.question import Context, Question
 from study_app.protocol.trials.limits import Limits
-from study_app.protocol.trials.methods.adjustment import Adjustment
 from study_app.protocol.trials.presentation import link_words
 from study_app.protocol.trials.summary import design_rows
-from study_app.protocol.trials.tracks import design_of, method_of
-
-READING_WORDS_PER_S = 3.0
-PAGE_S = 5.0
-ANSWER_S = 6.0
-CHOICE_S = 2.0
-"""How long people take, for the expected duration [choice]: read (180 words a minute) and turn a page, answer one
-statement, choose an interval."""
-
 
 BLINDINGS = {
     "double": "double-blind: the operator sees no force",
@@ -69,46 +60,6 @@ def describe_scenes(scenes: Mapping[str, Scene]) -> str:
     effects = ("\n".join(f"  {line}".rstrip() for line in describe_gate(it)) for it in scenes.values())
     head = ("Liquids without a study", *_aligned(rows))
     return "\n\n".join(("\n".join(head), "Effects in each liquid", *effects))
-
-
-def expected_duration_s(protocol: Protocol) -> float:
-    """Return how long a session will take [s], between the shortest and the longest it can be."""
-    language = protocol.study.languages[0]
-    return sum(step_duration_s(protocol, step, language) for step in protocol.steps)
-
-
-def step_duration_s(protocol: Protocol, step: str, language: str) -> float:
-    """Return how long a page, form or block will take [s], read in one of the study's languages."""
-    if step in protocol.pages:
-        return _reading_s(protocol, step, language)
-    if step in protocol.forms:
-        return _answering_s(protocol.forms[step])
-    return _block_s(protocol, protocol.blocks[step], language)
-
-
-def _answering_s(questionnaire: Questionnaire) -> float:
-    return PAGE_S + ANSWER_S * len(questionnaire.items)
-
-
-def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
-    page = protocol.pages[page_id]
-    return max(PAGE_S + len(protocol.text(page.body, language).split()) / READING_WORDS_PER_S, page.min_s or 0.0)
-
-
-def _block_s(protocol: Protocol, block: Block, language: str) -> float:
-    questionnaire = protocol.questionnaire_of(block.id)
-    answering = 0.0 if questionnaire is None else _answering_s(questionnaire)
-    order = order_of(protocol, block)
-    resting = 0.0 if block.break_page is None else order.breaks * _reading_s(protocol, block.break_page, language)
-    task_s = protocol.tasks[block.task].expected_s
-    if block.design is not None:
-        design = design_of(protocol, block)
-        answer_s = CHOICE_S if design.reply == "choice" else ANSWER_S
-        answering = answer_s + design.between_s + design.feedback_s * design.shows_feedback(block.phase == "practice")
-        task_s = design.intervals * task_s + (design.intervals - 1) * design.pause_s
-        if isinstance(method := method_of(protocol, block) if block.stimulus else None, Adjustment):
-            task_s, answering = task_s + method.most_s / 2, design.between_s
-    return order.trials * (task_s + answering) + resting
 
 
 def _counted(count: int, noun: str) -> str:
@@ -198,7 +149,7 @@ def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) ->
         *([] if block.design is not None or compared is None else [("Compared", compared)]),
         *(design_rows(protocol, block, delay_ticks) if block.design is not None else ()),
         *(
-            [("Duration", f"about {_block_s(protocol, block, language) / 60:.0f} min")]
+            [("Duration", f"about {block_duration_s(protocol, block, language) / 60:.0f} min")]
             if block.design is not None
             else []
         ),

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from study_app.protocol.describe import expected_duration_s, spread
+from study_app.protocol.describe import spread
+from study_app.protocol.durations import expected_duration_s
 from study_app.protocol.groups.own_protocol import variants
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of

@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.protocol.describe import describe, expected_duration_s
+from study_app.protocol.describe import describe
+from study_app.protocol.durations import expected_duration_s
 from study_app.protocol.load import load, parse
 from tests.protocol.sound import ORDER, SOUND
 

@@ -7,7 +7,8 @@ import json
 import pytest
 
 from study_app.errors import ProtocolError, StudyError
-from study_app.protocol.describe import describe, expected_duration_s
+from study_app.protocol.describe import describe
+from study_app.protocol.durations import expected_duration_s
 from study_app.protocol.groups.own_protocol import own_protocol, variants
 from study_app.protocol.groups.steps import every_step, refuse_beyond_last, steps_of
 from study_app.protocol.load import load

@@ -6,7 +6,7 @@ from study_app.authoring.facts import facts
 from study_app.authoring.study import read
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.haptics.model.steady_state import HAND_MPS, steady
-from study_app.protocol.describe import expected_duration_s
+from study_app.protocol.durations import expected_duration_s
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.fact_cards import UNKNOWN, fact_cards

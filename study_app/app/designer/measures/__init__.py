@@ -1,0 +1,1 @@
+"""The designer's tab Measures: what the open study can find."""

@@ -1,0 +1,195 @@
+"""The worker process that simulates what a study can find; none of its numbers is computed in a window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, TypeAlias
+
+from study_app.authoring.measures.observers import GivenUp, Measurable, Observed, measurable, observe
+from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision
+from study_app.protocol.checks.expected_precision import ThresholdPlan, imprecise
+from study_app.protocol.model import Protocol
+from study_app.workers.client import WorkerClient
+from study_app.workers.messages import Stopped
+from study_app.workers.server import Stop, Tell
+
+if TYPE_CHECKING:
+    from study_app.session.simulated.trial_features import Feelings
+
+SEED: Final = 1
+"""That of ``power`` where none is given."""
+STUDIES: Final = 200
+THRESHOLD_STUDIES: Final = 60
+MORE: Final = 4 / 3
+
+
+@dataclass(frozen=True, slots=True)
+class Observing:
+    """Ask for `Observed`."""
+
+    plan: ThresholdPlan
+    threshold: float
+    lapses: float
+
+
+@dataclass(frozen=True, slots=True)
+class Measuring:
+    """Ask for `Measurable`, not below a level."""
+
+    plan: ThresholdPlan
+    lapses: float
+    least: float
+
+
+@dataclass(frozen=True, slots=True)
+class Grouping:
+    """Ask for `GroupPrecision` of so many participants."""
+
+    plan: ThresholdPlan
+    participants: int
+    precision: float
+
+
+@dataclass(frozen=True, slots=True)
+class Detecting:
+    """Ask for `Detectable`.
+
+    Attributes
+    ----------
+    depends : str
+        What of the study the answer depends on: two questions that agree in it have one answer.
+    block : str
+        The block.
+    participants : int
+        Of each study.
+    protocol : Protocol
+        The study.
+    """
+
+    depends: str
+    block: str
+    participants: int
+    protocol: Protocol = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Advising:
+    """Ask for the warnings of ``check`` that take simulated observers; ``depends`` as in `Detecting`."""
+
+    depends: str
+    protocol: Protocol = field(compare=False, repr=False)
+
+
+Wanted: TypeAlias = Observing | Measuring | Grouping | Detecting | Advising
+Found: TypeAlias = Observed | Measurable | GroupPrecision | Detectable | tuple[str, ...] | None
+
+
+@dataclass(frozen=True, slots=True)
+class MeasureOrder:
+    """What is wanted of a study, in this order; each is answered by (what was wanted, what was found)."""
+
+    wanted: tuple[Wanted, ...]
+
+
+MeasureClient: TypeAlias = WorkerClient[MeasureOrder, tuple[Wanted, Found] | None]
+
+
+def start_measure_worker() -> MeasureClient:
+    """Start the worker process, at the lowest priority."""
+    return WorkerClient("study_app.app.designer.measures.worker:carry_out", name="measures", background=True)
+
+
+def carry_out(order: MeasureOrder, tell: Tell, stop: Stop) -> None:
+    """Answer what is wanted, one after the other.
+
+    Raises
+    ------
+    Stopped
+        Another order came, or the client is gone.
+    """
+    try:
+        for wanted in order.wanted:
+            tell((wanted, _found(wanted, stop)))
+    except GivenUp as given_up:
+        raise Stopped("the study was edited") from given_up
+
+
+def _found(wanted: Wanted, stop: Stop) -> Found:
+    match wanted:
+        case Observing(plan, threshold, lapses):
+            return observe(plan, threshold, lapses, stop)
+        case Measuring(plan, lapses, least):
+            return measurable(plan, lapses, least, stop)
+        case Grouping():
+            return _group(wanted, stop)
+        case Detecting():
+            return _detectable(wanted, stop)
+        case Advising(protocol=protocol):
+            return tuple(sentence for block in protocol.main_blocks for sentence in imprecise(protocol, block))
+
+
+def _group(wanted: Grouping, stop: Stop) -> GroupPrecision:
+    more = wanted.plan.with_trials(round(MORE * wanted.plan.trials))
+    shares = [_within(plan, wanted, stop) for plan in (wanted.plan, more)]
+    return GroupPrecision(
+        wanted.participants, THRESHOLD_STUDIES, wanted.precision, wanted.plan.trials, shares[0], more.trials, shares[1]
+    )
+
+
+def _within(plan: ThresholdPlan, wanted: Grouping, stop: Stop) -> float:
+    """Return the share of simulated studies whose group's interval is narrow enough, as ``power`` counts it."""
+    from study_app.analysis.power import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
+
+    total = threshold_studies.Found()
+    for number in range(THRESHOLD_STUDIES // threshold_studies.BATCH):
+        if stop():
+            raise GivenUp
+        case = threshold_studies.Case("", plan, (SEED, 0, plan.trials, number))
+        found = threshold_studies.study_batch(case, (wanted.participants,))
+        total.halves += found.halves
+    return total.within(0, wanted.precision)
+
+
+def _detectable(wanted: Detecting, stop: Stop) -> Detectable | None:
+    from study_app.analysis.power.batch_counts import BATCH, Counts, count  # noqa: PLC0415 - loads scipy
+    from study_app.analysis.power.plan import HIGHEST, compares_statements, plan  # noqa: PLC0415
+    from study_app.analysis.power.power_curves import powers  # noqa: PLC0415
+
+    protocol = wanted.protocol
+    if not compares_statements(protocol):
+        return None
+    planned = plan(protocol, _felt(wanted, stop))
+    sizes, counts = (wanted.participants,), Counts()
+    for number in range(STUDIES // BATCH):
+        if stop():
+            raise GivenUp
+        found = count(planned, sizes, SEED, number, BATCH)
+        counts = {what: counts.get(what, 0) + one for what, one in found.items()}
+    curves = powers(planned, sizes, STUDIES, STUDIES, SEED, counts).curves
+    findings = [
+        Finding(one.item, None if one.detectable is None else one.detectable[0])
+        for one in curves
+        if one.block == wanted.block and one.item is not None and one.question in ("settings differ", "trend")
+        and one.item not in planned.unknown
+    ]  # fmt: skip
+    findings.sort(key=lambda one: (one.detectable is None, one.detectable or 0.0))
+    return Detectable(wanted.participants, STUDIES, HIGHEST, tuple(findings))
+
+
+_feelings: dict[str, Feelings] = {}
+
+
+def _felt(wanted: Detecting, stop: Stop) -> Feelings:
+    """Return what is felt in each condition, of the last study; rehearsing it takes most of the time."""
+    from study_app.session.simulated.trial_features import feelings  # noqa: PLC0415 - the compiler: only here
+
+    if wanted.depends not in _feelings:
+
+        def look(_words: str) -> None:
+            if stop():
+                raise GivenUp
+
+        found = feelings(wanted.protocol, seed=SEED, progress=look)
+        _feelings.clear()
+        _feelings[wanted.depends] = found
+    return _feelings[wanted.depends]

@@ -1,0 +1,251 @@
+"""What simulated observers with one planted threshold show of a block: levels asked, estimates, errors.
+
+The observers answer by the block's own method and are estimated as the analysis does, as for ``check`` and ``power``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from study_app.protocol.checks.expected_precision import Answered, ThresholdPlan
+from study_app.psychophysics.families import Floats, success
+
+OBSERVERS: Final = 400
+SEED: Final = 1
+AT_ONCE: Final = 100
+"""Observers that are simulated between two looks at whether to stop."""
+SHARES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""The quantiles of every band: the middle, the 50 % and the 90 % in between."""
+POINTS: Final = 61
+MOST_BARS: Final = 60
+COURSE: Final = 12
+"""Numbers of trials after which the estimate is computed."""
+PLANTED: Final = 12
+BIAS: Final = 0.1
+COVERAGE: Final = 0.93
+"""A threshold can be measured if the mean estimate is within the bias and so many 95 % intervals hold it. [choice]"""
+
+Stop: TypeAlias = Callable[[], bool]
+Values: TypeAlias = tuple[float, ...]
+
+
+class GivenUp(Exception):
+    """A simulation was stopped before its end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """One trial of one observer: its number, its track (both from 1), its level, and whether it was a success."""
+
+    trial: int
+    track: int
+    level: float
+    success: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """What observers with one threshold showed; levels are those of the stimulus, not comparisons.
+
+    Attributes
+    ----------
+    threshold, lapses : float
+        What was planted: a level, and the lapse rate.
+    observers : int
+        How many there were.
+    at_threshold : float
+        Share of successes at the threshold.
+    levels : tuple of float
+        Where the functions are given.
+    planted : tuple of float
+        Share of successes of the planted function at each of them.
+    found : tuple of tuple of float
+        The functions through the quantiles (`SHARES`) of the thresholds that were found.
+    asked : tuple of (float, float)
+        Each level with the share of trials that presented it.
+    course : tuple of (int, tuple of float)
+        Quantiles of the estimates after so many trials of the standard.
+    one : tuple of Asked
+        The trials of the first observer.
+    error : float
+        Standard deviation of the estimates as a share of the threshold.
+    trials : int
+        Comparisons of each standard, at most.
+    """
+
+    threshold: float
+    lapses: float
+    observers: int
+    at_threshold: float
+    levels: Values
+    planted: Values
+    found: tuple[Values, ...]
+    asked: tuple[tuple[float, float], ...]
+    course: tuple[tuple[int, Values], ...]
+    one: tuple[Asked, ...]
+    error: float
+    trials: int
+
+
+@dataclass(frozen=True, slots=True)
+class Planted:
+    """A threshold that was planted, the mean estimate's error as a share of it, and how many intervals held it."""
+
+    threshold: float
+    bias: float
+    coverage: float
+
+    @property
+    def measurable(self) -> bool:
+        """Whether the method measures it."""
+        return abs(self.bias) <= BIAS and self.coverage >= COVERAGE
+
+
+@dataclass(frozen=True, slots=True)
+class Measurable:
+    """The thresholds that a block can measure, lowest to highest; None where it can measure none."""
+
+    ends: tuple[float, float] | None
+    planted: tuple[Planted, ...]
+
+
+def observe(plan: ThresholdPlan, threshold: float, lapses: float, stop: Stop = lambda: False) -> Observed | None:
+    """Return what observers with a threshold (a level) show; None where tracks of the method are not simulated.
+
+    Raises
+    ------
+    GivenUp
+        ``stop`` asked for it.
+    """
+    stimulus, random = plan.stimulus, np.random.default_rng(SEED)
+    u = stimulus.coordinate(threshold)
+    medians, course, presented = [], None, []
+    first: Answered | None = None
+    for _ in range(0, OBSERVERS, AT_ONCE):
+        if stop():
+            raise GivenUp
+        answered = plan.answered(np.full(AT_ONCE, u), random, lapses)
+        if answered is None:
+            return None
+        medians.append(plan.estimates(answered).medians)
+        presented += [one.levels[~np.isnan(one.levels)] for one in answered.tracks]
+        if first is None:
+            first, course = answered, _course(plan, answered, stop)
+    assert first is not None  # noqa: S101 - there is a first one
+    found = np.concatenate(medians)
+    errors = (found - u) * math.log(10) if stimulus.spacing == "log" else (found - u) / u
+    at = np.linspace(*stimulus.domain, POINTS)
+    quantiles = np.quantile(found, SHARES)
+    return Observed(
+        threshold,
+        lapses,
+        len(found),
+        float(first.observers.probability(np.array([u]))[0]),
+        tuple(stimulus.level_of(float(one)) for one in at),
+        tuple(_function(first, u, at)),
+        tuple(tuple(_function(first, float(one), at)) for one in quantiles),
+        _asked(plan, np.concatenate(presented)),
+        course or (),
+        tuple(_one(plan, first)),
+        float(np.std(errors)),
+        plan.trials,
+    )
+
+
+def measurable(plan: ThresholdPlan, lapses: float, least: float, stop: Stop = lambda: False) -> Measurable | None:
+    """Return which thresholds a block can measure; None where tracks of the method are not simulated.
+
+    Parameters
+    ----------
+    plan : ThresholdPlan
+        The block.
+    lapses : float
+        Lapse rate of the observers.
+    least : float
+        No threshold below this level counts: twice the largest error of a valid trial.
+    stop : callable
+        Whether to give up.
+
+    Raises
+    ------
+    GivenUp
+        ``stop`` asked for it.
+    """
+    stimulus, random = plan.stimulus, np.random.default_rng(SEED)
+    found: list[Planted] = []
+    for u in np.linspace(*stimulus.domain, PLANTED).tolist():
+        threshold = stimulus.level_of(u)
+        if threshold < least or threshold <= 0:
+            continue
+        levels, held = [], []
+        for _ in range(0, OBSERVERS, AT_ONCE):
+            if stop():
+                raise GivenUp
+            answered = plan.answered(np.full(AT_ONCE, u), random, lapses)
+            if answered is None:
+                return None
+            estimates = plan.estimates(answered)
+            levels += [stimulus.level_of(one) for one in estimates.medians.tolist()]
+            held.append((estimates.lows <= u) & (u <= estimates.highs))
+        bias = float(np.mean(levels)) / threshold - 1.0
+        found.append(Planted(threshold, bias, float(np.mean(np.concatenate(held)))))
+    return Measurable(_longest(found), tuple(found))
+
+
+def _longest(found: list[Planted]) -> tuple[float, float] | None:
+    """Return the ends of the longest row of thresholds that are measurable."""
+    best: list[Planted] = []
+    run: list[Planted] = []
+    for one in found:
+        run = [*run, one] if one.measurable else []
+        best = run if len(run) > len(best) else best
+    return (best[0].threshold, best[-1].threshold) if best else None
+
+
+def _function(answered: Answered, u: float, at: Floats) -> list[float]:
+    """Return the share of successes of an observer with threshold ``u`` at some levels [u]."""
+    who = answered.observers
+    found: list[float] = success(who.family, at, u, who.width, who.guess, who.lapse).tolist()
+    return found
+
+
+def _asked(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float], ...]:
+    """Return levels with their shares of the trials: those presented, or where they are many the nearest of a grid."""
+    places = np.unique(presented)
+    if len(places) > MOST_BARS:
+        places = np.array([plan.stimulus.coordinate(level) for level in plan.stimulus.spaced(plan.stimulus.steps)])
+    nearest = np.searchsorted((places[1:] + places[:-1]) / 2, presented)
+    counts = np.bincount(nearest, minlength=len(places)) / len(presented)
+    return tuple((plan.stimulus.level_of(u), share) for u, share in zip(places.tolist(), counts.tolist(), strict=True))
+
+
+def _course(plan: ThresholdPlan, answered: Answered, stop: Stop) -> tuple[tuple[int, Values], ...]:
+    """Return the quantiles of the estimates after some numbers of trials."""
+    each, tracks = answered.tracks[0].levels.shape[1], len(answered.tracks)
+    found: list[tuple[int, Values]] = []
+    for number in sorted({round(one) for one in np.geomspace(1, each, min(COURSE, each))}):
+        if stop():
+            raise GivenUp
+        medians = plan.estimates(answered, most=number).medians
+        quantiles = (plan.stimulus.level_of(one) for one in np.quantile(medians, SHARES).tolist())
+        found.append((number * tracks, tuple(quantiles)))
+    return tuple(found)
+
+
+def _one(plan: ThresholdPlan, answered: Answered) -> list[Asked]:
+    """Return the trials of the first observer, in the order of presentation."""
+    tracks = len(answered.tracks)
+    each = answered.tracks[0].levels.shape[1]
+    found = []
+    for track, answers in enumerate(answered.tracks):
+        for at, u in enumerate(answers.levels[0].tolist()):
+            if math.isnan(u):
+                continue
+            place = at * tracks + track if plan.method.order == "interleaved" else track * each + at
+            found.append(Asked(place + 1, track + 1, plan.stimulus.level_of(u), bool(answers.successes[0, at])))
+    return sorted(found, key=lambda one: one.trial)

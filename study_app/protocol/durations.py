@@ -1,0 +1,85 @@
+"""How long a session will take: reading, answering, tasks, breaks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from study_app.protocol.groups.own_protocol import variants
+from study_app.protocol.model import Block, Explore, Protocol, Questionnaire
+from study_app.protocol.orders.block_orders import order_of
+from study_app.protocol.trials.methods.adjustment import Adjustment
+from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tracks import design_of, method_of
+
+READING_WORDS_PER_S = 3.0
+PAGE_S = 5.0
+ANSWER_S = 6.0
+CHOICE_S = 2.0
+"""How long people take, for the expected duration [choice]: read (180 words a minute) and turn a page, answer one
+statement, choose an interval."""
+
+
+def expected_duration_s(protocol: Protocol) -> float:
+    """Return how long a session will take [s], between the shortest and the longest it can be."""
+    language = protocol.study.languages[0]
+    return sum(step_duration_s(protocol, step, language) for step in protocol.steps)
+
+
+def duration_range_s(protocol: Protocol) -> tuple[float, float]:
+    """Return how long the shortest and the longest session will take [s]: tasks end early, or by their limit."""
+    kinds = [one.protocol for one in variants(protocol)]
+    least_s = min(
+        _session_s(one, lambda task: task.min_s if isinstance(task, Explore) else task.expected_s) for one in kinds
+    )
+    return least_s, max(_session_s(one, lambda task: task.limit_s) for one in kinds)
+
+
+def _session_s(protocol: Protocol, task_s: Callable[[AnyTask], float]) -> float:
+    language = protocol.study.languages[0]
+    return sum(
+        block_duration_s(protocol, protocol.blocks[step], language, task_s)
+        if step in protocol.blocks
+        else step_duration_s(protocol, step, language)
+        for step in protocol.steps
+    )
+
+
+def _expected_s(task: AnyTask) -> float:
+    return task.expected_s
+
+
+def step_duration_s(protocol: Protocol, step: str, language: str) -> float:
+    """Return how long a page, form or block will take [s], read in one of the study's languages."""
+    if step in protocol.pages:
+        return _reading_s(protocol, step, language)
+    if step in protocol.forms:
+        return _answering_s(protocol.forms[step])
+    return block_duration_s(protocol, protocol.blocks[step], language)
+
+
+def _answering_s(questionnaire: Questionnaire) -> float:
+    return PAGE_S + ANSWER_S * len(questionnaire.items)
+
+
+def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
+    page = protocol.pages[page_id]
+    return max(PAGE_S + len(protocol.text(page.body, language).split()) / READING_WORDS_PER_S, page.min_s or 0.0)
+
+
+def block_duration_s(
+    protocol: Protocol, block: Block, language: str, of_task: Callable[[AnyTask], float] = _expected_s
+) -> float:
+    """Return how long a block will take [s]; ``of_task`` says how long one of its tasks takes."""
+    questionnaire = protocol.questionnaire_of(block.id)
+    answering = 0.0 if questionnaire is None else _answering_s(questionnaire)
+    order = order_of(protocol, block)
+    resting = 0.0 if block.break_page is None else order.breaks * _reading_s(protocol, block.break_page, language)
+    task_s = of_task(protocol.tasks[block.task])
+    if block.design is not None:
+        design = design_of(protocol, block)
+        answer_s = CHOICE_S if design.reply == "choice" else ANSWER_S
+        answering = answer_s + design.between_s + design.feedback_s * design.shows_feedback(block.phase == "practice")
+        task_s = design.intervals * task_s + (design.intervals - 1) * design.pause_s
+        if isinstance(method := method_of(protocol, block) if block.stimulus else None, Adjustment):
+            task_s, answering = task_s + method.most_s / 2, design.between_s
+    return order.trials * (task_s + answering) + resting
