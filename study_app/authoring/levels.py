@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from study_app.haptics.model.overrides import override
+from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.pace import FASTER
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.trials.stimuli import OF_CONDITION
+from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus
 from study_app.protocol.trials.tracks import condition_of, method_of, standards_of, stimulus_of
 
 
@@ -55,16 +56,28 @@ def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
     stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
     asked = sorted({*(stimulus.grid if method.adaptive else ()), *method.asked(stimulus)})
     scene, hand_mps = protocol.scene_for(condition_of(protocol, stimulus)), hand_mps_of(protocol, block)
-    found: list[Level] = []
-    for standard in standards_of(protocol, block):
-        for level in asked:
-            comparison = stimulus.comparison(standard, level)
-            if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1:
-                found.append(Level(standard, level, comparison))
-                continue
-            force = steady(override(scene, stimulus.vary, comparison), hand_mps)
-            found.append(Level(standard, level, comparison, force.drag_n, force.force_n, force.limit))
-    return tuple(found)
+    return tuple(
+        _level(stimulus, scene, hand_mps, standard, level)
+        for standard in standards_of(protocol, block)
+        for level in asked
+    )
+
+
+def standard_of(protocol: Protocol, block_id: str, standard: float) -> Level:
+    """Return a standard of a block as its level 0."""
+    block = protocol.blocks[block_id]
+    stimulus = stimulus_of(protocol, block)
+    scene = protocol.scene_for(condition_of(protocol, stimulus))
+    found = _level(stimulus, scene, hand_mps_of(protocol, block), None, standard)
+    return replace(found, standard=standard, level=0.0, comparison=standard)
+
+
+def _level(stimulus: Stimulus, scene: Scene, hand_mps: float, standard: float | None, level: float) -> Level:
+    comparison = stimulus.comparison(standard, level)
+    if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1:
+        return Level(standard, level, comparison)
+    force = steady(override(scene, stimulus.vary, comparison), hand_mps)
+    return Level(standard, level, comparison, force.drag_n, force.force_n, force.limit)
 
 
 def hand_mps_of(protocol: Protocol, block: Block) -> float:

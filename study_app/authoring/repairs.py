@@ -10,6 +10,7 @@ from typing import Any, Final
 from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Insert, Rename, Set, Unset
 from study_app.authoring.writer.refused import Refused
+from study_app.protocol.checks.pace import paced
 from study_app.protocol.source.document import has
 from study_app.protocol.source.problems import Fault, shown
 
@@ -110,10 +111,15 @@ def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
 
 def highest_level(study: Study, fault: Fault, low: float, high: float) -> float | None:
     """Return the highest level, in three digits, without this kind of fault; None where not even ``low`` is."""
+    formed = study.formed
+    if formed is None:
+        return None
+    name = str(fault.path[1])
 
     def passes(level: float) -> bool:
-        after, _ = study.edited(Set((*fault.path, 1), level))
-        return not any(one.path == fault.path for one in after.faults)
+        stimulus = formed.stimuli[name].model_copy(update={"levels": (low, level)})
+        changed = formed.model_copy(update={"stimuli": {**formed.stimuli, name: stimulus}})
+        return not any(one.path == fault.path for one in paced(changed))
 
     least, most = low, high
     for _ in range(_HALVINGS):

@@ -1,0 +1,1 @@
+"""What the tab Measures shows, and the cards below the other tabs."""
