@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Final
 
 from study_app.authoring.study import Study
@@ -49,6 +50,7 @@ class Facts:
     warnings: tuple[str, ...] = ()
 
 
+@lru_cache(maxsize=2)
 def facts(study: Study) -> Facts:
     """Return the facts of a study."""
     missing: dict[str, int] = {}

@@ -13,6 +13,7 @@ from PySide6.QtCore import QObject, QTimer
 from study_app.app.designer.clipboard import Clipboard
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.element_steps import Step, delete_prompt
+from study_app.app.designer.measures.controller import MeasuresController
 from study_app.app.designer.open_study import OpenStudy, open_file, open_new, open_unsaved
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.app.designer.saving import Saving
@@ -28,7 +29,6 @@ from study_app.gui.designer.view import DesignerPlace
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import find
 from study_app.viewmodels.designer.addable import addable
-from study_app.viewmodels.designer.fact_cards import fact_cards
 from study_app.viewmodels.designer.file_text import file_text
 from study_app.viewmodels.designer.form_rows import form
 from study_app.viewmodels.designer.outline_rows import outline_rows
@@ -83,6 +83,7 @@ class DesignerController(QObject):
         self.saving.kept.connect(self._show_header)
         self.saving.copy_asked.connect(self.ask_for_new)
         self._repairs.found.connect(place.show_repairs)
+        self.measures = MeasuresController(editing, place, self._repairs)
 
     # opening
 
@@ -219,7 +220,7 @@ class DesignerController(QObject):
         study = self.editing.opened.study
         known = facts(study)
         rows = outline_rows(study, known.steps_s, self._find)
-        self.place.show_outline(rows, self.editing.selected, fact_cards(known, study.document))
+        self.place.show_outline(rows, self.editing.selected)
         if known.warnings != self._warnings:
             self._warnings = known.warnings
             self._show_header()

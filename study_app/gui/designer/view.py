@@ -10,6 +10,7 @@ from study_app.gui.designer.arrangement import Arrangement
 from study_app.gui.designer.banner import BannerCard
 from study_app.gui.designer.form.form import FormCard
 from study_app.gui.designer.header import DesignerHeader
+from study_app.gui.designer.measures.page import MeasuresPage
 from study_app.gui.designer.new_study import NewStudyPage, NoStudyCard
 from study_app.gui.designer.outline.add_list import AddList
 from study_app.gui.designer.outline.card import OutlineCard
@@ -20,7 +21,6 @@ from study_app.gui.designer.prompts import DeleteCard, Prompt, VersionCard
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.main_view import Place
-from study_app.viewmodels.designer.fact_cards import FactCards
 from study_app.viewmodels.designer.new_study import TemplateChoice
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
@@ -72,7 +72,10 @@ class DesignerPlace(Place):
         self.problems = ProblemsCard()
         self.new_page = NewStudyPage()
         self.pane = RightPane()
+        self.measures = MeasuresPage()
+        self.pane.add_page(PanePage("measures", "Measures", self.measures, self.measures.controls, with_facts=False))
         self.pane.add_page(PanePage("file", "File", self.file))
+        self.pane.show_tab("file")
         self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
         self.sides = self.parts.sides
         self.adding = AddList(self)
@@ -177,10 +180,9 @@ class DesignerPlace(Place):
         """Show the header's state."""
         self.header.show_state(state)
 
-    def show_outline(self, rows: tuple[OutlineRow, ...], selected: object, facts: FactCards) -> None:
-        """Show the rows of the outline, and the facts of the study."""
+    def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
+        """Show the rows of the outline."""
         self.outline.show_outline(rows, selected)
-        self.pane.facts.show_facts(facts)
 
     def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
         """Offer the repairs of a problem."""

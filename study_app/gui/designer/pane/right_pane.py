@@ -11,7 +11,7 @@ from study_app.gui.designer.pane.facts import FactsRow
 from study_app.gui.designer.segments import Segments
 from study_app.gui.widgets.cards import SHADOW
 
-FACTS_FROM = 860
+FACTS_FROM = 740
 
 
 @dataclass(frozen=True)
@@ -88,4 +88,6 @@ class RightPane(QWidget):
     def make_room(self) -> None:
         """Hide the facts where the window is too low for them, or the page takes their place."""
         page = next((one for one in self.pages if one.name == self.tab), None)
-        self.facts.setVisible(page is not None and page.with_facts and self.window().height() >= FACTS_FROM)
+        height = self.window().height()
+        self.facts.make_room(height)
+        self.facts.setVisible(page is not None and page.with_facts and height >= FACTS_FROM)

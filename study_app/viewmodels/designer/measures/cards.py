@@ -86,7 +86,7 @@ class BalanceCard:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line with a bar: its title, its number in words, its share (0 to 1) and its verdict, of no icon if there is none."""
+    """A line with a bar: its title, its number in words, its share (0 to 1), and its verdict where it has an icon."""
 
     title: str
     number: str

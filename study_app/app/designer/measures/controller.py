@@ -1,0 +1,158 @@
+"""The tab Measures: instant numbers once the window is idle after an edit, slow ones when the keyboard rests."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from PySide6.QtCore import QObject, QTimer
+
+from study_app.app.designer.editing import Editing
+from study_app.app.designer.measures.slow_numbers import SlowNumbers
+from study_app.app.designer.measures.wanted import LAPSES, participants_of, threshold_of, wanted_of
+from study_app.app.designer.measures.worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
+from study_app.app.designer.repair_search import RepairSearch
+from study_app.authoring.facts import facts
+from study_app.authoring.measures.observers import Measurable, Observed
+from study_app.authoring.measures.planned import Detectable, GroupPrecision
+from study_app.gui.designer.view import DesignerPlace
+from study_app.viewmodels.designer.measures.level_plots import Simulated
+from study_app.viewmodels.designer.measures.level_words import LevelWords
+from study_app.viewmodels.designer.measures.measures_view import (
+    Controls,
+    Focus,
+    SlowResults,
+    focus_of,
+    measures_view,
+)
+from study_app.viewmodels.designer.problem_rows import ProblemRow, problem_rows
+
+IDLE_MS: Final = 20
+MOST_PARTICIPANTS: Final = 500
+NAMES: Final[dict[type, str]] = {Observing: "observed", Grouping: "group", Measuring: "measurable",
+                                 Detecting: "detectable", Advising: "warnings"}  # fmt: skip
+
+
+class MeasuresController(QObject):
+    """Shows what the open study can find.
+
+    Parameters
+    ----------
+    editing : Editing
+        The open study.
+    place : DesignerPlace
+        Where it is shown.
+    repairs : RepairSearch
+        Finds the repairs of problems.
+    """
+
+    def __init__(self, editing: Editing, place: DesignerPlace, repairs: RepairSearch) -> None:
+        super().__init__(editing)
+        self._editing, self._place = editing, place
+        self.slow = SlowNumbers(self)
+        self._participants: int | None = None
+        self._thresholds: dict[str, float] = {}
+        self._lapses = LAPSES
+        self._focus = Focus()
+        self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
+        self._last: dict[tuple[str, str], Any] = {}
+        self._idle = QTimer(self)
+        self._idle.setSingleShot(True)
+        self._idle.setInterval(IDLE_MS)
+        self._idle.timeout.connect(self.show)
+        editing.opened_other.connect(self._forget)
+        editing.changed.connect(self._idle.start)
+        repairs.found.connect(self._take_repairs)
+        self.slow.came.connect(self._idle.start)
+        place.pane.tab_shown.connect(self._idle.start)
+        place.entered.connect(self._idle.start)
+        measures = place.measures
+        measures.repair_asked.connect(place.repair_asked)
+        measures.controls.participants_asked.connect(self._take_participants)
+        measures.controls.threshold_asked.connect(self._take_threshold)
+        measures.controls.lapses_asked.connect(self._take_lapses)
+        for part in (measures, place.pane.facts):
+            part.open_asked.connect(editing.select)
+
+    def show(self) -> None:
+        """Show the numbers of the study as it is now, and order those that are not known."""
+        opened = self._editing.opened
+        if opened is None:
+            self.slow.want(())
+            return
+        study, path = opened.study, opened.history.selected
+        protocol = study.formed
+        self._focus = focus = focus_of(protocol, path)
+        controls = self._controls(focus)
+        wanted = () if protocol is None else wanted_of(protocol, focus, controls)
+        self.slow.want(wanted if self._is_looked_at else ())
+        repairs = {row: self._repairs.get(row, ()) for row in problem_rows(study)}
+        view = measures_view(study, facts(study), path, controls, self._results(wanted, focus, controls), repairs)
+        self._place.measures.show_measures(view)
+        self._place.pane.facts.show_measures(view)
+
+    @property
+    def _is_looked_at(self) -> bool:
+        pane = self._place.pane
+        return pane.isVisible() and (pane.tab == "measures" or pane.facts.isVisible())
+
+    def _forget(self) -> None:
+        self._participants, self._lapses = None, LAPSES
+        self._thresholds, self._last, self._repairs = {}, {}, {}
+
+    def _controls(self, focus: Focus) -> Controls:
+        opened = self._editing.opened
+        planned = participants_of(None if opened is None else opened.study.formed)
+        participants = planned if self._participants is None else self._participants
+        if focus.plan is None or focus.block is None:
+            return Controls(participants, lapses=self._lapses)
+        asked = self._thresholds.get(focus.block.id)
+        low, high = focus.plan.stimulus.levels
+        threshold = asked if asked is not None and low <= asked <= high else threshold_of(focus.plan)
+        return Controls(participants, threshold, self._lapses)
+
+    def _results(self, wanted: tuple[Wanted, ...], focus: Focus, controls: Controls) -> SlowResults:
+        """Return what is known of what is wanted; where nothing is, what was known of the block before."""
+        block = "" if focus.block is None else focus.block.id
+        found: dict[str, Any] = {}
+        anew = set()
+        for one in wanted:
+            name = NAMES[type(one)]
+            if self.slow.known(one):
+                found[name] = self._last[name, block] = self.slow.found(one)
+            elif (before := self._last.get((name, block))) is not None:
+                found[name] = before
+                anew.add(name)
+        observed, measured, group = (found.get(name) for name in ("observed", "measurable", "group"))
+        detectable = found.get("detectable")
+        return SlowResults(
+            Simulated(
+                observed if isinstance(observed, Observed) else None,
+                measured if isinstance(measured, Measurable) else None,
+                group if isinstance(group, GroupPrecision) else None,
+                frozenset(anew),
+                controls.threshold,
+            ),
+            detectable if isinstance(detectable, Detectable) else None,
+            "detectable" in anew,
+            found.get("warnings") or (),
+            self.slow.waits,
+        )
+
+    def _take_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
+        self._repairs[row] = words
+        self._idle.start()
+
+    def _take_participants(self, number: float) -> None:
+        self._participants = min(MOST_PARTICIPANTS, max(2, round(number)))
+        self.show()
+
+    def _take_threshold(self, number: float) -> None:
+        if self._focus.plan is not None and self._focus.block is not None:
+            words = LevelWords(self._focus.plan.stimulus, self._focus.plan.design)
+            low, high = self._focus.plan.stimulus.levels
+            self._thresholds[self._focus.block.id] = min(high, max(low, number / words.factor))
+            self.show()
+
+    def _take_lapses(self, number: float) -> None:
+        self._lapses = min(0.2, max(0.0, number / 100))
+        self.show()

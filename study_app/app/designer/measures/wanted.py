@@ -1,0 +1,86 @@
+"""Which simulations a study calls for, and what each of them depends on."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Final
+
+from study_app.app.designer.measures.worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
+from study_app.authoring.measures.texts import text_keys
+from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
+from study_app.protocol.model import Protocol
+from study_app.viewmodels.designer.measures.measures_view import Controls, Focus
+
+PARTICIPANTS: Final = 12
+"""Where the file decides no number."""
+PRECISION: Final = 0.15
+JND: Final = 0.19
+"""People tell viscosities that differ by so much (Jones, Hunter & Lafontaine 1997)."""
+LAPSES: Final = 0.02
+ERRORS: Final = 2.0
+"""A threshold below so many times the largest error of a valid trial is not measured. [choice]"""
+USUAL_ERROR_PERCENT, USUAL_ERROR_MS = 2.0, 2.0
+
+
+def wanted_of(protocol: Protocol, focus: Focus, controls: Controls) -> tuple[Wanted, ...]:
+    """Return what is to be simulated, the quickest first."""
+    wanted: list[Wanted] = []
+    depends = ""
+    if (plan := focus.plan) is not None:
+        wanted = [
+            Observing(plan, controls.threshold, controls.lapses),
+            Grouping(plan, controls.participants, precision_of(protocol)),
+            Measuring(plan, controls.lapses, least_of(protocol, plan)),
+        ]
+    if focus.compares and focus.block is not None:
+        depends = _dependencies(protocol)
+        wanted.append(Detecting(depends, focus.block.id, controls.participants, protocol))
+    decided = protocol.analysis
+    if decided is not None and decided.precision is not None and decided.participants is not None:
+        plans = (threshold_plan(protocol, block) for block in protocol.main_blocks)
+        if any(one is not None for one in plans):
+            wanted.append(Advising(depends or _dependencies(protocol), protocol))
+    return tuple(wanted)
+
+
+def precision_of(protocol: Protocol) -> float:
+    """Return half the 95 % interval that is wanted, as a share of the mean."""
+    decided = protocol.analysis
+    return PRECISION if decided is None or decided.precision is None else decided.precision
+
+
+def participants_of(protocol: Protocol | None) -> int:
+    """Return how many participants are planned."""
+    decided = None if protocol is None else protocol.analysis
+    return PARTICIPANTS if decided is None or decided.participants is None else decided.participants
+
+
+def threshold_of(plan: ThresholdPlan) -> float:
+    """Return the threshold (a level) that is simulated first: that of viscosity, or one in the middle of the levels."""
+    stimulus = plan.stimulus
+    low, high = stimulus.levels
+    if stimulus.level_kind == "weber" and low < JND < high:
+        return JND
+    return float(f"{stimulus.level_of(sum(stimulus.domain) / 2):.2g}")
+
+
+def least_of(protocol: Protocol, plan: ThresholdPlan) -> float:
+    """Return the smallest level that an estimate can be of: twice the largest error of a valid trial."""
+    limits = protocol.limits
+    if plan.stimulus.vary.endswith("_ms"):
+        return ERRORS * (limits.level_error_ms or USUAL_ERROR_MS)
+    if plan.stimulus.level_kind == "weber":
+        return ERRORS * (limits.level_error_percent or USUAL_ERROR_PERCENT) / 100
+    return 0.0
+
+
+def _dependencies(protocol: Protocol) -> str:
+    """Return what of a study its simulations depend on: all but pages and texts."""
+    whole = protocol.model_dump(mode="json", exclude={"pages"})
+    return json.dumps(_without_texts(whole), sort_keys=True)
+
+
+def _without_texts(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_texts(inner) for key, inner in value.items() if key not in text_keys()}
+    return [_without_texts(inner) for inner in value] if isinstance(value, list) else value

@@ -1,0 +1,1 @@
+"""The tab Measures, and the cards below the other tabs."""

@@ -1,0 +1,79 @@
+"""The controls at the right of the tabs: what is simulated."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.number_field import NumberField
+from study_app.viewmodels.designer.measures.cards import ControlValues
+
+FIELD_PX = 52
+
+
+class Control(QWidget):
+    """A number with its words before and its unit behind it; ``entered`` carries what was typed or stepped to."""
+
+    entered = Signal(float)
+
+    def __init__(self, words: str, unit: str, step: float) -> None:
+        super().__init__()
+        self._value, self._step = 0.0, step
+        self.words, self.unit = label(words, "small", "text2"), label(unit, "small", "text2")
+        self.field = NumberField()
+        self.field.setFixedWidth(FIELD_PX)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        for part in (self.words, self.field, self.unit):
+            row.addWidget(part)
+        self.show_words(words, unit)
+        self.field.entered.connect(self.entered)
+        self.field.unread.connect(lambda _text: self.field.put_back())
+        self.field.stepped.connect(lambda steps: self.entered.emit(self._value + steps * self._step))
+
+    def show_words(self, words: str, unit: str) -> None:
+        """Call the number otherwise."""
+        self.words.setText(words)
+        self.unit.setText(unit)
+        self.field.setAccessibleName(f"{words}, {unit}" if unit else words)
+
+    def show_number(self, text: str) -> None:
+        """Show a number."""
+        self._value = float(text)
+        self.field.show_text(text)
+
+
+class MeasureControls(QWidget):
+    """Simulated threshold, lapse rate and participants."""
+
+    participants_asked = Signal(float)
+    threshold_asked = Signal(float)
+    lapses_asked = Signal(float)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("What is simulated")
+        self.threshold = Control("simulated JND", "%", 1.0)
+        self.lapses = Control("lapses", "%", 1.0)
+        self.participants = Control("participants", "", 1.0)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(12)
+        for part in (self.threshold, self.lapses, self.participants):
+            row.addWidget(part)
+        self.threshold.entered.connect(self.threshold_asked)
+        self.lapses.entered.connect(self.lapses_asked)
+        self.participants.entered.connect(self.participants_asked)
+
+    def show_values(self, shown: ControlValues) -> None:
+        """Show other values; threshold and lapses only where observers are simulated."""
+        self.participants.show_number(str(shown.participants))
+        simulated = shown.threshold is not None and shown.lapses is not None
+        self.threshold.setVisible(simulated)
+        self.lapses.setVisible(simulated)
+        if shown.threshold is not None and shown.lapses is not None:
+            self.threshold.show_words(shown.threshold_words, shown.threshold_unit)
+            self.threshold.show_number(shown.threshold)
+            self.lapses.show_number(shown.lapses)

@@ -1,0 +1,218 @@
+"""The body of the tab Measures: numbers and plots of a block with a method, cards of everything else."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.gui.designer.measures.controls import MeasureControls
+from study_app.gui.designer.measures.parts import CardGrid, NumberPart
+from study_app.gui.theme.themed import Themed, dress
+from study_app.gui.widgets.cards import Card, Chip, Icon
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, label
+from study_app.viewmodels.designer.measures.cards import ANEW, ForcesPlot, MeasuresView, NumberCard
+
+if TYPE_CHECKING:
+    from study_app.gui.designer.measures.plots import ForcesView, FunctionView, TrackView
+
+NUMBERS = 4
+PLOT_PX, FORCES_PX = 300, 216
+FUNCTION_LEGEND = "Line: planted. Bands: 50 and 90 % of those found. Bars: how often a level is asked."
+TRACK_LEGEND = "Bands: 50 and 90 % of the estimates. Marks: the trials of one observer, filled if right."
+
+
+class NumbersRow(QWidget):
+    """Four numbers side by side."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(8)
+        self.parts = [NumberPart() for _ in range(NUMBERS)]
+        for part in self.parts:
+            row.addWidget(part, 1)
+
+    def show_numbers(self, shown: tuple[NumberCard, ...]) -> None:
+        """Show other numbers."""
+        self.setVisible(bool(shown))
+        for part, one in zip(self.parts, shown, strict=False):
+            part.show_card(one)
+
+
+class PlotCard(Card):
+    """A plot under its heading, its units and what its marks mean."""
+
+    def __init__(self, title: str, legend: str, plot: QWidget) -> None:
+        self.heading_unit = Elided("small", "text2")
+        self.heading_unit.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        super().__init__(title, padding=14, gap=4)
+        self.column.addWidget(self.heading_unit)
+        self.heading_unit.setAlignment(Qt.AlignmentFlag.AlignLeft)
+        self.legend = label(legend, "small", "text2", wraps=True)
+        self.column.addWidget(self.legend)
+        self.column.addWidget(plot, 1)
+        self._legend = legend
+
+    def show_heading(self, words: str, *, anew: bool) -> None:
+        """Say what is drawn, and whether it is of an earlier study."""
+        self.heading_unit.show_text(words)
+        self.legend.setText(f"{ANEW[:1].upper()}{ANEW[1:]}." if anew else self._legend)
+
+
+class ForcesCard(Card):
+    """The force of each level, what clips it, and the repair; ``repair_asked`` carries problem and words."""
+
+    repair_asked = Signal(object, str)
+
+    def __init__(self, plot: ForcesView) -> None:
+        super().__init__(padding=14, gap=4)
+        self.plot = plot
+        self.shown: ForcesPlot | None = None
+        head = QHBoxLayout()
+        head.addWidget(label("Force at each level", "card"))
+        self.unit = Elided("small", "text2")
+        head.addWidget(self.unit, 1)
+        self.chips = [Chip(small=True), Chip(small=True)]
+        for chip in self.chips:
+            head.addWidget(chip)
+        self.column.addLayout(head)
+        self.column.addWidget(plot, 1)
+        self.bar = QWidget()
+        self.bar.setObjectName("clipped")
+        across = QHBoxLayout(self.bar)
+        across.setContentsMargins(0, 2, 0, 0)
+        across.setSpacing(10)
+        across.addWidget(Icon("warning", "warn", 18))
+        self.words = label("", "small", wraps=True)
+        across.addWidget(self.words, 1)
+        self.repair = ActionButton("", "", height=34)
+        self.repair.setProperty("dense", "true")
+        self.repair.clicked.connect(self._ask)
+        across.addWidget(self.repair)
+        self.column.addWidget(self.bar)
+
+    def show_forces(self, shown: ForcesPlot) -> None:
+        """Show other forces."""
+        self.shown = shown
+        self.unit.show_text(shown.heading)
+        for chip, state in zip(self.chips, (*shown.verdicts, None), strict=False):
+            chip.setVisible(state is not None)
+            if state is not None:
+                chip.show_state(*state)
+        self.bar.setVisible(bool(shown.warning))
+        self.words.setText(shown.warning)
+        self.repair.setVisible(shown.repair is not None)
+        if shown.repair is not None:
+            self.repair.show_action("", shown.repair.words)
+        self.plot.show_plot(shown)
+
+    def _ask(self) -> None:
+        if self.shown is not None and self.shown.repair is not None:
+            self.repair_asked.emit(self.shown.repair.row, self.shown.repair.words)
+
+
+class MeasuresPage(Themed, QWidget):
+    """Draws a `MeasuresView`; plots are made when a block with a method is first shown."""
+
+    repair_asked = Signal(object, str)
+    open_asked = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Measures")
+        self.shown: MeasuresView | None = None
+        self.controls = MeasureControls()
+        self.numbers = NumbersRow()
+        self.numbers.hide()
+        self.function: FunctionView | None = None
+        self.track: TrackView | None = None
+        self.forces: ForcesView | None = None
+        self.cards: dict[str, Card] = {}
+        self.grid = CardGrid()
+        self.grid.open_asked.connect(self.open_asked)
+        inside = QWidget()
+        self.column = QVBoxLayout(inside)
+        self.column.setContentsMargins(0, 0, 0, 0)
+        self.column.setSpacing(8)
+        self.column.addWidget(self.numbers)
+        self.plots = QHBoxLayout()
+        self.plots.setSpacing(8)
+        self.column.addLayout(self.plots, 3)
+        self.column.addWidget(self.grid, 1)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.area.setAccessibleName("Measures")
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.area.setWidget(inside)
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(0, 0, 0, 0)
+        whole.addWidget(self.area)
+        self.setFocusProxy(self.area)
+
+    def show_measures(self, shown: MeasuresView) -> None:
+        """Show other measures; while the page is hidden they are kept for later."""
+        self.shown = shown
+        self.controls.show_values(shown.controls)
+        if self.isVisible():
+            self._show()
+
+    def showEvent(self, event: object) -> None:  # noqa: N802 - Qt's name
+        """Show what came while the page was hidden."""
+        super().showEvent(event)  # type: ignore[arg-type]
+        self._show()
+
+    def _show(self) -> None:
+        shown = self.shown
+        if shown is None:
+            return
+        self.numbers.show_numbers(shown.numbers)
+        if (shown.function or shown.track or shown.forces) and not self.cards:
+            self._make_plots()
+        for name, plot in (("function", shown.function), ("track", shown.track), ("forces", shown.forces)):
+            if name in self.cards:
+                self.cards[name].setVisible(plot is not None)
+        if shown.function is not None and self.function is not None:
+            self.function.show_plot(shown.function)
+            self._head("function", shown.function.heading, anew=shown.function.anew)
+        if shown.track is not None and self.track is not None:
+            self.track.show_plot(shown.track)
+            self._head("track", shown.track.heading, anew=shown.track.anew)
+        forces = self.cards.get("forces")
+        if shown.forces is not None and isinstance(forces, ForcesCard):
+            forces.show_forces(shown.forces)
+        self.grid.setVisible(bool(shown.cards))
+        self.grid.show_cards(shown.cards)
+
+    def _head(self, name: str, words: str, *, anew: bool) -> None:
+        card = self.cards[name]
+        if isinstance(card, PlotCard):
+            card.show_heading(words, anew=anew)
+
+    def _make_plots(self) -> None:
+        from study_app.gui.designer.measures.plots import (  # noqa: PLC0415 - pyqtgraph, once there is a plot
+            ForcesView,
+            FunctionView,
+            TrackView,
+        )
+
+        self.function, self.track, self.forces = FunctionView(), TrackView(), ForcesView()
+        forces = ForcesCard(self.forces)
+        forces.repair_asked.connect(self.repair_asked)
+        self.cards = {
+            "function": PlotCard("Psychometric function", FUNCTION_LEGEND, self.function),
+            "track": PlotCard("Expected track", TRACK_LEGEND, self.track),
+            "forces": forces,
+        }
+        for name in ("function", "track"):
+            self.cards[name].setMinimumHeight(PLOT_PX)
+            self.plots.addWidget(self.cards[name], 1)
+        forces.setMinimumHeight(FORCES_PX)
+        self.column.insertWidget(2, forces, 2)
+        for card in self.cards.values():
+            card.hide()
+            dress(card, self.theme)

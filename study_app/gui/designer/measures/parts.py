@@ -1,0 +1,333 @@
+"""The cards of the tab Measures that hold words, numbers and bars."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import Themed, dress, take_away
+from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
+from study_app.viewmodels.designer.measures.cards import (
+    ANEW,
+    BalanceCard,
+    Line,
+    LinesCard,
+    NumberCard,
+    SessionCard,
+    TextsCard,
+    Verdict,
+)
+from study_app.viewmodels.tones import Tone
+
+INKS: dict[Tone, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}
+NAME_PX = 132
+MOST_LINES = 7
+
+
+def verdict_line(verdict: Verdict) -> QWidget:
+    """Return a state as icon and words that wrap."""
+    tone, icon, words = verdict
+    made = QWidget()
+    row = QHBoxLayout(made)
+    row.setContentsMargins(0, 0, 0, 0)
+    row.setSpacing(8)
+    row.addWidget(Icon(icon or "info", INKS[tone], 16), 0, Qt.AlignmentFlag.AlignTop)
+    row.addWidget(label(words, "small", "text" if tone != "neutral" else "text2", wraps=True), 1)
+    return made
+
+
+class NumberPart(Card):
+    """One number; grey while another one is computed."""
+
+    def __init__(self) -> None:
+        super().__init__(padding=14, gap=2)
+        self.shown: NumberCard | None = None
+        self.title = Elided("small", "text2")
+        self.number, self.unit = figures("", "number"), label("", "small", "text2")
+        self.icon, self.note = Icon("info", "text2", 14), Elided("small", "text2")
+        across, below = QHBoxLayout(), QHBoxLayout()
+        across.setSpacing(6)
+        across.addWidget(self.number)
+        across.addWidget(self.unit, 0, Qt.AlignmentFlag.AlignBottom)
+        across.addStretch()
+        below.setSpacing(6)
+        below.addWidget(self.icon)
+        below.addWidget(self.note, 1)
+        self.column.addWidget(self.title)
+        self.column.addLayout(across)
+        self.column.addLayout(below)
+
+    def show_card(self, shown: NumberCard) -> None:
+        """Show another number."""
+        if shown == self.shown:
+            return
+        self.shown = shown
+        self.title.show_text(shown.title)
+        self.number.setText(shown.number)
+        set_ink(self.number, "text3" if shown.anew else "text")
+        self.unit.setText(shown.unit)
+        tone, icon, words = ("neutral", "clock", ANEW) if shown.anew else shown.note
+        self.icon.show_icon(icon or "info", INKS[tone])
+        self.note.show_text(words)
+        self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {words}")
+
+
+class Strip(Themed, QWidget):
+    """The steps of a session side by side, as wide as they are long; the one that is looked at in accent."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.segments: tuple[tuple[str, float, bool], ...] = ()
+        self.setFixedHeight(14)
+
+    def show_segments(self, segments: tuple[tuple[str, float, bool], ...]) -> None:
+        """Show other steps."""
+        self.segments = segments
+        self.setAccessibleName("Session, in order: " + ", ".join(words for words, _, _ in segments))
+        self.setToolTip("\n".join(words for words, _, _ in segments))
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the steps."""
+        painter, x = QPainter(self), 0.0
+        painter.setPen(Qt.PenStyle.NoPen)
+        for _, share, chosen in self.segments:
+            width = share * self.width()
+            painter.setBrush(QColor(self.theme.accent if chosen else self.theme.ctl))
+            painter.setOpacity(1.0 if chosen else 0.45)
+            painter.drawRect(QRectF(x, 0, max(1.0, width - 1.0), self.height()))
+            x += width
+
+
+class Made(Card):
+    """A card whose content is made anew where it changes."""
+
+    open_asked = Signal(object)
+
+    def __init__(self, title: str, aside: str = "") -> None:
+        self.aside = label(aside, "small", "text2")
+        super().__init__(title, self.aside, padding=16, gap=8)
+        self.setAccessibleName(title)
+        self.column.addStretch()
+
+    def add(self, part: QWidget) -> None:
+        """Add a part below the others."""
+        self.column.insertWidget(self.column.count() - 1, part)
+
+
+class SessionPart(Made):
+    """A session in numbers."""
+
+    def __init__(self, shown: SessionCard) -> None:
+        super().__init__(shown.title, shown.aside)
+        numbers = QWidget()
+        row = QHBoxLayout(numbers)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        for value, word in shown.figures:
+            number = figures(value, "number")
+            number.setAccessibleName(f"{value} {word}")
+            row.addWidget(number)
+            row.addWidget(label(word, "small", "text2"), 0, Qt.AlignmentFlag.AlignBottom)
+            row.addSpacing(8)
+        row.addStretch()
+        self.add(numbers)
+        if shown.segments:
+            self.strip = Strip()
+            self.strip.show_segments(shown.segments)
+            self.add(self.strip)
+            notes = QWidget()
+            line = QHBoxLayout(notes)
+            line.setContentsMargins(0, 0, 0, 0)
+            for at, words in enumerate(shown.notes):
+                made = Elided("small", "text2")
+                made.show_text(words)
+                if at:
+                    made.setAlignment(Qt.AlignmentFlag.AlignRight)
+                line.addWidget(made, 1)
+            self.add(notes)
+        if shown.verdicts:
+            self.add(Rule())
+        for verdict in shown.verdicts:
+            self.add(verdict_line(verdict))
+
+
+class BalancePart(Made):
+    """How even the orders of a block are: two tables of counts."""
+
+    def __init__(self, shown: BalanceCard) -> None:
+        super().__init__("Balance", f"{shown.block}, {shown.participants} people")
+        tables = QWidget()
+        row = QHBoxLayout(tables)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(18)
+        places = [str(number + 1) for number in range(len(shown.positions))]
+        row.addWidget(_table("position", shown.codes, places, shown.positions), 0, Qt.AlignmentFlag.AlignTop)
+        after = _table("comes after", shown.codes, list(shown.codes), shown.follows)
+        row.addWidget(after, 0, Qt.AlignmentFlag.AlignTop)
+        row.addStretch()
+        self.add(tables)
+        if shown.hidden:
+            self.add(label(f"and {shown.hidden} more positions", "small", "text2"))
+        self.add(verdict_line(shown.verdict))
+
+
+def _table(name: str, codes: Sequence[str], places: Sequence[str], counts: Sequence[Sequence[int]]) -> QWidget:
+    made = QWidget()
+    grid = QGridLayout(made)
+    grid.setContentsMargins(0, 0, 0, 0)
+    grid.setSpacing(3)
+    grid.addWidget(label(name, "small", "text2"), 0, 0, 1, len(codes) + 1)
+    for across, code in enumerate(codes, start=1):
+        grid.addWidget(label(code, "small", "text2"), 1, across, Qt.AlignmentFlag.AlignHCenter)
+    for down, (place, line) in enumerate(zip(places, counts, strict=True), start=2):
+        grid.addWidget(label(place, "small", "text2"), down, 0)
+        for across, (code, count) in enumerate(zip(codes, line, strict=True), start=1):
+            grid.addWidget(_Cell(count, f"{code}, {name} {place}: {count} times"), down, across)
+    return made
+
+
+class _Cell(Themed, QWidget):
+    """A count on a coloured field."""
+
+    def __init__(self, count: int, name: str) -> None:
+        super().__init__()
+        self._count = count
+        self.setFixedSize(30, 17)
+        self.setAccessibleName(name)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint field and count."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(self.theme.selected if self._count else self.theme.sunk))
+        painter.drawRoundedRect(QRectF(self.rect()), 3, 3)
+        painter.setPen(QColor(self.theme.accent if self._count else self.theme.text2))
+        painter.setFont(font("small", weight=600, tabular=True))
+        painter.drawText(QRectF(self.rect()), Qt.AlignmentFlag.AlignCenter, str(self._count))
+
+
+class LinesPart(Made):
+    """Lines with bars, and sentences below them."""
+
+    def __init__(self, shown: LinesCard) -> None:
+        super().__init__(shown.title, ANEW if shown.anew else shown.aside)
+        if shown.lines:
+            self.add(_lines(shown.lines, grey=shown.anew))
+        if shown.lines and shown.sentences:
+            self.add(Rule())
+        for verdict in shown.sentences:
+            self.add(verdict_line(verdict))
+
+
+def _lines(lines: Sequence[Line], *, grey: bool = False) -> QWidget:
+    made = QWidget()
+    grid = QGridLayout(made)
+    grid.setContentsMargins(0, 0, 0, 0)
+    grid.setVerticalSpacing(4)
+    grid.setColumnStretch(1, 1)
+    for at, line in enumerate(lines[:MOST_LINES]):
+        name, bar = Elided("label", "text3" if grey else "text"), Bar(6)
+        name.setFixedWidth(NAME_PX)
+        name.show_text(line.title)
+        bar.show_share(line.share)
+        number = figures(line.number, ink="text3" if grey else "text")
+        tone, icon, words = line.verdict
+        number.setAccessibleName(f"{line.title}: {line.number}{f', {words}' if words else ''}")
+        grid.addWidget(name, at, 0)
+        grid.addWidget(bar, at, 1)
+        grid.addWidget(number, at, 2, Qt.AlignmentFlag.AlignRight)
+        if icon:
+            mark = Icon(icon, INKS[tone], 16)
+            mark.setToolTip(words)
+            mark.setAccessibleName(f"{line.title}: {words}")
+            grid.addWidget(mark, at, 3)
+    if len(lines) > MOST_LINES:
+        grid.addWidget(label(f"and {len(lines) - MOST_LINES} more", "small", "text2"), MOST_LINES, 0, 1, 2)
+    return made
+
+
+class TextsPart(Made):
+    """Texts by language, and those that reveal a condition, each with a button that opens it."""
+
+    def __init__(self, shown: TextsCard) -> None:
+        super().__init__("Languages", "texts of the study")
+        self.add(_lines(shown.languages))
+        self.buttons: list[ActionButton] = []
+        if shown.revealing:
+            self.add(Rule())
+        for words, path in shown.revealing[:MOST_LINES]:
+            row = QWidget()
+            across = QHBoxLayout(row)
+            across.setContentsMargins(0, 0, 0, 0)
+            across.addWidget(verdict_line(("warn", "warning", words)), 1)
+            made = ActionButton("", "Go there", height=32)
+            made.setProperty("dense", "true")
+            made.setAccessibleName(f"Go to {words}")
+            made.clicked.connect(lambda _checked=False, path=path: self.open_asked.emit(path[:2]))
+            across.addWidget(made)
+            self.buttons.append(made)
+            self.add(row)
+
+
+def part_of(card: object) -> Made:
+    """Return the widget of a card."""
+    if isinstance(card, SessionCard):
+        return SessionPart(card)
+    if isinstance(card, BalanceCard):
+        return BalancePart(card)
+    if isinstance(card, TextsCard):
+        return TextsPart(card)
+    assert isinstance(card, LinesCard)  # noqa: S101 - the last kind
+    return LinesPart(card)
+
+
+class CardGrid(Themed, QWidget):
+    """Cards in two columns; only those that changed are made anew. ``open_asked`` carries the path of an element."""
+
+    open_asked = Signal(object)
+
+    def __init__(self, columns: int = 2) -> None:
+        super().__init__()
+        self._columns = columns
+        self.cards: tuple[object, ...] = ()
+        self.parts: list[Made] = []
+        self.grid = QVBoxLayout(self)
+        self.grid.setContentsMargins(0, 0, 0, 0)
+        self.grid.setSpacing(8)
+
+    def show_cards(self, cards: tuple[object, ...]) -> None:
+        """Show other cards."""
+        if cards == self.cards:
+            return
+        kept = {at: part for at, (part, card) in enumerate(zip(self.parts, self.cards, strict=True))
+                if at < len(cards) and card == cards[at]}  # fmt: skip
+        for at, part in enumerate(self.parts):
+            if at not in kept:
+                take_away(part)
+        while self.grid.count():
+            self.grid.takeAt(0)
+        self.parts = []
+        for at, card in enumerate(cards):
+            part = kept.get(at)
+            if part is None:
+                part = part_of(card)
+                part.open_asked.connect(self.open_asked)
+                dress(part, self.theme)
+            self.parts.append(part)
+        for first in range(0, len(self.parts), self._columns):
+            row = QHBoxLayout()
+            row.setSpacing(8)
+            some = self.parts[first : first + self._columns]
+            for part in some:
+                row.addWidget(part, 1)
+            self.grid.addLayout(row)
+        self.grid.addStretch()
+        self.cards = cards

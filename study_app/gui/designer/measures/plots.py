@@ -1,0 +1,241 @@
+"""The plots of a block with a method: psychometric function, expected track, force of each level."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QSize, Qt
+from PySide6.QtGui import QBrush, QColor, QPen
+
+from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.widgets.accessible import describe_plot
+from study_app.gui.widgets.plots import Plot, pen
+from study_app.viewmodels.designer.measures.cards import ForcesPlot, FunctionPlot, TrackPlot
+
+BARS = 0.14  # of the height, for how often each level is asked
+SYMBOLS = ("o", "t1", "s", "d")
+DASHED = (4.0, 3.0)
+
+
+class MeasurePlot(Plot):
+    """A plot that is drawn anew from its value."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.axes["left"].setWidth(40)
+        self.axes["bottom"].setHeight(26)
+        self.drawn: list[pg.GraphicsObject] = []
+        describe_plot(self, name, "")
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return a small size: a plot takes what is left."""
+        return QSize(220, 110)
+
+    def draw(self) -> None:
+        """Draw the value in the colours of the theme."""
+        raise NotImplementedError
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        self.draw()
+
+    def clear(self) -> None:
+        """Take everything away that was drawn."""
+        for item in self.drawn:
+            self.box.removeItem(item)
+        self.drawn = []
+
+    def add(self, item: pg.GraphicsObject, z: float = 0.0) -> None:
+        """Draw an item at a height: those of more are in front."""
+        item.setZValue(z)
+        self.box.addItem(item, ignoreBounds=True)
+        self.drawn.append(item)
+
+    def band(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, opacity: float, *, anew: bool) -> None:
+        """Fill the space between two curves."""
+        colour = QColor(self.theme.ctl if anew else self.theme.accent)
+        colour.setAlphaF(opacity)
+        curves = [pg.PlotCurveItem(x, one, pen=QPen(Qt.PenStyle.NoPen)) for one in (low, high)]
+        for curve in curves:
+            self.add(curve, -6)
+        self.add(pg.FillBetweenItem(*curves, brush=QBrush(colour)), -5)
+
+    def curve(self, x: object, y: object, colour: str, width: float = 2.0, *, dashed: bool = False) -> None:
+        """Draw a curve."""
+        made = pg.PlotCurveItem(np.asarray(x, float), np.asarray(y, float), antialias=True)
+        made.setPen(self.stroke(colour, width, DASHED if dashed else None))
+        self.add(made, 2)
+
+    def zone(self, first: float, last: float, *, upright: bool) -> None:
+        """Mark where limits take part of the force away."""
+        colour = QColor(self.theme.warn)
+        colour.setAlphaF(0.16)
+        made = pg.LinearRegionItem(
+            (first, last), orientation="vertical" if upright else "horizontal", movable=False, brush=QBrush(colour),
+            pen=pen(self.theme.warn, 1, DASHED),
+        )  # fmt: skip
+        self.add(made, -8)
+
+    def words(self, text: str, x: float, y: float, colour: str, anchor: tuple[float, float]) -> None:
+        """Write words at a place."""
+        made = pg.TextItem(text, color=QColor(colour), anchor=anchor)
+        made.textItem.setFont(font("small", weight=600, tabular=True))
+        made.setPos(QPointF(x, y))
+        self.add(made, 5)
+
+
+class FunctionView(MeasurePlot):
+    """The psychometric function, the functions that were found, and how often each level is asked."""
+
+    def __init__(self) -> None:
+        super().__init__("Psychometric function")
+        self.shown: FunctionPlot | None = None
+        self.wear(LIGHT)
+
+    def show_plot(self, shown: FunctionPlot) -> None:
+        """Show another function."""
+        if shown != self.shown:
+            self.shown = shown
+            self.setAccessibleDescription(shown.sentence)
+            self.draw()
+
+    def draw(self) -> None:
+        """Draw bands, function, mark and bars."""
+        self.clear() if hasattr(self, "drawn") else None
+        shown = getattr(self, "shown", None)
+        if shown is None:
+            return
+        theme, (left, right) = self.theme, shown.span
+        bottom, top = shown.low - 1.0, 101.5
+        x = np.array(shown.x)
+        self.band(x, np.array(shown.found[-1]), np.array(shown.found[0]), 0.18, anew=shown.anew)
+        self.band(x, np.array(shown.found[-2]), np.array(shown.found[1]), 0.30, anew=shown.anew)
+        self.curve(x, shown.planted, theme.ctl if shown.anew else theme.accent, 2.4)
+        at, percent = shown.mark
+        for xs, ys in (([left, at], [percent, percent]), ([at, at], [bottom, percent])):
+            self.curve(xs, ys, theme.text, 1.2, dashed=True)
+        dot = pg.ScatterPlotItem([at], [percent], size=9, pen=pen(theme.text, 2), brush=QBrush(QColor(theme.surface)))
+        self.add(dot, 4)
+        before = at > (left + right) / 2
+        self.words(shown.mark_words, at, percent, theme.text, (1.08, 1.0) if before else (-0.08, 0.0))
+        self._bars(shown, bottom, top)
+        if shown.clipped_from is not None and shown.clipped_from < right:
+            self.zone(max(left, shown.clipped_from), right, upright=True)
+        self.show_ticks("left", list(shown.ticks_y))
+        self.show_ticks("bottom", list(shown.ticks_x))
+        beyond = 0.03 * (right - left)
+        self.box.setXRange(left - beyond, right + beyond, padding=0)
+        self.box.setYRange(bottom, top, padding=0)
+
+    def _bars(self, shown: FunctionPlot, bottom: float, top: float) -> None:
+        places = np.array([at for at, _ in shown.asked])
+        shares = np.array([share for _, share in shown.asked])
+        if not len(places) or shares.max() <= 0:
+            return
+        apart = float(np.min(np.diff(places))) if len(places) > 1 else 0.04 * (shown.span[1] - shown.span[0])
+        heights = BARS * (top - bottom) * shares / shares.max()
+        clipped = np.array([shown.clipped_from is not None and at >= shown.clipped_from for at in places])
+        for some, ink in ((~clipped, self.theme.accent), (clipped, self.theme.warn)):
+            if some.any():
+                colour = QColor(self.theme.ctl if shown.anew else ink)
+                colour.setAlphaF(0.6)
+                bars = pg.BarGraphItem(
+                    x=places[some], y0=bottom, height=heights[some], width=0.72 * apart, brush=QBrush(colour),
+                    pen=QPen(Qt.PenStyle.NoPen),
+                )  # fmt: skip
+                self.add(bars, -2)
+
+
+class TrackView(MeasurePlot):
+    """The estimates after so many trials, and the trials of one observer."""
+
+    def __init__(self) -> None:
+        super().__init__("Expected track")
+        self.shown: TrackPlot | None = None
+        self.wear(LIGHT)
+
+    def show_plot(self, shown: TrackPlot) -> None:
+        """Show another track."""
+        if shown != self.shown:
+            self.shown = shown
+            self.setAccessibleDescription(shown.sentence)
+            self.draw()
+
+    def draw(self) -> None:
+        """Draw bands, median, planted threshold and trials."""
+        self.clear() if hasattr(self, "drawn") else None
+        shown = getattr(self, "shown", None)
+        if shown is None:
+            return
+        theme, (bottom, top) = self.theme, shown.span
+        x, found = np.array(shown.trials), [np.array(one) for one in shown.found]
+        self.band(x, found[0], found[-1], 0.18, anew=shown.anew)
+        self.band(x, found[1], found[-2], 0.30, anew=shown.anew)
+        self.curve(x, found[len(found) // 2], theme.ctl if shown.anew else theme.accent, 2.4)
+        self.curve([0, shown.last], [shown.planted, shown.planted], theme.text, 1.2, dashed=True)
+        ink = QColor(theme.ctl if shown.anew else theme.trace_y)
+        for track in sorted({track for _, _, track, _ in shown.one}):
+            for success in (True, False):
+                some = [(trial, level) for trial, level, of, right in shown.one if of == track and right == success]
+                points = pg.ScatterPlotItem(
+                    [trial for trial, _ in some], [level for _, level in some], size=7,
+                    symbol=SYMBOLS[(track - 1) % len(SYMBOLS)], pen=pen(ink.name(), 1.2),
+                    brush=QBrush(ink) if success else QBrush(QColor(theme.surface)),
+                )  # fmt: skip
+                self.add(points, 3)
+        if shown.clipped_from is not None and shown.clipped_from < top:
+            self.zone(max(bottom, shown.clipped_from), top, upright=False)
+        self.show_ticks("left", list(shown.ticks_y))
+        self.show_ticks("bottom", list(shown.ticks_x))
+        beyond = 0.04 * (top - bottom)
+        self.box.setXRange(-0.03 * shown.last, 1.03 * shown.last, padding=0)
+        self.box.setYRange(bottom - beyond, top + beyond, padding=0)
+
+
+class ForcesView(MeasurePlot):
+    """The force of each level: as sent, and dashed what the limits take away."""
+
+    def __init__(self) -> None:
+        super().__init__("Force at each level")
+        self.shown: ForcesPlot | None = None
+        self.wear(LIGHT)
+
+    def show_plot(self, shown: ForcesPlot) -> None:
+        """Show other forces."""
+        if shown != self.shown:
+            self.shown = shown
+            self.setAccessibleDescription(shown.sentence)
+            self.draw()
+
+    def draw(self) -> None:
+        """Draw bars and limit."""
+        self.clear() if hasattr(self, "drawn") else None
+        shown = getattr(self, "shown", None)
+        if shown is None:
+            return
+        theme, count = self.theme, len(shown.bars)
+        for at, bar in enumerate(shown.bars):
+            if bar.clipped and bar.asked_n > bar.sent_n:
+                lost = pg.BarGraphItem(
+                    x=[at], y0=bar.sent_n, height=[bar.asked_n - bar.sent_n], width=0.62,
+                    brush=QBrush(Qt.BrushStyle.NoBrush), pen=pen(theme.warn, 1.2, (2.0, 2.0)),
+                )  # fmt: skip
+                self.add(lost, 1)
+        inks = [theme.ctl if bar.standard else theme.warn if bar.clipped else theme.accent for bar in shown.bars]
+        for ink in dict.fromkeys(inks):
+            places = [at for at, one in enumerate(inks) if one == ink]
+            bars = pg.BarGraphItem(
+                x=places, y0=0.0, height=[shown.bars[at].sent_n for at in places], width=0.62,
+                brush=QBrush(QColor(ink)), pen=QPen(Qt.PenStyle.NoPen),
+            )  # fmt: skip
+            self.add(bars, 0)
+        top = max(shown.limit_n, *(bar.asked_n for bar in shown.bars))
+        highest = 1.16 * top
+        room = 0.09 * max(4, count)
+        self.curve([-0.7, count - 0.3], [shown.limit_n, shown.limit_n], theme.bad, 1.5, dashed=True)
+        self.words(f"limit {shown.limit_n:g} N", count - 0.2, shown.limit_n, theme.bad, (0.0, 0.5))
+        self.show_ticks("left", list(shown.ticks_y))
+        self.show_ticks("bottom", list(shown.ticks_x))
+        self.box.setXRange(-0.8, count - 0.2 + room, padding=0)
+        self.box.setYRange(0.0, highest, padding=0)

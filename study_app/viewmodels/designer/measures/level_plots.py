@@ -1,0 +1,289 @@
+"""What is shown of a block with a method: numbers, psychometric function, expected track, force of each level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from study_app.authoring.levels import Level, levels, standard_of
+from study_app.authoring.measures.felt import LevelLimits, level_limits
+from study_app.authoring.measures.observers import Measurable, Observed
+from study_app.authoring.measures.planned import GroupPrecision
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
+from study_app.protocol.trials.tracks import design_of, stimulus_of
+from study_app.viewmodels.designer.measures.cards import (
+    UNKNOWN,
+    ForceBar,
+    ForcesPlot,
+    FunctionPlot,
+    NumberCard,
+    RepairOffer,
+    TrackPlot,
+    Verdict,
+)
+from study_app.viewmodels.designer.measures.level_words import LevelWords, even_ticks, rounded
+from study_app.viewmodels.designer.problem_rows import ProblemRow
+
+ENOUGH: Final = 0.8
+MOST_LABELS: Final = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """What was simulated of a block with a method, each None until it was answered for the first time.
+
+    Attributes
+    ----------
+    observed : Observed or None
+        Observers with the planted threshold.
+    measurable : Measurable or None
+        The thresholds that can be measured.
+    group : GroupPrecision or None
+        Studies of so many participants.
+    anew : frozenset of str
+        Which of the three are of an earlier study.
+    threshold : float
+        The planted threshold, a level.
+    """
+
+    observed: Observed | None = None
+    measurable: Measurable | None = None
+    group: GroupPrecision | None = None
+    anew: frozenset[str] = frozenset()
+    threshold: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class LevelBlock:
+    """A block with a stimulus, with what its levels are."""
+
+    protocol: Protocol
+    block: Block
+    words: LevelWords
+    levels: tuple[Level, ...]
+    limits: LevelLimits | None
+
+    @property
+    def standard(self) -> float | None:
+        """The standard that is shown: the highest, whose forces are the strongest."""
+        return max((one.standard for one in self.levels if one.standard is not None), default=None)
+
+    @property
+    def shown(self) -> tuple[Level, ...]:
+        """The levels of that standard."""
+        return tuple(one for one in self.levels if one.standard == self.standard)
+
+    @property
+    def clipped_from(self) -> float | None:
+        """The place from which on a limit takes part of the force away, where some level is beyond it."""
+        first = next((one for one in self.shown if one.clipped_by is not None), None)
+        if first is None or self.limits is None:
+            return None
+        limit = min(one for one in (self.limits.force, self.limits.loop, math.inf) if one is not None)
+        level = self.words.stimulus.level_between(self.standard, limit)
+        return self.words.at(level) if math.isfinite(level) and level > 0 else self.words.at(first.level)
+
+
+def level_block(protocol: Protocol, block: Block) -> LevelBlock | None:
+    """Return a block's levels; None where it varies nothing."""
+    if block.stimulus is None or block.design is None:
+        return None
+    found = levels(protocol, block.id)
+    most = max((one.comparison for one in found), default=0.0)
+    words = LevelWords(stimulus_of(protocol, block), design_of(protocol, block))
+    return LevelBlock(protocol, block, words, found, level_limits(protocol, block.id, most))
+
+
+def number_cards(
+    of: LevelBlock, simulated: Simulated, participants: int, duration_s: float, trials: int
+) -> tuple[NumberCard, ...]:
+    """Return the four numbers of a block whose tracks are simulated."""
+    return (
+        _range(of, simulated),
+        _one_person(of, simulated),
+        _people(simulated, participants),
+        NumberCard(
+            "Lasts", f"{duration_s / 60:.0f}", "min",
+            ("neutral", "clock", f"{trials} trials of {duration_s / max(1, trials):.1f} s"),
+        ),
+    )  # fmt: skip
+
+
+def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
+    title, found, words = f"{of.words.name}s it can measure", simulated.measurable, of.words
+    if found is None:
+        return NumberCard(title, UNKNOWN, words.unit, anew=True)
+    anew = "measurable" in simulated.anew
+    if found.ends is None:
+        return NumberCard(title, "none", "", ("bad", "warning", "estimates are biased"), anew)
+    low, high = found.ends
+    note: Verdict = ("neutral", "info", f"of {words.number(of.words.stimulus.levels[1])} {words.unit} at most")
+    if words.stimulus.level_kind == "weber" and of.standard is not None:
+        values = (rounded(level * of.standard, 2) for level in (low, high))
+        note = ("neutral", "info", f"{' to '.join(values)} {words.value_unit}")
+    if not low * 0.999 <= simulated.threshold <= high * 1.001:
+        note = ("warn", "warning", f"not {words.words(simulated.threshold)}")
+    return NumberCard(title, f"{words.number(low, 2)} – {words.number(high, 2)}", words.unit, note, anew)
+
+
+def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
+    found = simulated.observed
+    if found is None:
+        return NumberCard("One person", UNKNOWN, "%", anew=True)
+    note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(found.threshold)}")
+    return NumberCard("One person", f"± {100 * found.error:.0f}", "%", note, "observed" in simulated.anew)
+
+
+def _people(simulated: Simulated, participants: int) -> NumberCard:
+    found = simulated.group
+    if found is None:
+        return NumberCard(f"{participants} people", UNKNOWN, "%", anew=True)
+    title = f"{found.participants} people in ± {100 * found.precision:g} %"
+    enough = found.share >= ENOUGH
+    note: Verdict = ("ok" if enough else "warn", "check" if enough else "warning", "")
+    note = (*note[:2], f"{found.more_trials} trials: {100 * found.more_share:.0f} %")
+    return NumberCard(title, f"{100 * found.share:.0f}", "%", note, "group" in simulated.anew)
+
+
+def function_plot(of: LevelBlock, simulated: Simulated) -> FunctionPlot | None:
+    """Return the psychometric function; None before the first answer."""
+    found, words = simulated.observed, of.words
+    if found is None:
+        return None
+    low = min(found.planted[0], *(one[0] for one in found.found))
+    low_percent = 10.0 * math.floor(10.0 * low + 1e-9)
+    most, _ = max(found.asked, key=lambda pair: pair[1], default=(0.0, 0.0))
+    middle = [words.number(level) for level in _within(found)]
+    sentence = (
+        f"Share of answers that are {words.success}, over the {words.kind}: {100 * found.planted[0]:.0f} % at "
+        f"{words.words(found.levels[0])} to {100 * found.planted[-1]:.0f} % at {words.words(found.levels[-1])}, "
+        f"{100 * found.at_threshold:.0f} % at the planted {words.name} of {words.words(found.threshold)}. "
+        f"Half of {found.observers} observers are estimated between {middle[0]} and {words.words(_within(found)[1])}. "
+        f"The level asked most often is {words.words(most)}."
+    )
+    return FunctionPlot(
+        heading=f"% {words.success} over {words.kind}, {words.unit}".rstrip(", "),
+        span=(words.at(found.levels[0]), words.at(found.levels[-1])),
+        x=tuple(words.at(level) for level in found.levels),
+        planted=_percent(found.planted),
+        found=tuple(_percent(one) for one in found.found),
+        asked=tuple((words.at(level), share) for level, share in found.asked),
+        mark=(words.at(found.threshold), 100 * found.at_threshold),
+        mark_words=words.words(found.threshold),
+        low=low_percent,
+        clipped_from=of.clipped_from,
+        ticks_x=words.ticks(),
+        ticks_y=tuple((one, f"{one:g}") for one in even_ticks(low_percent, 100.0, 7)),
+        sentence=sentence,
+        anew="observed" in simulated.anew,
+    )
+
+
+def _within(found: Observed) -> tuple[float, float]:
+    """Return the 25 and 75 % quantiles of the estimates after all trials."""
+    quantiles = found.course[-1][1]
+    return quantiles[1], quantiles[3]
+
+
+def _percent(values: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(100 * value for value in values)
+
+
+def track_plot(of: LevelBlock, simulated: Simulated) -> TrackPlot | None:
+    """Return the expected track; None before the first answer."""
+    found, words = simulated.observed, of.words
+    if found is None or not found.course:
+        return None
+    last = max((one.trial for one in found.one), default=1)
+    right = sum(one.success for one in found.one)
+    low, high = _within(found)
+    unit = f", {words.unit}" if words.unit else ""
+    return TrackPlot(
+        heading=f"{words.kind}{unit} over trials",
+        span=(words.at(found.levels[0]), words.at(found.levels[-1])),
+        trials=tuple(float(number) for number, _ in found.course),
+        found=tuple(tuple(words.at(one[at]) for _, one in found.course) for at in range(len(found.course[0][1]))),
+        one=tuple((one.trial, words.at(one.level), one.track, one.success) for one in found.one),
+        last=last,
+        planted=words.at(found.threshold),
+        clipped_from=of.clipped_from,
+        ticks_x=tuple((one or 1, f"{one or 1:g}") for one in even_ticks(0, last, 7)),
+        ticks_y=words.ticks(),
+        observers=found.observers,
+        sentence=(
+            f"Estimates of the {words.name} over {last} trials: after the last one half of the observers are between "
+            f"{words.number(low)} and {words.words(high)}, planted was {words.words(found.threshold)}. One of them "
+            f"answered {right} of {len(found.one)} trials with success."
+        ),
+        anew="observed" in simulated.anew,
+    )
+
+
+def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) -> ForcesPlot | None:
+    """Return the force at each level; None where levels have no force of their own.
+
+    Parameters
+    ----------
+    of : LevelBlock
+        The block.
+    problems : mapping
+        The problems of the study, each with the words of its repairs as far as they were found.
+    """
+    shown = [one for one in of.shown if one.asked_n is not None]
+    if not shown or of.limits is None:
+        return None
+    bars = [ForceBar(one.asked_n or 0.0, one.sent_n or 0.0, one.clipped_by is not None) for one in shown]
+    values = [one.comparison for one in shown]
+    if of.standard is not None:
+        own = standard_of(of.protocol, of.block.id, of.standard)
+        bars.insert(0, ForceBar(own.asked_n or 0.0, own.sent_n or 0.0, own.clipped_by is not None, standard=True))
+        values.insert(0, of.standard)
+    unit, limit_n = of.words.value_unit, of.protocol.device.force_limit_n
+    clipped = sum(one.clipped_by is not None for one in of.levels)
+    asked = len(of.levels) - clipped
+    row, repair = _repair(of, problems)
+    warning = "" if not clipped else row.message if row is not None else _clipped_words(of, clipped)
+    top = max(limit_n, *(bar.asked_n for bar in bars))
+    step = max(1, math.ceil(len(bars) / MOST_LABELS))
+    standard = "" if of.standard is None else f"standard {rounded(of.standard)} {unit}, "
+    verdicts: list[Verdict] = [("ok", "check", f"{asked} of {len(of.levels)} as asked")]
+    if clipped:
+        verdicts.append(("bad" if row is not None else "warn", "warning", f"{clipped} clipped"))
+    strongest = max(one.asked_n or 0.0 for one in shown)
+    return ForcesPlot(
+        heading=f"N, {standard}at {of.limits.hand_mps:.3f} m/s of the hand",
+        bars=tuple(bars),
+        ticks_x=tuple((float(at), rounded(values[at])) for at in range(0, len(bars), step)),
+        ticks_y=tuple((one, f"{one:g}") for one in even_ticks(0.0, 1.02 * top, 5)),
+        limit_n=limit_n,
+        verdicts=tuple(verdicts),
+        warning=warning,
+        repair=repair,
+        sentence=(
+            f"Force at {len(shown)} levels from {rounded(values[0])} to {rounded(values[-1])} {unit}: at most "
+            f"{strongest:.2f} N are asked, the force limit is {limit_n:g} N. {asked} of {len(of.levels)} levels are as "
+            f"asked, {clipped} are clipped."
+        ),
+    )
+
+
+def _repair(
+    of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]
+) -> tuple[ProblemRow | None, RepairOffer | None]:
+    """Return the problem of a block's levels, and the repair that was found for it."""
+    place = ("stimuli", str(of.block.stimulus), "levels")
+    row = next((one for one in problems if one.fault.path == place), None)
+    words = () if row is None else problems[row]
+    return row, RepairOffer(words[0], row) if words else None
+
+
+def _clipped_words(of: LevelBlock, clipped: int) -> str:
+    assert of.limits is not None  # noqa: S101 - forces are known
+    limits = (("the force limit", of.limits.force), ("the limit of the loop", of.limits.loop))
+    known = [f"above {rounded(at)} {of.words.value_unit} {name}" for name, at in limits if at is not None]
+    begins = " and ".join(known) or "the limits"
+    levels_ = "level" if clipped == 1 else "levels"
+    return f"{begins[:1].upper()}{begins[1:]} takes part of the force away: {clipped} {levels_} feel alike."

@@ -1,0 +1,197 @@
+"""What the tab Measures shows for the selected element, and the cards below the other tabs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from study_app.authoring.facts import Facts
+from study_app.authoring.measures.planned import Detectable
+from study_app.authoring.study import Study
+from study_app.protocol.blocks import Block
+from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import order_of
+from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.measures import session_cards as cards
+from study_app.viewmodels.designer.measures.cards import ANEW, Card, ControlValues, LinesCard, MeasuresView
+from study_app.viewmodels.designer.measures.level_plots import (
+    Simulated,
+    forces_plot,
+    function_plot,
+    level_block,
+    number_cards,
+    track_plot,
+)
+from study_app.viewmodels.designer.measures.level_words import LevelWords, rounded
+from study_app.viewmodels.designer.problem_rows import ProblemRow
+
+BELOW: Final = 4
+"""So many cards stay below the other tabs."""
+_NAMED_BY: Final = {"stimuli": "stimulus", "methods": "method", "designs": "design", "questionnaires": "questionnaire",
+                    "tasks": "task"}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Focus:
+    """What the measures are of: the block, and what its tracks are simulated by; None where it has none.
+
+    Attributes
+    ----------
+    block : Block or None
+        The selected block, or the first one that uses what is selected.
+    plan : ThresholdPlan or None
+        What decides how precise its thresholds are.
+    compares : bool
+        Whether its statements compare conditions, so that studies of it are simulated.
+    """
+
+    block: Block | None = None
+    plan: ThresholdPlan | None = None
+    compares: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Controls:
+    """What is simulated: participants, the threshold (a level) and the lapse rate."""
+
+    participants: int = 12
+    threshold: float = 0.2
+    lapses: float = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class SlowResults:
+    """What simulations answered: of observers, of studies, and the warnings of ``check`` that take them.
+
+    Attributes
+    ----------
+    simulated : Simulated
+        Of a block with a method.
+    detectable : Detectable or None
+        Of a block whose statements compare conditions.
+    detectable_anew : bool
+        Whether it is of an earlier study.
+    warnings : tuple of str
+        Sentences.
+    waits : bool
+        Whether a number is still to come.
+    """
+
+    simulated: Simulated = field(default_factory=Simulated)
+    detectable: Detectable | None = None
+    detectable_anew: bool = False
+    warnings: tuple[str, ...] = ()
+    waits: bool = False
+
+
+def focus_of(protocol: Protocol | None, path: Path) -> Focus:
+    """Return what the measures of an element are of."""
+    if protocol is None or len(path) < 2:
+        return Focus()
+    block = protocol.blocks.get(str(path[1])) if path[0] == "blocks" else None
+    if (key := _NAMED_BY.get(str(path[0]))) is not None:
+        users = [one for one in protocol.blocks_in_order if getattr(one, key) == path[1]]
+        block = next((one for one in users if one.phase == "main"), next(iter(users), None))
+    if block is None:
+        return Focus()
+    questionnaire = protocol.questionnaire_of(block.id)
+    statements = () if questionnaire is None else questionnaire.statements
+    compares = block.phase == "main" and bool(statements) and len(block.conditions) > 1
+    return Focus(block, threshold_plan(protocol, block), compares)
+
+
+def control_values(protocol: Protocol | None, focus: Focus, controls: Controls) -> ControlValues:
+    """Return what the controls show: threshold and lapses only where observers are simulated."""
+    if protocol is None or focus.plan is None:
+        return ControlValues(controls.participants)
+    words = LevelWords(focus.plan.stimulus, focus.plan.design)
+    return ControlValues(
+        controls.participants, words.number(controls.threshold), f"simulated {words.name}", words.unit,
+        rounded(100 * controls.lapses),
+    )  # fmt: skip
+
+
+def measures_view(
+    study: Study,
+    facts: Facts,
+    path: Path,
+    controls: Controls,
+    slow: SlowResults,
+    problems: Mapping[ProblemRow, tuple[str, ...]],
+) -> MeasuresView:
+    """Return what is shown of the selected element.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    facts : Facts
+        Its facts.
+    path : tuple of str or int
+        The selected element.
+    controls : Controls
+        What is simulated.
+    slow : SlowResults
+        What simulations answered.
+    problems : mapping
+        The problems of the study, each with the words of its repairs as far as they were found.
+    """
+    protocol = study.formed
+    focus = focus_of(protocol, path)
+    block, values = focus.block, control_values(protocol, focus, controls)
+    waiting = ANEW if slow.waits else ""
+    of = None if protocol is None or block is None else level_block(protocol, block)
+    if protocol is not None and block is not None and of is not None and focus.plan is not None:
+        numbers = number_cards(
+            of, slow.simulated, controls.participants, facts.steps_s.get(block.id, 0.0),
+            order_of(protocol, block).trials,
+        )  # fmt: skip
+        return MeasuresView(
+            values, numbers, function_plot(of, slow.simulated), track_plot(of, slow.simulated),
+            forces_plot(of, problems), (), tuple(_others(study, facts, path, slow)), waiting,
+        )  # fmt: skip
+    shown = tuple(_cards(study, facts, path, focus, controls, slow))
+    forces = None if of is None else forces_plot(of, problems)
+    return MeasuresView(values, forces=forces, cards=shown, below=shown[:BELOW], waiting=waiting)
+
+
+def _others(study: Study, facts: Facts, path: Path, slow: SlowResults) -> list[Card]:
+    session: list[Card] = [cards.session_card(study, facts, path)]
+    warned = cards.warnings_card(facts, slow.warnings)
+    return session if warned is None else [*session, warned]
+
+
+def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, slow: SlowResults) -> list[Card]:
+    """Return the cards of an element without simulated tracks, those that concern it first."""
+    protocol, block = study.formed, focus.block
+    found: list[Card] = [cards.session_card(study, facts, path)]
+    if protocol is None:
+        return [*found, cards.texts_card(study)]
+    if block is not None and (balance := cards.balance_card(study, protocol, block, controls.participants)):
+        found.append(balance)
+    if block is not None and focus.compares:
+        detectable = cards.detectable_card(
+            study, block, controls.participants, slow.detectable, anew=slow.detectable_anew
+        )
+        found.append(detectable)
+    found.append(cards.force_card(study, facts, protocol, _liquids(protocol, path, block)))
+    if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids:
+        found.insert(0, cards.effects_card(study, protocol, str(path[1])))
+    if block is not None and path[0] == "blocks":
+        found.append(cards.block_card(study, facts, protocol, block))
+    found.append(cards.texts_card(study))
+    warned: LinesCard | None = cards.warnings_card(facts, slow.warnings)
+    return found if warned is None else [*found, warned]
+
+
+def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
+    """Return the liquids of an element, of most elements all."""
+    if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids:
+        return [str(path[1])]
+    names = () if block is None else protocol.conditions_in(block.id)
+    if path[0] == "conditions" and len(path) > 1 and path[1] in protocol.conditions:
+        names = (str(path[1]),)
+    found = dict.fromkeys(liquid for name in names for liquid in protocol.conditions[name].liquid_ids)
+    return list(found) or list(protocol.liquids)

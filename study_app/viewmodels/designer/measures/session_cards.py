@@ -1,0 +1,203 @@
+"""Cards about a session: its length, the balance of its orders, what a hand feels, its texts, what people can show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from study_app.authoring.facts import Facts
+from study_app.authoring.fields import label_of
+from study_app.authoring.measures.balance import balance_of
+from study_app.authoring.measures.felt import forces
+from study_app.authoring.measures.planned import Detectable
+from study_app.authoring.measures.texts import revealing, texts_by_language
+from study_app.authoring.outline import title_of
+from study_app.authoring.study import Study
+from study_app.haptics.model.gate import calls_for
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import order_of
+from study_app.protocol.source.document import Path
+from study_app.protocol.wording.languages import LANGUAGES
+from study_app.viewmodels.designer.measures.cards import (
+    UNKNOWN,
+    BalanceCard,
+    Line,
+    LinesCard,
+    SessionCard,
+    TextsCard,
+    Verdict,
+)
+from study_app.viewmodels.number_words import minutes
+
+MOST_ROWS: Final = 6
+"""Positions that are shown of a long block."""
+NO_ICON: Final[Verdict] = ("neutral", "", "")
+
+
+def session_card(study: Study, facts: Facts, path: Path) -> SessionCard:
+    """Return the session in numbers, with the step that is looked at."""
+    verdicts = tuple(text_verdicts(study, facts))
+    if facts.expected_s is None or facts.range_s is None:
+        unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials", "breaks"))
+        return SessionCard("Session", unknown, verdicts=verdicts)
+    least, most = (round(one / 60) for one in facts.range_s)
+    figures = (
+        (f"{facts.expected_s / 60:.0f}", "min"),
+        (str(facts.answers), "answers"),
+        (str(facts.trials), "trials"),
+        (str(facts.breaks), "breaks"),
+    )
+    whole = max(1e-9, sum(facts.steps_s.values()))
+    chosen = str(path[1]) if len(path) > 1 else ""
+    segments = tuple(
+        (f"{_title(study, step)} {minutes(duration)}", duration / whole, step == chosen)
+        for step, duration in facts.steps_s.items()
+    )
+    longest = sorted(facts.steps_s, key=lambda step: -facts.steps_s[step])[:2]
+    named = [chosen, *(one for one in longest if one != chosen)][:2] if chosen in facts.steps_s else longest
+    notes = tuple(f"{_title(study, step)} {minutes(facts.steps_s[step])}" for step in facts.steps_s if step in named)
+    aside = f"{least} to {most} min" if least != most else ""
+    return SessionCard("Session", figures, aside, segments, notes, verdicts)
+
+
+def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> SessionCard:
+    """Return a block in numbers."""
+    order, questionnaire = order_of(protocol, block), protocol.questionnaire_of(block.id)
+    answers = 0 if questionnaire is None else len(questionnaire.items)
+    duration_s = facts.steps_s.get(block.id)
+    figures = (
+        (UNKNOWN if duration_s is None else f"{duration_s / 60:.0f}", "min"),
+        (str(order.trials), "trials"),
+        (str(order.trials * answers), "answers"),
+        (str(order.breaks), "breaks"),
+    )
+    return SessionCard(_title(study, block.id), figures)
+
+
+def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
+    """Return whether texts are missing, and whether a text reveals a condition."""
+    missing = ", ".join(f"{count} in {_language(code)}" for code, count in facts.missing.items())
+    codes = tuple(texts_by_language(study))
+    languages = " and ".join(_language(code) for code in codes) if len(codes) < 3 else f"{len(codes)} languages"
+    found: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
+    if not missing:
+        found = [("ok", "check", f"Every text in {languages}")]
+    if (protocol := study.formed) is not None:
+        revealed = revealing(study, protocol)
+        named = f"{revealed[0].element}: “{revealed[0].word}” reveals a condition" if revealed else ""
+        more = f", and {len(revealed) - 1} more" if len(revealed) > 1 else ""
+        found.append(("warn", "warning", named + more) if revealed else ("ok", "check", "No text reveals a condition"))
+    return found
+
+
+def balance_card(study: Study, protocol: Protocol, block: Block, participants: int) -> BalanceCard | None:
+    """Return how even the orders of a block are over so many participants; None where it has one code."""
+    judged = balance_of(protocol, block, participants)
+    if judged is None:
+        return None
+    evenness, rows = judged.evenness, judged.rows
+    if evenness.balanced:
+        rounds = "" if rows is None else f", {participants // rows} round{'s' * (participants > rows)} of {rows}"
+        verdict: Verdict = ("ok", "check", f"even{rounds}")
+    elif rows is not None and participants % rows:
+        verdict = ("warn", "warning", f"even at {judged.next_even}")
+    elif rows is not None:
+        verdict = ("warn", "warning", "even in position, not in carry-over")
+    elif judged.order == "fixed":
+        verdict = ("warn", "warning", "everyone gets the same order")
+    else:
+        verdict = ("neutral", "info", "even on average only: drawn for each session")
+    title = _title(study, block.id)
+    shown = evenness.positions[:MOST_ROWS]
+    return BalanceCard(
+        title, evenness.orders, evenness.codes, shown, evenness.follows, len(evenness.positions) - len(shown), verdict
+    )
+
+
+def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[str]) -> LinesCard:
+    """Return the force of some liquids against a hand at 0.1 m/s."""
+    limit_n, found = protocol.device.force_limit_n, forces(protocol)
+    lines = []
+    for name in names:
+        it = found[name]
+        limit = "the force limit" if it.limit == "norm" else "the limit of the loop"
+        verdict: Verdict = (
+            ("ok", "check", "not clipped") if it.limit is None else ("bad", "warning", f"clipped by {limit}")
+        )
+        lines.append(
+            Line(_title(study, name, "liquids"), f"{it.force_n:.2f} N", min(1.0, it.force_n / limit_n), verdict)
+        )
+    alike = [one for one in facts.warnings if "hard to tell apart" in one and any(name in one for name in names)]
+    sentences: tuple[Verdict, ...] = tuple(("warn", "warning", _sentence(one)) for one in alike)
+    if not sentences and len(names) > 1:
+        sentences = (("ok", "check", "No pair is hard to tell apart"),)
+    return LinesCard("Force of each liquid", f"at 0.1 m/s, limit {limit_n:g} N", tuple(lines), sentences)
+
+
+def effects_card(study: Study, protocol: Protocol, name: str) -> LinesCard:
+    """Return which effects act in a liquid, with their bounds, and why others do not."""
+    verdicts = [one for one in calls_for(protocol.scene_of(name)) if one.liquid == name]
+    lines = tuple(
+        Line(
+            label_of(one.effect), f"{one.bound_n:.3g} N", one.share,
+            ("ok", "check", f"in: {one.why}") if one.included else ("neutral", "minus", f"out: {one.why}"),
+        )
+        for one in verdicts
+    )  # fmt: skip
+    said = tuple((*line.verdict[:2], f"{line.title}, {line.verdict[2]}") for line in lines)
+    return LinesCard(f"Effects in {_title(study, name, 'liquids')}", "largest force of each", lines, said)
+
+
+def texts_card(study: Study) -> TextsCard:
+    """Return how many texts each language has, and the texts that reveal a condition."""
+    lines = []
+    for code, (there, wanted) in texts_by_language(study).items():
+        verdict: Verdict = ("ok", "check", "complete") if there == wanted else ("bad", "warning", "texts are missing")
+        lines.append(Line(_language(code), f"{there} of {wanted}", there / max(1, wanted), verdict))
+    formed = study.formed
+    found = () if formed is None else revealing(study, formed)
+    revealed = tuple((f"{one.element}, {one.key.lower()}: “{one.word}”", one.path) for one in found)
+    return TextsCard(tuple(lines), revealed)
+
+
+def detectable_card(
+    study: Study, block: Block, participants: int, found: Detectable | None, *, anew: bool
+) -> LinesCard:
+    """Return the smallest difference of each statement that studies of so many participants show."""
+    title = f"What {participants if found is None else found.participants} people can show"
+    if found is None:
+        return LinesCard(title, "", (), (("neutral", "clock", "Studies are simulated."),), anew=True)
+    items = study.document.get("questionnaires", {}).get(block.questionnaire, {}).get("items", ())
+    places = {item.get("id"): at for at, item in enumerate(items)}
+    lines = []
+    for one in found.findings:
+        path: Path = ("questionnaires", str(block.questionnaire), "items", places.get(one.item, 0))
+        name = title_of(study.document, path)
+        number = UNKNOWN if one.detectable is None else f"{one.detectable:.1f}"
+        lines.append(Line(name, number, (one.detectable or 0.0) / (found.points - 1)))
+    model = "The smallest difference that 4 of 5 simulated studies show. The answers are a model's, not measured."
+    note: Verdict = ("neutral", "info", model)
+    if not lines:
+        note = ("neutral", "info", "The answer model knows none of the statements.")
+    return LinesCard(title, f"points of {found.points}", tuple(lines), (note,), anew)
+
+
+def warnings_card(facts: Facts, more: Sequence[str]) -> LinesCard | None:
+    """Return the warnings of ``check``; None where there are none."""
+    sentences: list[Verdict] = [("warn", "warning", _sentence(one)) for one in (*facts.warnings, *more)]
+    return LinesCard("Warnings", "of check", (), tuple(sentences)) if sentences else None
+
+
+def _title(study: Study, name: str, section: str = "") -> str:
+    sections = (section,) if section else ("blocks", "pages", "questionnaires")
+    inside = next((one for one in sections if name in study.document.get(one, {})), "blocks")
+    return title_of(study.document, (inside, name))
+
+
+def _language(code: str) -> str:
+    return LANGUAGES[code].name if code in LANGUAGES else code
+
+
+def _sentence(words: str) -> str:
+    return f"{words[:1].upper()}{words[1:]}."
