@@ -16,6 +16,11 @@ from study_app.gui.widgets.main_view import Place
 from study_app.protocol.source.files import shipped_file
 
 
+def no_worker() -> None:
+    """Refuse to start the worker of slow numbers: tests that need it give another one."""
+    raise OSError("no process in this test")
+
+
 class Designer:
     """The designer with its window; ``file`` is the workspace's study, a copy of the demo."""
 
@@ -26,6 +31,7 @@ class Designer:
         self.file.write_bytes(demo.replace(b'name = "demo"', b'name = "kitchen"'))
         self.results = folder / "results"
         self.controller = DesignerController(self.results)
+        self.controller.measures.slow.make = no_worker
         self.editing, self.saving = self.controller.editing, self.controller.saving
         self.place = self.controller.place
         self.messages: list[tuple[str, str]] = []

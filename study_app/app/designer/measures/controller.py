@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, QTimer
 
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.measures.slow_numbers import SlowNumbers
-from study_app.app.designer.measures.wanted import LAPSES, participants_of, threshold_of, wanted_of
+from study_app.app.designer.measures.wanted import LAPSES, participants_of, precision_of, threshold_of, wanted_of
 from study_app.app.designer.measures.worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.authoring.facts import facts
@@ -101,14 +101,15 @@ class MeasuresController(QObject):
 
     def _controls(self, focus: Focus) -> Controls:
         opened = self._editing.opened
-        planned = participants_of(None if opened is None else opened.study.formed)
+        formed = None if opened is None else opened.study.formed
+        planned = participants_of(formed)
         participants = planned if self._participants is None else self._participants
         if focus.plan is None or focus.block is None:
             return Controls(participants, lapses=self._lapses)
         asked = self._thresholds.get(focus.block.id)
         low, high = focus.plan.stimulus.levels
         threshold = asked if asked is not None and low <= asked <= high else threshold_of(focus.plan)
-        return Controls(participants, threshold, self._lapses)
+        return Controls(participants, threshold, self._lapses, precision_of(formed))
 
     def _results(self, wanted: tuple[Wanted, ...], focus: Focus, controls: Controls) -> SlowResults:
         """Return what is known of what is wanted; where nothing is, what was known of the block before."""
@@ -131,6 +132,8 @@ class MeasuresController(QObject):
                 group if isinstance(group, GroupPrecision) else None,
                 frozenset(anew),
                 controls.threshold,
+                controls.precision,
+                self.slow.waits,
             ),
             detectable if isinstance(detectable, Detectable) else None,
             "detectable" in anew,

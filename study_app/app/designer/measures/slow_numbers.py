@@ -32,7 +32,7 @@ class SlowNumbers(QObject):
 
     def __init__(self, parent: QObject, make: Callable[[], MeasureClient] = start_measure_worker) -> None:
         super().__init__(parent)
-        self._make = make
+        self.make = make
         self._client: MeasureClient | None = None
         self._known: OrderedDict[Wanted, Found] = OrderedDict()
         self._wanted: tuple[Wanted, ...] = ()
@@ -85,7 +85,7 @@ class SlowNumbers(QObject):
             self.close()
         if self._client is None:
             try:
-                self._client = self._make()
+                self._client = self.make()
             except OSError as error:  # no process to be had: the designer goes on without these numbers
                 log.info("the worker of slow numbers does not start: %s", error)
                 self._failed |= set(wanted)

@@ -29,7 +29,7 @@ def wanted_of(protocol: Protocol, focus: Focus, controls: Controls) -> tuple[Wan
     if (plan := focus.plan) is not None:
         wanted = [
             Observing(plan, controls.threshold, controls.lapses),
-            Grouping(plan, controls.participants, precision_of(protocol)),
+            Grouping(plan, controls.participants, controls.precision),
             Measuring(plan, controls.lapses, least_of(protocol, plan)),
         ]
     if focus.compares and focus.block is not None:
@@ -43,9 +43,9 @@ def wanted_of(protocol: Protocol, focus: Focus, controls: Controls) -> tuple[Wan
     return tuple(wanted)
 
 
-def precision_of(protocol: Protocol) -> float:
+def precision_of(protocol: Protocol | None) -> float:
     """Return half the 95 % interval that is wanted, as a share of the mean."""
-    decided = protocol.analysis
+    decided = None if protocol is None else protocol.analysis
     return PRECISION if decided is None or decided.precision is None else decided.precision
 
 

@@ -37,6 +37,7 @@ class Control(QWidget):
         """Call the number otherwise."""
         self.words.setText(words)
         self.unit.setText(unit)
+        self.unit.setVisible(bool(unit))
         self.field.setAccessibleName(f"{words}, {unit}" if unit else words)
 
     def show_number(self, text: str) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.measures.controls import MeasureControls
 from study_app.gui.designer.measures.parts import CardGrid, NumberPart
+from study_app.gui.theme.theme import RADIUS_CONTROL
 from study_app.gui.theme.themed import Themed, dress
 from study_app.gui.widgets.cards import Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton
@@ -63,6 +65,18 @@ class PlotCard(Card):
         self.legend.setText(f"{ANEW[:1].upper()}{ANEW[1:]}." if anew else self._legend)
 
 
+class WarningBar(Themed, QWidget):
+    """A field in the colour of warnings."""
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the field."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(self.theme.warn_bg))
+        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+
+
 class ForcesCard(Card):
     """The force of each level, what clips it, and the repair; ``repair_asked`` carries problem and words."""
 
@@ -81,10 +95,9 @@ class ForcesCard(Card):
             head.addWidget(chip)
         self.column.addLayout(head)
         self.column.addWidget(plot, 1)
-        self.bar = QWidget()
-        self.bar.setObjectName("clipped")
+        self.bar = WarningBar()
         across = QHBoxLayout(self.bar)
-        across.setContentsMargins(0, 2, 0, 0)
+        across.setContentsMargins(12, 6, 8, 6)
         across.setSpacing(10)
         across.addWidget(Icon("warning", "warn", 18))
         self.words = label("", "small", wraps=True)
@@ -139,9 +152,11 @@ class MeasuresPage(Themed, QWidget):
         self.column.setContentsMargins(0, 0, 0, 0)
         self.column.setSpacing(8)
         self.column.addWidget(self.numbers)
-        self.plots = QHBoxLayout()
+        self.curves = QWidget()
+        self.plots = QHBoxLayout(self.curves)
+        self.plots.setContentsMargins(0, 0, 0, 0)
         self.plots.setSpacing(8)
-        self.column.addLayout(self.plots, 3)
+        self.column.addWidget(self.curves, 3)
         self.column.addWidget(self.grid, 1)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
@@ -171,17 +186,17 @@ class MeasuresPage(Themed, QWidget):
         if shown is None:
             return
         self.numbers.show_numbers(shown.numbers)
-        if (shown.function or shown.track or shown.forces) and not self.cards:
+        if (shown.numbers or shown.forces) and not self.cards:
             self._make_plots()
-        for name, plot in (("function", shown.function), ("track", shown.track), ("forces", shown.forces)):
+        for name, there in (("function", shown.numbers), ("track", shown.numbers), ("forces", shown.forces)):
             if name in self.cards:
-                self.cards[name].setVisible(plot is not None)
-        if shown.function is not None and self.function is not None:
-            self.function.show_plot(shown.function)
-            self._head("function", shown.function.heading, anew=shown.function.anew)
-        if shown.track is not None and self.track is not None:
-            self.track.show_plot(shown.track)
-            self._head("track", shown.track.heading, anew=shown.track.anew)
+                self.cards[name].setVisible(bool(there))
+        self.curves.setVisible(bool(shown.numbers))
+        for name, view, plot in (("function", self.function, shown.function), ("track", self.track, shown.track)):
+            if view is not None:
+                view.show_plot(plot)
+                anew = bool(shown.waiting) if plot is None else plot.anew
+                self._head(name, "" if plot is None else plot.heading, anew=anew)
         forces = self.cards.get("forces")
         if shown.forces is not None and isinstance(forces, ForcesCard):
             forces.show_forces(shown.forces)

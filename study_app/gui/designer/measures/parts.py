@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, dress, take_away
@@ -28,6 +28,7 @@ from study_app.viewmodels.tones import Tone
 INKS: dict[Tone, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}
 NAME_PX = 132
 MOST_LINES = 7
+NARROW_CODES = 3
 
 
 def verdict_line(verdict: Verdict) -> QWidget:
@@ -72,7 +73,8 @@ class NumberPart(Card):
         self.number.setText(shown.number)
         set_ink(self.number, "text3" if shown.anew else "text")
         self.unit.setText(shown.unit)
-        tone, icon, words = ("neutral", "clock", ANEW) if shown.anew else shown.note
+        waiting: Verdict = ("neutral", "clock", ANEW)
+        tone, icon, words = waiting if shown.anew else shown.note
         self.icon.show_icon(icon or "info", INKS[tone])
         self.note.show_text(words)
         self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {words}")
@@ -109,11 +111,16 @@ class Made(Card):
     """A card whose content is made anew where it changes."""
 
     open_asked = Signal(object)
+    wide = False
+    """Whether it takes the width of two cards."""
 
     def __init__(self, title: str, aside: str = "") -> None:
-        self.aside = label(aside, "small", "text2")
+        self.aside = Elided("small", "text2")
+        self.aside.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.aside.show_text(aside)
         super().__init__(title, self.aside, padding=16, gap=8)
         self.setAccessibleName(title)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)  # columns are equally wide
         self.column.addStretch()
 
     def add(self, part: QWidget) -> None:
@@ -172,7 +179,9 @@ class BalancePart(Made):
         after = _table("comes after", shown.codes, list(shown.codes), shown.follows)
         row.addWidget(after, 0, Qt.AlignmentFlag.AlignTop)
         row.addStretch()
-        self.add(tables)
+        self.wide = len(shown.codes) > NARROW_CODES
+        if shown.codes:
+            self.add(tables)
         if shown.hidden:
             self.add(label(f"and {shown.hidden} more positions", "small", "text2"))
         self.add(verdict_line(shown.verdict))
@@ -189,7 +198,9 @@ def _table(name: str, codes: Sequence[str], places: Sequence[str], counts: Seque
     for down, (place, line) in enumerate(zip(places, counts, strict=True), start=2):
         grid.addWidget(label(place, "small", "text2"), down, 0)
         for across, (code, count) in enumerate(zip(codes, line, strict=True), start=1):
-            grid.addWidget(_Cell(count, f"{code}, {name} {place}: {count} times"), down, across)
+            cell = _Cell(count, f"{code}, {name} {place}: {count} times")
+            cell.setFixedSize(30 if len(codes) <= NARROW_CODES else 24, 17)
+            grid.addWidget(cell, down, across)
     return made
 
 
@@ -199,7 +210,6 @@ class _Cell(Themed, QWidget):
     def __init__(self, count: int, name: str) -> None:
         super().__init__()
         self._count = count
-        self.setFixedSize(30, 17)
         self.setAccessibleName(name)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
@@ -294,9 +304,8 @@ class CardGrid(Themed, QWidget):
 
     open_asked = Signal(object)
 
-    def __init__(self, columns: int = 2) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._columns = columns
         self.cards: tuple[object, ...] = ()
         self.parts: list[Made] = []
         self.grid = QVBoxLayout(self)
@@ -316,18 +325,33 @@ class CardGrid(Themed, QWidget):
             self.grid.takeAt(0)
         self.parts = []
         for at, card in enumerate(cards):
-            part = kept.get(at)
-            if part is None:
-                part = part_of(card)
-                part.open_asked.connect(self.open_asked)
-                dress(part, self.theme)
-            self.parts.append(part)
-        for first in range(0, len(self.parts), self._columns):
+            self.parts.append(kept[at] if at in kept else self._made(card))
+        for some in _rows(self.parts):
             row = QHBoxLayout()
             row.setSpacing(8)
-            some = self.parts[first : first + self._columns]
             for part in some:
                 row.addWidget(part, 1)
             self.grid.addLayout(row)
         self.grid.addStretch()
         self.cards = cards
+
+    def _made(self, card: object) -> Made:
+        part = part_of(card)
+        part.open_asked.connect(self.open_asked)
+        dress(part, self.theme)
+        return part
+
+
+def _rows(parts: Sequence[Made]) -> list[list[Made]]:
+    """Return cards in rows of two, wide ones in a row of their own."""
+    rows: list[list[Made]] = []
+    waiting: list[Made] = []
+    for part in parts:
+        if part.wide:
+            rows.append([part])
+            continue
+        waiting.append(part)
+        if len(waiting) == 2:
+            rows.append(waiting)
+            waiting = []
+    return [*rows, waiting] if waiting else rows

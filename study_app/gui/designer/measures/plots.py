@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSize, Qt
@@ -15,6 +17,7 @@ from study_app.viewmodels.designer.measures.cards import ForcesPlot, FunctionPlo
 BARS = 0.14  # of the height, for how often each level is asked
 SYMBOLS = ("o", "t1", "s", "d")
 DASHED = (4.0, 3.0)
+LIMIT_PX = 66.0  # of the name of the force limit
 
 
 class MeasurePlot(Plot):
@@ -25,20 +28,33 @@ class MeasurePlot(Plot):
         self.axes["left"].setWidth(40)
         self.axes["bottom"].setHeight(26)
         self.drawn: list[pg.GraphicsObject] = []
+        self.shown: Any = None
         describe_plot(self, name, "")
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return a small size: a plot takes what is left."""
         return QSize(220, 110)
 
-    def draw(self) -> None:
-        """Draw the value in the colours of the theme."""
+    def show_plot(self, shown: Any) -> None:
+        """Show another value, None where there is none."""
+        if shown != self.shown:
+            self.shown = shown
+            self.setAccessibleDescription("Not known yet." if shown is None else shown.sentence)
+            self._draw()
+
+    def _draw(self) -> None:
+        self.clear()
+        if self.shown is not None:
+            self.draw(self.shown)
+
+    def draw(self, shown: Any) -> None:
+        """Draw a value in the colours of the theme."""
         raise NotImplementedError
 
     def wear(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
         super().wear(theme)
-        self.draw()
+        self._draw()
 
     def clear(self) -> None:
         """Take everything away that was drawn."""
@@ -90,22 +106,10 @@ class FunctionView(MeasurePlot):
 
     def __init__(self) -> None:
         super().__init__("Psychometric function")
-        self.shown: FunctionPlot | None = None
         self.wear(LIGHT)
 
-    def show_plot(self, shown: FunctionPlot) -> None:
-        """Show another function."""
-        if shown != self.shown:
-            self.shown = shown
-            self.setAccessibleDescription(shown.sentence)
-            self.draw()
-
-    def draw(self) -> None:
+    def draw(self, shown: FunctionPlot) -> None:
         """Draw bands, function, mark and bars."""
-        self.clear() if hasattr(self, "drawn") else None
-        shown = getattr(self, "shown", None)
-        if shown is None:
-            return
         theme, (left, right) = self.theme, shown.span
         bottom, top = shown.low - 1.0, 101.5
         x = np.array(shown.x)
@@ -152,22 +156,10 @@ class TrackView(MeasurePlot):
 
     def __init__(self) -> None:
         super().__init__("Expected track")
-        self.shown: TrackPlot | None = None
         self.wear(LIGHT)
 
-    def show_plot(self, shown: TrackPlot) -> None:
-        """Show another track."""
-        if shown != self.shown:
-            self.shown = shown
-            self.setAccessibleDescription(shown.sentence)
-            self.draw()
-
-    def draw(self) -> None:
+    def draw(self, shown: TrackPlot) -> None:
         """Draw bands, median, planted threshold and trials."""
-        self.clear() if hasattr(self, "drawn") else None
-        shown = getattr(self, "shown", None)
-        if shown is None:
-            return
         theme, (bottom, top) = self.theme, shown.span
         x, found = np.array(shown.trials), [np.array(one) for one in shown.found]
         self.band(x, found[0], found[-1], 0.18, anew=shown.anew)
@@ -198,22 +190,11 @@ class ForcesView(MeasurePlot):
 
     def __init__(self) -> None:
         super().__init__("Force at each level")
-        self.shown: ForcesPlot | None = None
+        self.box.sigResized.connect(self._draw)
         self.wear(LIGHT)
 
-    def show_plot(self, shown: ForcesPlot) -> None:
-        """Show other forces."""
-        if shown != self.shown:
-            self.shown = shown
-            self.setAccessibleDescription(shown.sentence)
-            self.draw()
-
-    def draw(self) -> None:
+    def draw(self, shown: ForcesPlot) -> None:
         """Draw bars and limit."""
-        self.clear() if hasattr(self, "drawn") else None
-        shown = getattr(self, "shown", None)
-        if shown is None:
-            return
         theme, count = self.theme, len(shown.bars)
         for at, bar in enumerate(shown.bars):
             if bar.clipped and bar.asked_n > bar.sent_n:
@@ -232,7 +213,7 @@ class ForcesView(MeasurePlot):
             self.add(bars, 0)
         top = max(shown.limit_n, *(bar.asked_n for bar in shown.bars))
         highest = 1.16 * top
-        room = 0.09 * max(4, count)
+        room = count * LIMIT_PX / max(LIMIT_PX + 1.0, self.box.width() - LIMIT_PX)
         self.curve([-0.7, count - 0.3], [shown.limit_n, shown.limit_n], theme.bad, 1.5, dashed=True)
         self.words(f"limit {shown.limit_n:g} N", count - 0.2, shown.limit_n, theme.bad, (0.0, 0.5))
         self.show_ticks("left", list(shown.ticks_y))

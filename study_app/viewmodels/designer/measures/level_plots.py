@@ -47,6 +47,10 @@ class Simulated:
         Which of the three are of an earlier study.
     threshold : float
         The planted threshold, a level.
+    precision : float
+        Half the group's 95 % interval that is wanted, as a share of the mean.
+    waits : bool
+        Whether a number is still to come.
     """
 
     observed: Observed | None = None
@@ -54,6 +58,8 @@ class Simulated:
     group: GroupPrecision | None = None
     anew: frozenset[str] = frozenset()
     threshold: float = 0.0
+    precision: float = 0.15
+    waits: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +110,7 @@ def number_cards(
     return (
         _range(of, simulated),
         _one_person(of, simulated),
-        _people(simulated, participants),
+        _people(simulated, participants, simulated.precision),
         NumberCard(
             "Lasts", f"{duration_s / 60:.0f}", "min",
             ("neutral", "clock", f"{trials} trials of {duration_s / max(1, trials):.1f} s"),
@@ -112,10 +118,15 @@ def number_cards(
     )  # fmt: skip
 
 
+def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:
+    """Return a number that is not known: not yet, or because nothing simulates it."""
+    return NumberCard(title, UNKNOWN, unit, ("neutral", "info", "not simulated"), anew=simulated.waits)
+
+
 def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
     title, found, words = f"{of.words.name}s it can measure", simulated.measurable, of.words
     if found is None:
-        return NumberCard(title, UNKNOWN, words.unit, anew=True)
+        return _unknown(title, words.unit, simulated)
     anew = "measurable" in simulated.anew
     if found.ends is None:
         return NumberCard(title, "none", "", ("bad", "warning", "estimates are biased"), anew)
@@ -132,15 +143,15 @@ def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
 def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
     found = simulated.observed
     if found is None:
-        return NumberCard("One person", UNKNOWN, "%", anew=True)
+        return _unknown("One person", "%", simulated)
     note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(found.threshold)}")
     return NumberCard("One person", f"± {100 * found.error:.0f}", "%", note, "observed" in simulated.anew)
 
 
-def _people(simulated: Simulated, participants: int) -> NumberCard:
+def _people(simulated: Simulated, participants: int, precision: float) -> NumberCard:
     found = simulated.group
     if found is None:
-        return NumberCard(f"{participants} people", UNKNOWN, "%", anew=True)
+        return _unknown(f"{participants} people in ± {100 * precision:g} %", "%", simulated)
     title = f"{found.participants} people in ± {100 * found.precision:g} %"
     enough = found.share >= ENOUGH
     note: Verdict = ("ok" if enough else "warn", "check" if enough else "warning", "")

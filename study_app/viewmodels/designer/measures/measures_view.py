@@ -54,11 +54,12 @@ class Focus:
 
 @dataclass(frozen=True, slots=True)
 class Controls:
-    """What is simulated: participants, the threshold (a level) and the lapse rate."""
+    """What is simulated: participants, the threshold (a level), the lapse rate, and the precision that is wanted."""
 
     participants: int = 12
     threshold: float = 0.2
     lapses: float = 0.02
+    precision: float = 0.15
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,8 @@ from study_app.viewmodels.designer.measures.cards import (
 )
 from study_app.viewmodels.number_words import minutes
 
+MOST_CODES: Final = 8
+"""Of more codes only how even they are is said."""
 MOST_ROWS: Final = 6
 """Positions that are shown of a long block."""
 NO_ICON: Final[Verdict] = ("neutral", "", "")
@@ -39,14 +41,13 @@ def session_card(study: Study, facts: Facts, path: Path) -> SessionCard:
     """Return the session in numbers, with the step that is looked at."""
     verdicts = tuple(text_verdicts(study, facts))
     if facts.expected_s is None or facts.range_s is None:
-        unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials", "breaks"))
+        unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials"))
         return SessionCard("Session", unknown, verdicts=verdicts)
     least, most = (round(one / 60) for one in facts.range_s)
     figures = (
         (f"{facts.expected_s / 60:.0f}", "min"),
         (str(facts.answers), "answers"),
         (str(facts.trials), "trials"),
-        (str(facts.breaks), "breaks"),
     )
     whole = max(1e-9, sum(facts.steps_s.values()))
     chosen = str(path[1]) if len(path) > 1 else ""
@@ -57,7 +58,8 @@ def session_card(study: Study, facts: Facts, path: Path) -> SessionCard:
     longest = sorted(facts.steps_s, key=lambda step: -facts.steps_s[step])[:2]
     named = [chosen, *(one for one in longest if one != chosen)][:2] if chosen in facts.steps_s else longest
     notes = tuple(f"{_title(study, step)} {minutes(facts.steps_s[step])}" for step in facts.steps_s if step in named)
-    aside = f"{least} to {most} min" if least != most else ""
+    breaks = f"{facts.breaks} break{'s' * (facts.breaks != 1)}" if facts.breaks else ""
+    aside = ", ".join(filter(None, (f"{least} to {most} min" if least != most else "", breaks)))
     return SessionCard("Session", figures, aside, segments, notes, verdicts)
 
 
@@ -70,9 +72,9 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
         (UNKNOWN if duration_s is None else f"{duration_s / 60:.0f}", "min"),
         (str(order.trials), "trials"),
         (str(order.trials * answers), "answers"),
-        (str(order.breaks), "breaks"),
     )
-    return SessionCard(_title(study, block.id), figures)
+    aside = f"{order.breaks} break{'s' * (order.breaks != 1)}" if order.breaks else ""
+    return SessionCard(_title(study, block.id), figures, aside)
 
 
 def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
@@ -109,6 +111,11 @@ def balance_card(study: Study, protocol: Protocol, block: Block, participants: i
     else:
         verdict = ("neutral", "info", "even on average only: drawn for each session")
     title = _title(study, block.id)
+    if len(evenness.codes) > MOST_CODES:
+        cells = [count for line in evenness.positions for count in line]
+        after = evenness.after_another
+        words = f"positions {min(cells)} to {max(cells)} times, carry-over {min(after)} to {max(after)} times"
+        return BalanceCard(title, evenness.orders, (), (), (), 0, (*verdict[:2], f"{verdict[2]}; {words}"))
     shown = evenness.positions[:MOST_ROWS]
     return BalanceCard(
         title, evenness.orders, evenness.codes, shown, evenness.follows, len(evenness.positions) - len(shown), verdict
