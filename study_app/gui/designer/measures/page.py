@@ -102,7 +102,7 @@ class ForcesCard(Card):
         across.addWidget(Icon("warning", "warn", 18))
         self.words = label("", "small", wraps=True)
         across.addWidget(self.words, 1)
-        self.repair = ActionButton("", "", height=34)
+        self.repair = ActionButton("", "Repair", height=34)
         self.repair.setProperty("dense", "true")
         self.repair.clicked.connect(self._ask)
         across.addWidget(self.repair)

@@ -1,0 +1,276 @@
+"""The tab Measures in its window: what follows an edit, what is ordered and given up, and the repair of levels."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QLineEdit
+
+from study_app.app.designer.measures.worker import (
+    Advising,
+    Detecting,
+    Grouping,
+    MeasureOrder,
+    Measuring,
+    Observing,
+    Wanted,
+    start_measure_worker,
+)
+from study_app.authoring.measures.observers import Asked, Measurable, Observed
+from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision
+from study_app.authoring.new_study import template
+from study_app.authoring.writer.edits import Set
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.protocol.checks.expected_precision import threshold_plan
+from study_app.protocol.source.files import shipped_file
+from study_app.viewmodels.designer.measures.cards import ANEW, UNKNOWN
+
+pytestmark = pytest.mark.slow
+QUANTILES = (0.1, 0.15, 0.2, 0.25, 0.3)
+
+
+class Worker:
+    """Stands for the worker process: answers come when a test gives them."""
+
+    def __init__(self) -> None:
+        self.orders: list[MeasureOrder] = []
+        self.given: list[tuple[int, Any]] = []
+        self.stops = 0
+        self.works = True
+
+    def order(self, order: MeasureOrder) -> int:
+        self.orders.append(order)
+        return len(self.orders)
+
+    def stop(self) -> None:
+        self.stops += 1
+
+    def close(self) -> None:
+        self.works = False
+
+    def answers(self, wait_s: float = 0.0) -> list[tuple[int, Any]]:
+        given, self.given = self.given, []
+        return given
+
+    def answer(self, *kinds: type) -> None:
+        """Answer what was wanted last, of some kinds only where they are given."""
+        number, order = len(self.orders), self.orders[-1]
+        self.given += [(number, (one, answer_to(one))) for one in order.wanted if not kinds or isinstance(one, kinds)]
+        if not kinds:
+            self.given.append((number, None))
+
+
+def answer_to(wanted: Wanted) -> Any:
+    if isinstance(wanted, Observing):
+        levels = wanted.plan.stimulus.grid
+        curves = tuple(tuple(0.5 + 0.4 * share for _ in levels) for share in QUANTILES)
+        one = tuple(Asked(at + 1, 1 + at % 2, levels[at % len(levels)], at % 3 > 0) for at in range(20))
+        return Observed(
+            wanted.threshold, wanted.lapses, 400, 0.75, levels, curves[2], curves[::-1],
+            tuple((level, 1 / len(levels)) for level in levels), ((10, QUANTILES), (20, QUANTILES)), one, 0.26, 20,
+        )  # fmt: skip
+    if isinstance(wanted, Measuring):
+        return Measurable((0.05, 0.5), ())
+    if isinstance(wanted, Grouping):
+        return GroupPrecision(wanted.participants, 60, wanted.precision, 80, 0.93, 107, 0.98)
+    if isinstance(wanted, Detecting):
+        return Detectable(wanted.participants, 200, 7, (Finding("feels_liquid", 0.9), Finding("like_honey", None)))
+    return ("methods.adaptive.trials: more trials",)
+
+
+@pytest.fixture
+def worker(designer: Any) -> Worker:
+    made = Worker()
+    slow = designer.controller.measures.slow
+    slow.make = lambda: made
+    slow.rest.setInterval(30)
+    return made
+
+
+def jnd(designer: Any) -> None:
+    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.editing.select(("blocks", "viscosity"))
+    designer.place.pane.show_tab("measures")
+
+
+def shown(qtbot: Any, designer: Any, at: int, number: str) -> None:
+    part = designer.place.measures.numbers.parts[at]
+    qtbot.waitUntil(lambda: part.number.text() == number)
+
+
+def click(button: Any) -> None:
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, button.rect().center())
+
+
+def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, worker: Worker) -> None:
+    jnd(designer)
+    page = designer.place.measures
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    assert [type(one) for one in worker.orders[0].wanted] == [Observing, Grouping, Measuring, Advising]
+    assert page.numbers.parts[0].number.text() == UNKNOWN
+    assert page.numbers.parts[0].note.whole == ANEW
+    assert page.numbers.parts[3].number.text() != UNKNOWN  # how long it lasts is known at once
+    worker.answer()
+    shown(qtbot, designer, 0, "5 – 50")
+    shown(qtbot, designer, 1, "± 26")
+    shown(qtbot, designer, 2, "93")
+    assert page.function.accessibleDescription().startswith("Share of answers that are correct")
+    assert "19 %" in page.track.accessibleDescription()
+    assert page.forces.accessibleDescription().startswith("Force at 31 levels")
+
+    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
+    qtbot.waitUntil(lambda: len(worker.orders) == 2)
+    assert page.numbers.parts[1].note.whole == ANEW  # grey, with the number of before
+    assert page.numbers.parts[1].number.text() == "± 26"
+    assert page.function.shown.anew
+    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 100))
+    qtbot.waitUntil(lambda: worker.stops == 1)  # what was under way is given up
+    qtbot.waitUntil(lambda: len(worker.orders) == 3)
+    assert worker.orders[2].wanted[0].plan.trials == 100
+    designer.editing.undo()
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: not page.function.shown.anew)  # kept by what it depends on
+    qtbot.wait(120)
+    assert len(worker.orders) == 3
+    designer.editing.make("Change", Set(("pages", "welcome", "title"), "Hello"))
+    qtbot.wait(120)
+    assert len(worker.orders) == 3  # nothing depends on a text
+
+    designer.editing.make("Break", Set(("study", "version"), 1))
+    qtbot.waitUntil(lambda: not page.numbers.isVisible())
+    assert page.grid.parts[0].accessibleName() == "Session"
+    assert worker.stops >= 1
+
+
+def test_what_is_simulated_is_typed_at_the_right(qtbot: Any, designer: Any, worker: Worker) -> None:
+    jnd(designer)
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    controls = designer.place.measures.controls
+    for control, typed in ((controls.threshold, "30"), (controls.lapses, "5"), (controls.participants, "8")):
+        control.field.setFocus()
+        control.field.selectAll()
+        qtbot.keyClicks(control.field, typed)
+        qtbot.keyClick(control.field, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: worker.orders[-1].wanted[0].lapses == 0.05)
+    observing, grouping, measuring, _ = worker.orders[-1].wanted
+    assert (observing.threshold, measuring.lapses, grouping.participants) == (0.3, 0.05, 8)
+    qtbot.keyClick(controls.participants.field, Qt.Key.Key_Up)
+    qtbot.waitUntil(lambda: worker.orders[-1].wanted[1].participants == 9)
+    designer.editing.select(("pages", "welcome"))
+    qtbot.waitUntil(lambda: not controls.threshold.isVisible())
+    assert controls.participants.isVisible()
+
+
+@pytest.mark.usefixtures("worker")
+def test_a_clipped_level_is_repaired_by_its_button(qtbot: Any, designer: Any) -> None:
+    jnd(designer)
+    designer.editing.make("Change", Set(("stimuli", "damping", "standards"), [32]),
+                          Set(("stimuli", "damping", "levels"), [0.02, 0.75]))  # fmt: skip
+    page = designer.place.measures
+    qtbot.waitUntil(lambda: "forces" in page.cards and page.cards["forces"].repair.isVisible())
+    forces = page.cards["forces"]
+    assert [chip.word for chip in forces.chips] == ["29 of 31 as asked", "2 clipped"]
+    assert forces.words.text() == designer.place.view.problems[0].message
+    click(forces.repair)
+    assert designer.editing.opened.study.protocol is not None
+    highest = designer.editing.opened.study.document["stimuli"]["damping"]["levels"][1]
+    assert forces.repair.text() == f"Highest level {highest}"
+    qtbot.waitUntil(lambda: not forces.bar.isVisible())
+    designer.editing.undo()
+    assert designer.editing.opened.study.document["stimuli"]["damping"]["levels"][1] == 0.75
+
+
+def test_a_block_of_statements_shows_what_people_can_show(qtbot: Any, designer: Any, worker: Worker) -> None:
+    designer.controller.open("rek2024")
+    designer.editing.select(("blocks", "liquids"))
+    designer.place.pane.show_tab("measures")
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    (wanted,) = worker.orders[0].wanted
+    assert (wanted.block, wanted.participants) == ("liquids", 12)
+    grid = designer.place.measures.grid
+    titles = [part.accessibleName() for part in grid.parts]
+    assert titles[:4] == ["Session", "Balance", "What 12 people can show", "Force of each liquid"]
+    worker.answer()
+    qtbot.waitUntil(lambda: grid.cards[2].lines != ())
+    lines = [(line.title, line.number) for line in grid.cards[2].lines]
+    assert lines == [("Feels like a liquid", "0.9"), ("Like honey", UNKNOWN)]
+    kept = grid.parts[0]
+    designer.place.measures.controls.participants.entered.emit(14)
+    qtbot.waitUntil(lambda: grid.cards[1].participants == 14)
+    assert grid.parts[0] is kept  # only what changed is made anew
+    designer.place.pane.show_tab("file")
+    facts = designer.place.pane.facts
+    qtbot.waitUntil(lambda: facts.isVisible() and len(facts.grid.parts) == 4)
+    assert facts.grid.cards[2].anew  # what 12 can show, until the answer for 14 is there
+    assert [part.accessibleName() for part in facts.grid.parts] == titles[:4]
+
+
+def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> None:
+    designer.controller.measures.slow.rest.setInterval(10)
+    jnd(designer)
+    part = designer.place.measures.numbers.parts[1]
+    qtbot.waitUntil(lambda: part.note.whole == "not simulated")
+    assert designer.place.measures.numbers.parts[3].number.text() == "17"
+
+
+@pytest.mark.parametrize("size", [(1600, 1000), (1366, 768), (1024, 640)])
+@pytest.mark.parametrize("theme", [LIGHT, DARK])
+def test_every_element_has_measures_that_fit(
+    qtbot: Any, designer: Any, worker: Worker, size: tuple[int, int], theme: Any
+) -> None:
+    designer.window.show_theme(theme)
+    designer.window.resize(*size)
+    jnd(designer)
+    designer.place.sides.buttons[1].click()
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    worker.answer()
+    shown(qtbot, designer, 2, "93")
+    page = designer.place.measures
+    assert page.area.widget().minimumSizeHint().width() <= page.area.viewport().width()
+    for part in page.findChildren(QAbstractButton) + page.controls.findChildren(QLineEdit):
+        assert part.accessibleName() or part.text()
+    for path in (("liquids", "damper"), ("study",), ("designs", "pair"), ("tasks", "stir")):
+        designer.editing.select(path)
+        qtbot.waitUntil(lambda path=path: page.shown is not None and designer.editing.selected == path)
+        designer.controller.measures.show()
+        assert page.area.widget().minimumSizeHint().width() <= page.area.viewport().width(), path
+
+
+def test_instant_numbers_of_the_largest_study_take_less_than_100_ms(designer: Any) -> None:
+    text = shipped_file("rek2024").read_text(encoding="utf-8").replace('name = "rek2024"', 'name = "large"')
+    (designer.file.parent / "large.toml").write_text(text, encoding="utf-8")
+    designer.controller.open("large")
+    designer.editing.select(("blocks", "liquids"))
+    designer.place.pane.show_tab("measures")
+    spent = []
+    for number in range(6):
+        designer.editing.make("Change", Set(("device", "force_limit_n"), 4 + 0.1 * number))
+        began = time.perf_counter()
+        designer.controller.measures.show()
+        spent.append(time.perf_counter() - began)
+    assert min(spent) < 0.1
+
+
+@pytest.mark.nightly
+def test_the_worker_process_simulates_observers_and_studies() -> None:
+    protocol = template("viscosity-jnd").protocol
+    assert protocol is not None
+    plan = threshold_plan(protocol, protocol.blocks["viscosity"])
+    assert plan is not None
+    client = start_measure_worker()
+    plan = plan.with_trials(20)
+    client.order(MeasureOrder((Observing(plan, 0.2, 0.02), Grouping(plan, 6, 0.5))))
+    found: list[Any] = []
+    for _ in range(600):
+        found += client.answers(0.5)
+        if found and found[-1][1] is None:
+            break
+    client.close()
+    observed, group = (answer[1] for _, answer in found[:2])
+    assert observed.threshold == 0.2
+    assert 0.0 <= group.share <= 1.0
+    assert group.more_trials > group.trials == 20

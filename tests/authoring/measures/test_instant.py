@@ -1,0 +1,94 @@
+"""Instant measures: where limits begin, how long sessions are, which texts reveal a condition, when orders are even."""
+
+from __future__ import annotations
+
+import pytest
+
+from study_app.authoring.facts import facts
+from study_app.authoring.levels import levels, standard_of
+from study_app.authoring.measures.balance import balance_of
+from study_app.authoring.measures.felt import level_limits
+from study_app.authoring.measures.texts import revealing, text_keys, texts_by_language
+from study_app.authoring.study import Study, read
+from study_app.authoring.writer.edits import Set, Unset
+from study_app.haptics.model.limits import slope_limit
+from study_app.protocol.durations import duration_range_s, expected_duration_s
+from study_app.protocol.load import load, shipped
+from study_app.protocol.source.files import shipped_file
+
+
+def study_of(name: str) -> Study:
+    return read(shipped_file(name).read_bytes(), shipped_file(name).parent)
+
+
+@pytest.mark.parametrize(("name", "block"), [("viscosityjnd", "viscosity"), ("thickness", "thickness")])
+def test_a_limit_begins_where_levels_begin_to_be_clipped(name: str, block: str) -> None:
+    protocol = load(name)
+    limits = level_limits(protocol, block, max(one.comparison for one in levels(protocol, block)))
+    assert limits is not None
+    assert limits.force is not None
+    assert limits.loop is not None
+    first = min(limits.force, limits.loop)
+    assert standard_of(protocol, block, 0.999 * first).clipped_by is None
+    assert standard_of(protocol, block, 1.001 * first).clipped_by is not None
+    force = standard_of(protocol, block, limits.force).asked_n
+    assert force == pytest.approx(protocol.device.force_limit_n, rel=1e-3)
+    if name == "viscosityjnd":
+        loop = slope_limit(1 / protocol.device.rate_hz, 1, protocol.scene.velocity)
+        assert limits.loop == pytest.approx(loop, rel=1e-4)
+
+
+def test_numbers_of_a_condition_have_no_force_of_their_own() -> None:
+    for name in ("delaydetect", "forcedelay"):
+        protocol = load(name)
+        assert level_limits(protocol, "delay", 100.0) is None
+        assert {one.asked_n for one in levels(protocol, "delay")} == {None}
+
+
+def test_a_study_with_clipped_levels_still_has_its_numbers() -> None:
+    clipped, _ = study_of("viscosityjnd").edited(Set(("stimuli", "damping", "levels"), [0.02, 3]))
+    assert clipped.protocol is None
+    assert clipped.formed is not None
+    assert facts(clipped).trials
+    assert any(one.clipped_by for one in levels(clipped.formed, "viscosity"))
+    broken, _ = clipped.edited(Set(("study", "version"), 3))
+    assert broken.formed is None
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_the_expected_duration_lies_between_the_shortest_and_the_longest(name: str) -> None:
+    protocol = load(name)
+    least_s, most_s = duration_range_s(protocol)
+    assert least_s <= expected_duration_s(protocol) <= most_s
+
+
+def test_texts_are_counted_by_language() -> None:
+    study = study_of("rek2024")
+    (there, wanted), dutch = texts_by_language(study)["en"], texts_by_language(study)["nl"]
+    assert there == wanted > 50
+    assert dutch == (there, wanted)
+    lacking, _ = study.edited(Unset(("blocks", "liquids", "title", "nl")))
+    assert texts_by_language(lacking)["nl"] == (wanted - 1, wanted)
+    assert {"title", "body", "setting_label", "instruction"} <= text_keys()
+
+
+@pytest.mark.parametrize(("text", "word"), [("Now comes Light Oil", "light oil"), ("Seen 50 ms late", "50 ms")])
+def test_a_text_that_names_what_is_compared_is_found(text: str, word: str) -> None:
+    study = study_of("rek2024")
+    assert study.protocol is not None
+    assert revealing(study, study.protocol) == ()
+    told, _ = study.edited(Set(("blocks", "liquids", "setting_label", "en"), text))
+    assert told.protocol is not None
+    (found,) = revealing(told, told.protocol)
+    assert (found.path, found.word) == (("blocks", "liquids", "setting_label"), word)
+
+
+def test_an_order_is_even_at_full_rounds_of_its_square() -> None:
+    protocol = load("physical2")
+    block = protocol.blocks["liquids"]
+    even, uneven = balance_of(protocol, block, 12), balance_of(protocol, block, 13)
+    assert even is not None
+    assert uneven is not None
+    assert (even.rows, even.next_even, even.evenness.balanced) == (6, 12, True)
+    assert (uneven.next_even, uneven.evenness.balanced) == (18, False)
+    assert balance_of(protocol, protocol.blocks["practice"], 12) is None
