@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Final
 
+from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study import Study
 from study_app.haptics.model.steady_state import HAND_MPS, steady
 from study_app.protocol.describe import warnings
@@ -19,7 +20,7 @@ _MISSING: Final = re.compile(r'is missing in "([a-z]{2})"$')
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What a study is, in numbers; of a study with faults, other than forces beyond a limit, only the missing texts.
+    """What a study is, in numbers: those that depend on a broken element are not known.
 
     Attributes
     ----------
@@ -57,17 +58,24 @@ def facts(study: Study) -> Facts:
     for fault in study.faults:
         if found := _MISSING.match(fault.message):
             missing[found[1]] = missing.get(found[1], 0) + 1
-    if (protocol := study.formed) is None:
+    valid = valid_part(study)
+    if (protocol := valid.protocol) is None:
         return Facts(missing=missing)
-    orders, language = orders_of(protocol), protocol.study.languages[0]
-    return Facts(
-        expected_s=expected_duration_s(protocol),
-        range_s=duration_range_s(protocol),
+    language = protocol.study.languages[0]
+    known = Facts(
         steps_s={step: step_duration_s(protocol, step, language) for step in protocol.steps},
-        trials=sum(block.trials for block in orders.blocks),
-        answers=orders.answers,
-        breaks=sum(block.breaks for block in orders.blocks),
         forces_n={name: steady(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids},
         missing=missing,
         warnings=warnings(protocol, simulates=False),
+    )
+    if not valid.whole:
+        return known
+    orders = orders_of(protocol)
+    return replace(
+        known,
+        expected_s=expected_duration_s(protocol),
+        range_s=duration_range_s(protocol),
+        trials=sum(block.trials for block in orders.blocks),
+        answers=orders.answers,
+        breaks=sum(block.breaks for block in orders.blocks),
     )

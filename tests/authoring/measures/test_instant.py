@@ -9,12 +9,14 @@ from study_app.authoring.levels import levels, standard_of
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.felt import level_limits
 from study_app.authoring.measures.texts import revealing, text_keys, texts_by_language
+from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study import Study, read
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.haptics.model.limits import slope_limit
 from study_app.protocol.durations import duration_range_s, expected_duration_s
 from study_app.protocol.load import load, shipped
 from study_app.protocol.source.files import shipped_file
+from tests.protocol.cases import CASES
 
 
 def study_of(name: str) -> Study:
@@ -92,3 +94,36 @@ def test_an_order_is_even_at_full_rounds_of_its_square() -> None:
     assert (even.rows, even.next_even, even.evenness.balanced) == (6, 12, True)
     assert (uneven.next_even, uneven.evenness.balanced) == (18, False)
     assert balance_of(protocol, protocol.blocks["practice"], 12) is None
+
+
+def test_numbers_continue_while_a_text_is_missing() -> None:
+    study = study_of("rek2024")
+    lacking, _ = study.edited(Unset(("blocks", "liquids", "title", "nl")), Set(("study", "version"), 3))
+    assert lacking.formed is None
+    before, after = facts(study), facts(lacking)
+    assert (after.trials, after.answers, after.expected_s) == (before.trials, before.answers, before.expected_s)
+    assert after.missing == {"nl": 1}
+
+
+def test_numbers_that_depend_on_a_broken_element_are_not_known() -> None:
+    study = study_of("rek2024")
+    before = facts(study)
+    broken, _ = study.edited(Set(("blocks", "liquids", "repetitions"), -1))
+    after = facts(broken)
+    assert (after.trials, after.expected_s) == (None, None)
+    assert "liquids" not in after.steps_s
+    assert after.steps_s["delays"] == before.steps_s["delays"]
+    assert after.forces_n == before.forces_n
+    drowned, _ = study.edited(Set(("liquids", "honey", "density_kg_m3"), -5))
+    left = facts(drowned)
+    assert set(left.forces_n) == set(before.forces_n) - {"honey"}
+    assert left.forces_n["water"] == before.forces_n["water"]
+    assert "delays" in left.steps_s
+    unlimited, _ = study.edited(Set(("device", "force_limit_n"), 60))
+    assert facts(unlimited).forces_n == {}
+
+
+@pytest.mark.slow
+def test_something_can_be_measured_of_every_known_fault() -> None:
+    whole = sum(valid_part(read(case.text.encode())).protocol is not None for case in CASES)
+    assert whole > 0.6 * len(CASES)

@@ -14,6 +14,7 @@ from study_app.app.designer.repair_search import RepairSearch
 from study_app.authoring.facts import facts
 from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import Detectable, GroupPrecision
+from study_app.authoring.measures.valid_part import valid_part
 from study_app.gui.designer.view import DesignerPlace
 from study_app.viewmodels.designer.measures.level_plots import Simulated
 from study_app.viewmodels.designer.measures.level_words import LevelWords
@@ -80,7 +81,7 @@ class MeasuresController(QObject):
             self.slow.want(())
             return
         study, path = opened.study, opened.history.selected
-        protocol = study.formed
+        protocol = valid_part(study).protocol
         self._focus = focus = focus_of(protocol, path)
         controls = self._controls(focus)
         wanted = () if protocol is None else wanted_of(protocol, focus, controls)
@@ -101,15 +102,15 @@ class MeasuresController(QObject):
 
     def _controls(self, focus: Focus) -> Controls:
         opened = self._editing.opened
-        formed = None if opened is None else opened.study.formed
-        planned = participants_of(formed)
+        protocol = None if opened is None else valid_part(opened.study).protocol
+        planned = participants_of(protocol)
         participants = planned if self._participants is None else self._participants
         if focus.plan is None or focus.block is None:
             return Controls(participants, lapses=self._lapses)
         asked = self._thresholds.get(focus.block.id)
         low, high = focus.plan.stimulus.levels
         threshold = asked if asked is not None and low <= asked <= high else threshold_of(focus.plan)
-        return Controls(participants, threshold, self._lapses, precision_of(formed))
+        return Controls(participants, threshold, self._lapses, precision_of(protocol))
 
     def _results(self, wanted: tuple[Wanted, ...], focus: Focus, controls: Controls) -> SlowResults:
         """Return what is known of what is wanted; where nothing is, what was known of the block before."""

@@ -9,7 +9,7 @@ from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.number_field import NumberField
 from study_app.viewmodels.designer.measures.cards import ControlValues
 
-FIELD_PX = 52
+FIELD_PX = 48
 
 
 class Control(QWidget):
@@ -35,7 +35,7 @@ class Control(QWidget):
 
     def show_words(self, words: str, unit: str) -> None:
         """Call the number otherwise."""
-        self.words.setText(words)
+        self.words.setText(words.removeprefix("simulated "))
         self.unit.setText(unit)
         self.unit.setVisible(bool(unit))
         self.field.setAccessibleName(f"{words}, {unit}" if unit else words)
@@ -61,7 +61,7 @@ class MeasureControls(QWidget):
         self.participants = Control("participants", "", 1.0)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(12)
+        row.setSpacing(10)
         for part in (self.threshold, self.lapses, self.participants):
             row.addWidget(part)
         self.threshold.entered.connect(self.threshold_asked)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.measures.controls import MeasureControls
 from study_app.gui.designer.measures.parts import CardGrid, NumberPart
@@ -20,29 +20,42 @@ from study_app.viewmodels.designer.measures.cards import ANEW, ForcesPlot, Measu
 if TYPE_CHECKING:
     from study_app.gui.designer.measures.plots import ForcesView, FunctionView, TrackView
 
-NUMBERS = 4
+NUMBERS, ONE_ROW_FROM = 4, 600
 PLOT_PX, FORCES_PX = 300, 216
 FUNCTION_LEGEND = "Line: planted. Bands: 50 and 90 % of those found. Bars: how often a level is asked."
 TRACK_LEGEND = "Bands: 50 and 90 % of the estimates. Marks: the trials of one observer, filled if right."
 
 
 class NumbersRow(QWidget):
-    """Four numbers side by side."""
+    """Four numbers side by side, in narrow places two by two."""
 
     def __init__(self) -> None:
         super().__init__()
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(8)
+        self.grid = QGridLayout(self)
+        self.grid.setContentsMargins(0, 0, 0, 0)
+        self.grid.setSpacing(8)
         self.parts = [NumberPart() for _ in range(NUMBERS)]
-        for part in self.parts:
-            row.addWidget(part, 1)
+        self._columns = 0
+        self._lay(NUMBERS)
 
     def show_numbers(self, shown: tuple[NumberCard, ...]) -> None:
         """Show other numbers."""
         self.setVisible(bool(shown))
         for part, one in zip(self.parts, shown, strict=False):
             part.show_card(one)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Take two rows where one is too narrow."""
+        super().resizeEvent(event)
+        self._lay(NUMBERS if self.width() >= ONE_ROW_FROM else NUMBERS // 2)
+
+    def _lay(self, columns: int) -> None:
+        if columns != self._columns:
+            self._columns = columns
+            for at, part in enumerate(self.parts):
+                self.grid.addWidget(part, at // columns, at % columns)
+            for at in range(NUMBERS):
+                self.grid.setColumnStretch(at, int(at < columns))
 
 
 class PlotCard(Card):

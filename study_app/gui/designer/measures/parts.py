@@ -48,6 +48,7 @@ class NumberPart(Card):
 
     def __init__(self) -> None:
         super().__init__(padding=14, gap=2)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.shown: NumberCard | None = None
         self.title = Elided("small", "text2")
         self.number, self.unit = figures("", "number"), label("", "small", "text2")

@@ -46,6 +46,9 @@ class MeasurePlot(Plot):
         self.clear()
         if self.shown is not None:
             self.draw(self.shown)
+        else:
+            self.show_ticks("left", [])
+            self.show_ticks("bottom", [])
 
     def draw(self, shown: Any) -> None:
         """Draw a value in the colours of the theme."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from study_app.gui.designer.pane.facts import FactsRow
@@ -12,6 +13,7 @@ from study_app.gui.designer.segments import Segments
 from study_app.gui.widgets.cards import SHADOW
 
 FACTS_FROM = 740
+GAP = 24
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,9 @@ class RightPane(QWidget):
         self.tab = ""
         self.tabs = Segments("View of the study")
         self.facts = FactsRow()
-        self._asides = QHBoxLayout()
+        self._asides, self._below = QHBoxLayout(), QHBoxLayout()
+        self._below.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        self._below.addStretch()
         bar = QHBoxLayout()
         bar.setContentsMargins(SHADOW, 0, SHADOW, 0)
         bar.addWidget(self.tabs)
@@ -60,6 +64,7 @@ class RightPane(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(12 - 2 * SHADOW)
         column.addLayout(bar)
+        column.addLayout(self._below)
         column.addWidget(self._stack, 1)
         column.addWidget(self.facts)
         self.tabs.chosen.connect(lambda name: self.show_tab(str(name)))
@@ -81,9 +86,24 @@ class RightPane(QWidget):
         for one in self.pages:
             if one.aside is not None:
                 one.aside.setVisible(one is page)
+        self._place_aside()
         self.make_room()
         if changed:
             self.tab_shown.emit(name)
+
+    def _place_aside(self) -> None:
+        """Put the controls of the page at the right of the tabs, or below them where there is no room."""
+        aside = next((one.aside for one in self.pages if one.name == self.tab), None)
+        if aside is not None:
+            needed = self.tabs.sizeHint().width() + aside.sizeHint().width() + GAP
+            row = self._asides if needed <= self.width() else self._below
+            if row.indexOf(aside) < 0:
+                row.addWidget(aside)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Put the controls where there is room."""
+        super().resizeEvent(event)
+        self._place_aside()
 
     def make_room(self) -> None:
         """Hide the facts where the window is too low for them, or the page takes their place."""

@@ -8,6 +8,7 @@ from typing import Final
 
 from study_app.authoring.facts import Facts
 from study_app.authoring.measures.planned import Detectable
+from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study import Study
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
@@ -139,7 +140,7 @@ def measures_view(
     problems : mapping
         The problems of the study, each with the words of its repairs as far as they were found.
     """
-    protocol = study.formed
+    protocol = valid_part(study).protocol
     focus = focus_of(protocol, path)
     block, values = focus.block, control_values(protocol, focus, controls)
     waiting = ANEW if slow.waits else ""
@@ -166,7 +167,7 @@ def _others(study: Study, facts: Facts, path: Path, slow: SlowResults) -> list[C
 
 def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, slow: SlowResults) -> list[Card]:
     """Return the cards of an element without simulated tracks, those that concern it first."""
-    protocol, block = study.formed, focus.block
+    protocol, block = valid_part(study).protocol, focus.block
     found: list[Card] = [cards.session_card(study, facts, path)]
     if protocol is None:
         return [*found, cards.texts_card(study)]

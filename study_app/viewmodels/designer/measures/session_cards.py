@@ -11,6 +11,7 @@ from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.felt import forces
 from study_app.authoring.measures.planned import Detectable
 from study_app.authoring.measures.texts import revealing, texts_by_language
+from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.haptics.model.gate import calls_for
@@ -85,7 +86,7 @@ def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     found: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
     if not missing:
         found = [("ok", "check", f"Every text in {languages}")]
-    if (protocol := study.formed) is not None:
+    if (protocol := valid_part(study).protocol) is not None:
         revealed = revealing(study, protocol)
         named = f"{revealed[0].element}: “{revealed[0].word}” reveals a condition" if revealed else ""
         more = f", and {len(revealed) - 1} more" if len(revealed) > 1 else ""
@@ -162,8 +163,8 @@ def texts_card(study: Study) -> TextsCard:
     for code, (there, wanted) in texts_by_language(study).items():
         verdict: Verdict = ("ok", "check", "complete") if there == wanted else ("bad", "warning", "texts are missing")
         lines.append(Line(_language(code), f"{there} of {wanted}", there / max(1, wanted), verdict))
-    formed = study.formed
-    found = () if formed is None else revealing(study, formed)
+    protocol = valid_part(study).protocol
+    found = () if protocol is None else revealing(study, protocol)
     revealed = tuple((f"{one.element}, {one.key.lower()}: “{one.word}”", one.path) for one in found)
     return TextsCard(tuple(lines), revealed)
 

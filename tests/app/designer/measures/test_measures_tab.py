@@ -141,6 +141,9 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     assert len(worker.orders) == 3  # nothing depends on a text
 
     designer.editing.make("Break", Set(("study", "version"), 1))
+    qtbot.wait(120)
+    assert page.numbers.isVisible()  # nothing of them depends on the version
+    designer.editing.make("Break", Set(("device", "force_limit_n"), 60))
     qtbot.waitUntil(lambda: not page.numbers.isVisible())
     assert page.grid.parts[0].accessibleName() == "Session"
     assert worker.stops >= 1

@@ -1,0 +1,130 @@
+"""What of a study with faults can be measured: without its broken elements, with a text for each that is wrong."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final
+
+from study_app.authoring.measures.texts import text_keys
+from study_app.authoring.study import Study
+from study_app.protocol.load import examined
+from study_app.protocol.model import Protocol
+from study_app.protocol.source.document import Path, has
+from study_app.protocol.source.problems import Fault
+
+ROUNDS: Final = 8
+"""Leaving one element out may break those that name it: so often the rest is examined again."""
+_PART: Final = re.compile(r"must be (\d+) at its place in sequence")
+TEXT: Final = "…"
+_MISSING: Final = re.compile(r'is missing in "([a-z]{2})"$')
+_STAND_IN: Final = {("study", "version"): "1", ("study", "name"): "study", ("study", "title"): TEXT}
+_LEFT_OUT: Final = ("analysis", "limits")
+"""Tables that no session needs."""
+
+
+@dataclass(frozen=True, slots=True)
+class ValidPart:
+    """What can be measured of a study.
+
+    Attributes
+    ----------
+    protocol : Protocol or None
+        The study without its broken elements; None where everything depends on what is broken.
+    whole : bool
+        Whether no element was left out, so that sums over the session are known.
+    """
+
+    protocol: Protocol | None
+    whole: bool
+
+
+@lru_cache(maxsize=2)
+def valid_part(study: Study) -> ValidPart:
+    """Return what can be measured of a study."""
+    if study.formed is not None or not study.is_toml:
+        return ValidPart(study.formed, whole=study.formed is not None)
+    document: Any = study.document
+    faults: list[Fault] = list(study.faults)
+    whole = True
+    for number in range(ROUNDS):
+        for fault in sorted(faults, key=_place, reverse=True):
+            place, value = _mended(document, fault, of_others=number > 0)
+            if not place:
+                return ValidPart(None, whole=False)
+            if not _is_there(document, place) and value is None:
+                continue  # another fault of the same element left it out
+            whole = whole and (value is not None or fault.message == "unknown key" or place[0] in _LEFT_OUT)
+            document = _with(document, place, value)
+        protocol, faults = examined(document)
+        if protocol is not None:
+            return ValidPart(protocol, whole)
+    return ValidPart(None, whole=False)
+
+
+def _place(fault: Fault) -> tuple[str, ...]:
+    """Return a key by which later entries of a list come after earlier ones."""
+    return tuple(f"{step:06}" if isinstance(step, int) else step for step in fault.path)
+
+
+def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]:
+    """Return the place to change because of a fault, and its value (None leaves it out); () where nothing helps.
+
+    A key that is wrong only because another element was left out (``of_others``) is left out before its own element.
+    """
+    path = fault.path
+    if (missing := _MISSING.search(fault.message)) is not None and path and path[-1] != missing[1]:
+        known = _at(document, path)
+        others = known.values() if isinstance(known, Mapping) else ()
+        return (*path, missing[1]), next(iter(others), TEXT)
+    if fault.message == "unknown key":
+        return path, None
+    if (part := _PART.search(fault.message)) is not None:
+        return path, int(part[1])
+    for length in range(len(path), 1, -1):
+        if path[length - 1] in text_keys():
+            return path[:length], _text(document)
+    if path[:2] in _STAND_IN:
+        return path[:2], _STAND_IN[path[0], path[1]]  # type: ignore[index]
+    if path[:1] and path[0] in _LEFT_OUT:
+        return path[:1], None
+    listed = len(path) > 1 and isinstance(path[-1], int) and isinstance(_at(document, path), str)
+    if listed:
+        return path, None
+    if of_others and len(path) > 2 and _is_there(document, path[:3]):
+        return path[:3], None
+    return (path[:2], None) if len(path) > 1 and isinstance(_at(document, path[:2]), Mapping) else ((), None)
+
+
+def _text(document: Any) -> Any:
+    codes = [str(code) for code in document.get("study", {}).get("languages", ())]
+    return dict.fromkeys(codes, TEXT) if len(codes) > 1 else TEXT
+
+
+def _at(document: Any, path: Path) -> Any:
+    for step in path:
+        if not has(document, step):
+            return None
+        document = document[step]
+    return document
+
+
+def _is_there(document: Any, path: Path) -> bool:
+    return _at(document, path) is not None
+
+
+def _with(document: Any, path: Path, value: Any) -> Any:
+    """Return a document with another value at a path, without it where the value is None."""
+    step, *rest = path
+    if isinstance(document, tuple) and isinstance(step, int):
+        if not rest and value is None:
+            return document[:step] + document[step + 1 :]
+        return (*document[:step], _with(document[step], tuple(rest), value) if rest else value, *document[step + 1 :])
+    if not isinstance(document, Mapping):
+        return document
+    changed = {key: inner for key, inner in document.items() if key != step}
+    if rest:
+        return {**changed, step: _with(document.get(step, {}), tuple(rest), value)}
+    return changed if value is None else {**changed, step: value}
