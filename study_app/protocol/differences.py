@@ -7,7 +7,7 @@ is said only that they differ.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import block_codes
@@ -16,6 +16,22 @@ from study_app.protocol.source.problems import shown
 CONDITIONS_DIFFER = "conditions differ"
 
 _HIDDEN = ("conditions", "liquids")
+
+
+Place: TypeAlias = tuple[str | int, ...]
+"""Where two protocols differ: keys, ids of entries, and indices from 0."""
+
+
+class Difference(NamedTuple):
+    """One place where two protocols differ, and how."""
+
+    place: Place
+    words: str
+
+    @property
+    def sentence(self) -> str:
+        """The place as people read it, entries counted from 1, and how it differs."""
+        return f"{'.'.join(str(step + 1) if isinstance(step, int) else step for step in self.place)}: {self.words}"
 
 
 def differences(old: Protocol | Mapping[str, Any], new: Protocol | Mapping[str, Any]) -> tuple[str, ...]:
@@ -28,10 +44,15 @@ def differences(old: Protocol | Mapping[str, Any], new: Protocol | Mapping[str, 
     before, after = _tables(old), _tables(new)
     _drop_unknown_comparisons(before, after)
     hidden = [_take_hidden(tables) for tables in (before, after)]
-    found = list(_differences("", before, after))
+    found = [one.sentence for one in document_differences(before, after)]
     if any(hidden[0][place] != hidden[1][place] for place in hidden[0].keys() & hidden[1].keys()):
         found.append(CONDITIONS_DIFFER)
     return tuple(found)
+
+
+def document_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> tuple[Difference, ...]:
+    """Return each place where two documents differ, conditions included; arrays are lists."""
+    return tuple(_differences((), old, new))
 
 
 def _tables(protocol: Protocol | Mapping[str, Any]) -> dict[str, Any]:
@@ -64,22 +85,22 @@ def _take_hidden(tables: dict[str, Any]) -> dict[str, Any]:
     return hidden
 
 
-def _differences(place: str, old: Any, new: Any) -> Iterator[str]:
+def _differences(place: Place, old: Any, new: Any) -> Iterator[Difference]:
     """Yield the differences below a place; a key that is None is as good as missing."""
     if _by_id(old) and _by_id(new):
         yield from _listed(place, old, new)
     elif isinstance(old, Mapping) and isinstance(new, Mapping):
         for key in dict.fromkeys((*old, *new)):
-            yield from _differences(f"{place}.{key}".lstrip("."), old.get(key), new.get(key))
+            yield from _differences((*place, key), old.get(key), new.get(key))
     elif isinstance(old, list) and isinstance(new, list):
         yield from _entries(place, old, new)
     elif old is None and new is not None:
-        yield f"{place}: new, {shown(new)}"
+        yield Difference(place, f"new, {shown(new)}")
     elif new is None and old is not None:
-        yield f"{place}: gone, it was {shown(old)}"
+        yield Difference(place, f"gone, it was {shown(old)}")
     elif old != new:
         before, after = shown(old), shown(new)
-        yield f"{place}: {before} before, {after} now" if before != after else f"{place}: another text or number"
+        yield Difference(place, f"{before} before, {after} now" if before != after else "another text or number")
 
 
 def _by_id(value: Any) -> bool:
@@ -87,18 +108,18 @@ def _by_id(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(entry, Mapping) and "id" in entry for entry in value)
 
 
-def _listed(place: str, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def _listed(place: Place, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]) -> Iterator[Difference]:
     """Compare tables with ids by their ids, and then the order of those that stayed."""
     before, after = ({entry["id"]: entry for entry in entries} for entries in (old, new))
     yield from _differences(place, before, after)
     stayed = before.keys() & after.keys()
     if [name for name in before if name in stayed] != [name for name in after if name in stayed]:
-        yield f"{place}: in another order"
+        yield Difference(place, "in another order")
 
 
-def _entries(place: str, old: Sequence[Any], new: Sequence[Any]) -> Iterator[str]:
+def _entries(place: Place, old: Sequence[Any], new: Sequence[Any]) -> Iterator[Difference]:
     if len(old) == len(new):
-        for number, (before, after) in enumerate(zip(old, new, strict=True), start=1):
-            yield from _differences(f"{place}.{number}", before, after)
+        for index, (before, after) in enumerate(zip(old, new, strict=True)):
+            yield from _differences((*place, index), before, after)
     else:
-        yield f"{place}: {len(old)} entries before, {len(new)} now"
+        yield Difference(place, f"{len(old)} entries before, {len(new)} now")
