@@ -7,8 +7,8 @@ import pickle
 import pytest
 
 from study_app import errors
-from study_app.authoring.drafts import ChangedOutsideError
 from study_app.authoring.study import Refused
+from study_app.authoring.versions.contents import ChangedOutsideError
 from study_app.devices.falcon.boot import BootFailure
 from study_app.devices.falcon.failures import FalconFailure, FalconLost, FalconNotFound, ProgramMissing, UsbFailure
 from study_app.devices.falcon.homing import NotHomed

@@ -1,19 +1,19 @@
-"""Drafts: what was edited and not saved, kept within a second; and saving a study's file.
+"""Drafts: what was edited and not saved, kept within a second.
 
-A draft is one file in the user's data folder, written whole or not at all. Only `save` writes the protocol file.
+A draft is one file in the user's data folder, written whole or not at all. Where two programs edit one study, each
+keeps the other's draft as a version before it writes its own.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
+from study_app.authoring.versions.contents import file_key, keep_version, write_whole
 from study_app.errors import StoreError
-from study_app.store.atomic import write_file
 from study_app.user_folder import data_folder
 
 REST_S: Final = 0.5
@@ -44,19 +44,28 @@ class Draft:
 
 
 class Keeper:
-    """Keeps the draft of one study: at most `REST_S` after an edit, however fast edits follow each other."""
+    """Keeps the draft of one study: at most `REST_S` after an edit, however fast edits follow each other.
+
+    ``others`` counts the drafts of other programs that were kept as versions.
+    """
 
     def __init__(self, file: Path, base: str) -> None:
+        self.base = base
+        self.others = 0
         self._file = file
-        self._base = base
+        self._own: str | None = None
         self._pending: Draft | None = None
         self._due_s = 0.0
+
+    def take(self, draft: Draft) -> None:
+        """Go on with a draft that was found."""
+        self._own = draft.text
 
     def edited(self, text: str, selected: Selection, now_s: float) -> None:
         """Note an edit at a time of a monotonic clock [s]."""
         if self._pending is None:
             self._due_s = now_s + REST_S
-        self._pending = Draft(text, self._base, selected)
+        self._pending = Draft(text, self.base, selected)
 
     def write_if_due(self, now_s: float) -> bool:
         """Write the draft if it is due; return whether it was written.
@@ -78,19 +87,27 @@ class Keeper:
         """
         if self._pending is None:
             return False
+        other = draft_of(self._file)
+        if other is not None and other.text not in {self._own, self._pending.text}:
+            keep_version(self._file, other.text.encode(), "draft")
+            self.others += 1
         keep(self._file, self._pending)
-        self._pending = None
+        self._own, self._pending = self._pending.text, None
         return True
 
     def saved(self, base: str) -> None:
-        """Forget the draft: the file holds it."""
-        self._base, self._pending = base, None
-        discard(self._file)
+        """Forget the draft: the file holds it. The draft of another program stays.
 
-
-def content_hash(content: bytes) -> str:
-    """Return the SHA-256 of a file's content, in hexadecimal."""
-    return hashlib.sha256(content).hexdigest()
+        Raises
+        ------
+        StoreError
+            It cannot be deleted.
+        """
+        self.base, self._pending = base, None
+        other = draft_of(self._file)
+        if other is None or other.text == self._own:
+            discard(self._file)
+        self._own = None
 
 
 def keep(file: Path, draft: Draft) -> None:
@@ -109,7 +126,7 @@ def keep(file: Path, draft: Draft) -> None:
         "kept_at": datetime.now(UTC).astimezone().isoformat(timespec="seconds"),
         "text": draft.text,
     }
-    _write(path, json.dumps(kept, ensure_ascii=False).encode())
+    write_whole(path, json.dumps(kept, ensure_ascii=False).encode())
 
 
 def draft_of(file: Path) -> Draft | None:
@@ -150,87 +167,5 @@ def discard(file: Path) -> None:
         raise StoreError(f"the draft of {file} cannot be deleted: {error.strerror}") from error
 
 
-class ChangedOutsideError(StoreError):
-    """The file is not the one that was edited; nothing was written."""
-
-
-def save(file: Path, text: str, base: str) -> str:
-    """Write a study's file in one step and return its hash; its previous content is kept (`kept_content`).
-
-    Parameters
-    ----------
-    file : Path
-        The protocol file; its permissions stay, and a link stays a link.
-    text : str
-        The whole text, with its own line breaks.
-    base : str
-        `content_hash` of the content that the text was edited from; "" for a new file.
-
-    Raises
-    ------
-    ChangedOutsideError
-        The file has another content than ``base``, or is already there.
-    StoreError
-        It cannot be written.
-    """
-    target = file.resolve()
-    mode = None
-    if target.exists():
-        content, mode = _content(target), target.stat().st_mode & 0o777
-        if content_hash(content) != base:
-            raise ChangedOutsideError(f"{file} was changed by another program: compare it with the edits, then choose")
-        keep_content(content)
-    elif base:
-        raise ChangedOutsideError(f"{file} was deleted or moved by another program: save it as another study")
-    source = text.encode()
-    _write(target, source)
-    if mode is not None:
-        target.chmod(mode)
-    keep_content(source)
-    return content_hash(source)
-
-
-def keep_content(content: bytes) -> None:
-    """Keep one content of a study's file by its hash.
-
-    Raises
-    ------
-    StoreError
-        It cannot be written.
-    """
-    path = _content_file(content_hash(content))
-    if not path.exists():
-        _write(path, content)
-
-
-def kept_content(hash_: str) -> bytes | None:
-    """Return the content of a hash; None where none was kept, or it was changed since."""
-    try:
-        content = _content_file(hash_).read_bytes()
-    except OSError:
-        return None
-    return content if content_hash(content) == hash_ else None
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise StoreError(f"{path} cannot be read: {error.strerror}") from error
-
-
-def _write(path: Path, content: bytes) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"{path.parent} cannot be made: {error.strerror}") from error
-    write_file(path, content)
-
-
 def _draft_file(file: Path) -> Path:
-    name = content_hash(str(file.resolve()).encode("utf-8", "surrogatepass"))
-    return data_folder() / "drafts" / f"{name[:32]}.json"
-
-
-def _content_file(hash_: str) -> Path:
-    return data_folder() / "contents" / f"{hash_}.toml"
+    return data_folder() / "drafts" / f"{file_key(file)}.json"

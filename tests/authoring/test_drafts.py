@@ -10,19 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from study_app.authoring.drafts import (
-    REST_S,
-    ChangedOutsideError,
-    Draft,
-    Keeper,
-    content_hash,
-    discard,
-    draft_of,
-    drafted_files,
-    keep,
-    kept_content,
-    save,
-)
+from study_app.authoring.drafts import REST_S, Draft, Keeper, discard, draft_of, drafted_files, keep
+from study_app.authoring.versions.contents import kept_content, kept_versions
 from study_app.errors import StoreError
 from study_app.user_folder import data_folder
 
@@ -74,33 +63,19 @@ def test_keeper_writes_within_its_rest_however_fast_edits_follow(tmp_path: Path)
     assert draft_of(tmp_path / "a.toml") is None
 
 
-def test_save_replaces_the_file_keeps_its_permissions_and_its_previous_content(tmp_path: Path) -> None:
-    file, link = tmp_path / "study.toml", tmp_path / "link.toml"
-    file.write_bytes(b"a = 1\r\n")
-    file.chmod(0o640)
-    link.symlink_to(file)
-    base = content_hash(b"a = 1\r\n")
-    after = save(link, "a = 2\r\n", base)
-    assert file.read_bytes() == b"a = 2\r\n"
-    assert link.is_symlink()
-    assert file.stat().st_mode & 0o777 == 0o640
-    assert kept_content(base) == b"a = 1\r\n"
-    assert kept_content(after) == b"a = 2\r\n"
-    assert kept_content("0" * 64) is None
-
-
-def test_save_refuses_a_file_that_another_program_changed(tmp_path: Path) -> None:
-    file = tmp_path / "study.toml"
-    base = save(file, "a = 1\n", "")
-    with pytest.raises(ChangedOutsideError, match="changed by another program"):
-        save(file, "a = 2\n", "")
-    file.write_text("b = 1\n")
-    with pytest.raises(ChangedOutsideError, match="changed by another program"):
-        save(file, "a = 2\n", base)
-    assert file.read_text() == "b = 1\n"
-    file.unlink()
-    with pytest.raises(ChangedOutsideError, match="deleted or moved"):
-        save(file, "a = 2\n", base)
+def test_the_draft_of_another_program_is_kept_as_a_version_and_not_discarded(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    one, other = Keeper(file, ""), Keeper(file, "")
+    for keeper, text in ((one, "mine"), (other, "yours"), (one, "mine again")):
+        keeper.edited(text, (), 0.0)
+        keeper.write()
+    assert [kept_content(kept.hash) for kept in kept_versions(file)] == [b"mine", b"yours"]
+    assert {kept.origin for kept in kept_versions(file)} == {"draft"}
+    assert (one.others, other.others) == (1, 1)
+    other.saved("hash")
+    assert draft_of(file) is not None
+    one.saved("hash")
+    assert draft_of(file) is None
 
 
 def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,8 @@ from study_app.app.designer.open_study import OpenStudy, open_file, open_new, op
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.app.designer.saving import Saving
 from study_app.app.designer.studies import header_state, new_choices, studies
+from study_app.app.designer.versions.changes import ChangesController
+from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.facts import facts
 from study_app.authoring.names import renamed
@@ -52,7 +54,9 @@ class DesignerController(QObject):
         super().__init__()
         self.place = place = DesignerPlace()
         self.editing = editing = Editing(results, self)
-        self.saving = Saving(editing, place)
+        self.runs = KnownRuns(editing)
+        self.saving = Saving(editing, place, self.runs)
+        self.changes = ChangesController(editing, place, self.runs)
         Clipboard(editing, place)
         self._others: dict[Path, OpenStudy] = {}
         self._warnings: tuple[str, ...] = ()
@@ -82,6 +86,9 @@ class DesignerController(QObject):
         editing.made.connect(self._show_step)
         self.saving.kept.connect(self._show_header)
         self.saving.copy_asked.connect(self.ask_for_new)
+        self.saving.continued.connect(self._take)
+        self.saving.compare_asked.connect(self.changes.compare_with)
+        self.runs.changed.connect(self._show_header)
         self._repairs.found.connect(place.show_repairs)
         self.measures = MeasuresController(editing, place, self._repairs)
 
@@ -91,6 +98,7 @@ class DesignerController(QObject):
         """Look again at what there is; a file that another program changed is taken in where nothing was edited."""
         self._choices = studies(None if self.editing.opened is None else self.editing.opened.file)
         self.saving.look_again()
+        self.runs.look()
         self.show()
 
     def open(self, source: str) -> None:
@@ -226,7 +234,7 @@ class DesignerController(QObject):
             self._show_header()
 
     def _header(self) -> HeaderState:
-        return header_state(self.editing.opened, self._choices, len(self._warnings))
+        return header_state(self.editing.opened, self._choices, len(self._warnings), self.runs.chip)
 
     def _show_header(self) -> None:
         self.place.show_header(self._header())

@@ -147,6 +147,13 @@ class Editing(QObject):
             self._joins = (None, 0.0)
             self._note()
 
+    def type_text(self, words: str, text: str) -> None:
+        """Give the file another text, as a step of its own."""
+        if (opened := self.writable) is not None:
+            opened.history = opened.history.typed(words, text)
+            self._joins = (None, 0.0)
+            self._note()
+
     def undo(self) -> None:
         """Undo the last step."""
         self._travel(History.undo)

@@ -8,14 +8,15 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-from study_app.authoring.drafts import Draft, Keeper, content_hash, draft_of, drafted_files, save
+from study_app.authoring.drafts import Draft, Keeper, draft_of, drafted_files
 from study_app.authoring.history import History
 from study_app.authoring.new_study import check_free, copy_of
 from study_app.authoring.study import Study, read
-from study_app.authoring.versions import check_saving, runs
+from study_app.authoring.versions.contents import content_hash, keep_content, save
+from study_app.authoring.versions.runs import Run, Standing, check_saving, standing
 from study_app.authoring.writer.edits import Set
 from study_app.errors import StoreError
-from study_app.protocol.source.files import protocol_hash, shipped, shipped_file
+from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.source.liquid_files import with_liquid_files
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import is_open
@@ -24,6 +25,7 @@ from study_app.viewmodels.designer.outline_rows import FIRST
 from study_app.workspace import workspace
 
 RESTORE: Final = "Restore the draft"
+DEFAULT_VERSION: Final = "1"
 
 
 @dataclass
@@ -127,8 +129,29 @@ class OpenStudy:
         self.rebase(content_hash(content) if self.file.exists() else "")
         self.note_edit(now_s)
 
-    def save(self, results: Path) -> None:
-        """Write the file.
+    @property
+    def name(self) -> str:
+        """The name of the study, which its results folder has, too."""
+        return str(value_at(self.study.document, ("study", "name")) or "")
+
+    @property
+    def version(self) -> str:
+        """The version that the study states, or the one that counts where it states none."""
+        stated = value_at(self.study.document, ("study", "version"))
+        return str(stated) if stated is not None else DEFAULT_VERSION
+
+    def source(self) -> bytes:
+        """Return what a session would be run with: the text, and the liquid files that it names."""
+        return with_liquid_files(self.study.text.encode(), self.study.folder)
+
+    def standing(self, known: tuple[Run, ...]) -> Standing:
+        """Return how the study stands to what was run."""
+        file = with_liquid_files(self.saved.encode(), self.study.folder)
+        base = content_hash(file) if self.base else ""
+        return standing(content_hash(self.source()), base, self.version, known)
+
+    def save(self, known: tuple[Run, ...]) -> None:
+        """Write the file, and keep what sessions will be run with.
 
         Raises
         ------
@@ -137,15 +160,28 @@ class OpenStudy:
         StoreError
             It cannot be written, or was changed outside.
         """
-        study = self.study
-        name, version = (str(value_at(study.document, ("study", key))) for key in ("name", "version"))
-        sound = study.protocol is not None
-        hash_ = protocol_hash(with_liquid_files(study.text.encode(), study.folder)) if sound else ""
-        check_saving(hash_, version, runs(results, name))
-        self.base = save(self.file, study.text, self.base)
-        self.saved = study.text
+        source = self.source()
+        check_saving(content_hash(source), self.version, known)
+        self.base = save(self.file, self.study.text, self.base)
+        self.saved = self.study.text
         self.keeper.saved(self.base)
         self.kept = self.draft = None
+        keep_content(source)
+
+    def saved_as(self, name: str) -> OpenStudy:
+        """Return the study with its edits under another name, as one step; this one goes back to its file.
+
+        Raises
+        ------
+        Refused
+            The name is not permitted, or taken.
+        StoreError
+            The draft of this one cannot be deleted.
+        """
+        file = check_free(name)
+        made = OpenStudy(file, self.history.typed(f"Save as {name}", copy_of(self.study, name).text))
+        self.discard_draft()
+        return made
 
     def set_version(self, version: str) -> None:
         """Give the study another version, as one step."""
@@ -153,8 +189,7 @@ class OpenStudy:
 
     def rebase(self, base: str) -> None:
         """Take edits as made from the content of another hash."""
-        self.base = base
-        self.keeper = Keeper(self.file, base)
+        self.base = self.keeper.base = base
 
 
 def open_file(file: Path, results: Path) -> OpenStudy:
@@ -170,7 +205,7 @@ def open_file(file: Path, results: Path) -> OpenStudy:
     content = _content(file)
     study = read(content, file.parent)
     opened = OpenStudy(file, History(study, first_element(study.document)), content_hash(content), study.text)
-    opened.read_only = _why_read_only(opened, results)
+    opened.read_only = why_read_only(opened, results)
     return opened if opened.read_only else _with_draft(opened)
 
 
@@ -189,7 +224,9 @@ def open_new(study: Study, name: str) -> OpenStudy:
 
 def open_unsaved(file: Path, draft: Draft) -> OpenStudy:
     """Open a study that was never saved, from its draft."""
-    return OpenStudy(file, History(Study(draft.text, file.parent), draft.selected or FIRST), draft=draft)
+    opened = OpenStudy(file, History(Study(draft.text, file.parent), draft.selected or FIRST), draft=draft)
+    opened.keeper.take(draft)
+    return opened
 
 
 def unsaved_studies() -> tuple[Path, ...]:
@@ -200,21 +237,24 @@ def unsaved_studies() -> tuple[Path, ...]:
 
 def _with_draft(opened: OpenStudy) -> OpenStudy:
     draft = draft_of(opened.file)
-    if draft is not None and draft.text != opened.saved:
+    if draft is None:
+        return opened
+    opened.keeper.take(draft)
+    if draft.text != opened.saved:
         opened.draft = draft
         opened.history = opened.history.typed(RESTORE, draft.text)
         opened.rebase(draft.base)
     return opened
 
 
-def _why_read_only(opened: OpenStudy, results: Path) -> str:
+def why_read_only(opened: OpenStudy, results: Path) -> str:
+    """Return why a study cannot be changed at this moment, "" where it can."""
     file = opened.file.resolve()
     if any(file == shipped_file(name).resolve() for name in shipped()):
         return "This study ships with the program. Make a copy to change it."
-    if not os.access(opened.file, os.W_OK):
+    if opened.base and not os.access(opened.file, os.W_OK):
         return "You may not write this file. Make a copy to change it."
-    name = str(value_at(opened.study.document, ("study", "name")))
-    if any(is_open(session.path) for session in StudyFolder(results / name).sessions()):
+    if any(is_open(session.path) for session in StudyFolder(results / opened.name).sessions()):
         return "A session of this study is under way. Make a copy, or wait until it has ended."
     return ""
 

@@ -18,6 +18,7 @@ from study_app.protocol.source.document import has
 from study_app.protocol.source.files import find, shipped, shipped_file
 from study_app.viewmodels.designer.new_study import TEMPLATES, TemplateChoice, copy_choice, template_choice
 from study_app.viewmodels.designer.outline_rows import FIRST
+from study_app.viewmodels.designer.versions.standing import VersionChip
 from study_app.viewmodels.designer.view import HeaderState, StudyChoice, problems_chip
 from study_app.viewmodels.home import holds_liquids_alone, is_shipped, sources
 
@@ -34,7 +35,9 @@ def studies(opened: Path | None) -> tuple[StudyChoice, ...]:
     )
 
 
-def header_state(opened: OpenStudy | None, choices: tuple[StudyChoice, ...], warnings: int) -> HeaderState:
+def header_state(
+    opened: OpenStudy | None, choices: tuple[StudyChoice, ...], warnings: int, version: VersionChip
+) -> HeaderState:
     """Return the header's state of the open study; ``warnings`` is how many it has."""
     if opened is None:
         return HeaderState(choices)
@@ -51,6 +54,7 @@ def header_state(opened: OpenStudy | None, choices: tuple[StudyChoice, ...], war
         history.undone[-1].words if history.undone else "",
         not opened.read_only and (opened.edited or not opened.base),
         bool(opened.read_only),
+        version,
     )
 
 

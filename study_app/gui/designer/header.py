@@ -19,10 +19,11 @@ NEW, OPEN = "\0new", "\0open"
 
 
 class ChipButton(Themed, PressedByEnter):
-    """A chip that is pressed."""
+    """A chip that is pressed; ``does`` says what follows."""
 
-    def __init__(self) -> None:
+    def __init__(self, does: str) -> None:
         super().__init__()
+        self._does = does
         self.setProperty("role", "plain")
         self.setProperty("dense", "true")
         self._state: tuple[Tone, str, str] = ("ok", "check", "")
@@ -31,7 +32,7 @@ class ChipButton(Themed, PressedByEnter):
     def show_state(self, tone: Tone, icon: str, words: str) -> None:
         """Show another state."""
         self._state = (tone, icon, words)
-        self.setAccessibleName(f"{words}: show the list")
+        self.setAccessibleName(f"{words}: {self._does}")
         size = chip_size(words, small=False)
         self.setFixedSize(size.width(), 32)
         self.update()
@@ -73,7 +74,8 @@ class DesignerHeader(QWidget):
         self.study.setFont(font("body"))
         self.study.setMinimumWidth(190)
         self.study.setPlaceholderText("Choose a study")
-        self.problems = ChipButton()
+        self.problems = ChipButton("show the list")
+        self.version = ChipButton("show the changes")
         self.draft = Chip("neutral", "save", "")
         self.undo = IconButton("undo", "Undo")
         self.redo = IconButton("redo", "Redo")
@@ -87,6 +89,7 @@ class DesignerHeader(QWidget):
         row.addWidget(self.study)
         row.addWidget(self.problems)
         row.addWidget(self.draft)
+        row.addWidget(self.version)
         row.addStretch()
         for part in (self.undo, self.redo, self.save):
             row.addWidget(part)
@@ -116,6 +119,8 @@ class DesignerHeader(QWidget):
             part.setVisible(there)
         self.problems.show_state(*state.problems)
         self.draft.show_state("neutral", "save", state.draft)
+        self.version.show_state(state.version.tone, state.version.icon, state.version.words)
+        self.version.setToolTip(state.version.tip)
         for button, word, keys, what in (
             (self.undo, "Undo", "Ctrl+Z", state.undo),
             (self.redo, "Redo", "Ctrl+Shift+Z", state.redo),
@@ -123,16 +128,18 @@ class DesignerHeader(QWidget):
             button.setEnabled(bool(what) and not state.read_only)
             button.setAccessibleName(f"{word}: {what}" if what else word)
             button.setToolTip(f"{word}: {what} ({keys})" if what else word)
+        self.save.show_action("save", state.version.save)
         self.save.setEnabled(state.can_save)
         self._make_room()
 
     def _make_room(self) -> None:
-        """Leave out the title, then what is said of the draft, where the window is too narrow for them."""
-        row = self.layout()
+        """Hide the title, the draft and the version, in this order, where the window is too narrow for them."""
+        row, state = self.layout(), self.state
         assert row is not None  # noqa: S101 - it was given one
         self.title.show()
-        self.draft.setVisible(bool(self.state.chosen and self.state.draft))
-        for part in (self.title, self.draft):
+        self.draft.setVisible(bool(state.chosen and state.draft))
+        self.version.setVisible(bool(state.chosen and state.version.words))
+        for part in (self.title, self.draft, self.version):
             row.invalidate()
             part.setVisible(part.isVisibleTo(self) and row.minimumSize().width() <= self.width())
 

@@ -1,4 +1,4 @@
-"""Questions as cards in the place: what to do with what names a deleted element, and which version to save."""
+"""Questions as cards in the place: what to do with what names a deleted element."""
 
 from __future__ import annotations
 
@@ -82,15 +82,3 @@ class DeleteCard(Prompt):
         self.column.addLayout(self.buttons)
         self.other.setVisible(bool(asked.others))
         self.first: QWidget = self.all
-
-
-class VersionCard(Prompt):
-    """A version that was run is not overwritten: under which one the study is saved."""
-
-    def __init__(self, reason: str, version: str) -> None:
-        super().__init__("This version was run", f"{reason[:1].upper()}{reason[1:]}")
-        self.save = ActionButton("save", f"Save as version {version}", role="primary", height=40)
-        self.save.clicked.connect(lambda: self.answered.emit(version))
-        self.buttons.addWidget(self.save)
-        self.column.addLayout(self.buttons)
-        self.first: QWidget = self.save

@@ -17,7 +17,7 @@ from study_app.gui.designer.outline.card import OutlineCard
 from study_app.gui.designer.pane.file_editor import FileCard
 from study_app.gui.designer.pane.right_pane import PanePage, RightPane
 from study_app.gui.designer.problems import ProblemsCard
-from study_app.gui.designer.prompts import DeleteCard, Prompt, VersionCard
+from study_app.gui.designer.prompts import DeleteCard, Prompt
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.main_view import Place
@@ -33,9 +33,9 @@ class DesignerPlace(Place):
     """Draws a `DesignerView` and says what is asked for.
 
     Signals: ``entered``, ``left``; ``asked`` (a request); ``selected`` (path) and ``back_asked``; ``study_asked``
-    (source), ``new_asked``, ``begin_asked`` (source, name, answers); ``undo_asked``, ``redo_asked``, ``save_asked``,
-    ``save_as_version_asked`` (version); ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``;
-    ``repair_asked`` (row, words); ``find_changed``; ``banner_asked`` (action); ``id_typed`` (path, id).
+    (source), ``new_asked``, ``begin_asked`` (source, name, answers); ``undo_asked``, ``redo_asked``, ``save_asked``;
+    ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``; ``repair_asked`` (row, words);
+    ``find_changed``; ``banner_asked`` (action); ``id_typed`` (path, id).
     """
 
     entered = Signal()
@@ -49,7 +49,6 @@ class DesignerPlace(Place):
     undo_asked = Signal()
     redo_asked = Signal()
     save_asked = Signal()
-    save_as_version_asked = Signal(str)
     delete_asked = Signal(object, object)
     copy_asked = Signal(object)
     paste_asked = Signal()
@@ -214,15 +213,10 @@ class DesignerPlace(Place):
         """Show what names an element, and ask what becomes of it."""
         made = DeleteCard(asked)
         made.answered.connect(self.asked)
-        self._show_prompt(made, made.first)
+        self.show_prompt(made, made.first)
 
-    def ask_for_version(self, reason: str, version: str) -> None:
-        """Ask whether to save under another version."""
-        made = VersionCard(reason, version)
-        made.answered.connect(self.save_as_version_asked.emit)
-        self._show_prompt(made, made.first)
-
-    def _show_prompt(self, prompt: Prompt, first: QWidget) -> None:
+    def show_prompt(self, prompt: Prompt, first: QWidget) -> None:
+        """Show a question in the place; ``first`` takes the keyboard."""
         self.close_prompt()
         self.prompt = prompt
         prompt.answered.connect(lambda _answer: self.close_prompt())
@@ -312,7 +306,7 @@ class DesignerPlace(Place):
             self._select(row.element)
         in_form = bool(row.element) and self.form.focus(row.fault.path)
         if row.line is not None and not in_form:
-            self._focus_file()
+            self.show_tab("file")
         if row.line is not None:
             self.file.editor.go_to(row.line - 1)
 
@@ -337,8 +331,9 @@ class DesignerPlace(Place):
         page = next(one for one in self.pane.pages if one.name == self.pane.tab)
         (page.body.focusProxy() or self.pane.tabs).setFocus(Qt.FocusReason.ShortcutFocusReason)
 
-    def _focus_file(self) -> None:
-        self.pane.show_tab("file")
+    def show_tab(self, name: str) -> None:
+        """Show a page of the right pane, and give it the keyboard."""
+        self.pane.show_tab(name)
         self._focus_pane()
 
     def _focus_problems(self) -> None:
@@ -349,7 +344,7 @@ class DesignerPlace(Place):
         if self.file.editor.hasFocus():
             self._focus_form()
         else:
-            self._focus_file()
+            self.show_tab("file")
 
     def _cycle(self, by: int) -> None:
         stops = [

@@ -9,10 +9,12 @@ from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.file_text import FileText
 from study_app.viewmodels.designer.form_rows import Form
 from study_app.viewmodels.designer.problem_rows import ProblemRow
+from study_app.viewmodels.designer.versions.standing import VersionChip
 from study_app.viewmodels.tones import Tone
 
 NO_FILE: Final = FileText()
-BannerAction: TypeAlias = Literal["copy", "keep", "take", "discard"]
+NO_VERSION: Final = VersionChip()
+BannerAction: TypeAlias = Literal["copy", "keep", "take", "compare", "discard"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,8 @@ class HeaderState:
         Whether the file differs and may be written.
     read_only : bool
         Whether the study cannot be changed.
+    version : VersionChip
+        The chip of the version, and what the button that saves says.
     """
 
     studies: tuple[StudyChoice, ...] = ()
@@ -62,6 +66,7 @@ class HeaderState:
     redo: str = ""
     can_save: bool = False
     read_only: bool = False
+    version: VersionChip = NO_VERSION
 
 
 @dataclass(frozen=True, slots=True)

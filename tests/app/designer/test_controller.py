@@ -100,7 +100,7 @@ def test_a_file_changed_outside_is_taken_in_or_asked_about_and_never_overwritten
     designer.file.write_text(before + "# outside again\n")
     designer.saving.save()
     assert designer.file.read_text() == before + "# outside again\n"
-    assert [words for _, words in designer.place.view.banner.actions] == ["Keep mine", "Take the file's"]
+    assert [words for _, words in designer.place.view.banner.actions] == ["Keep mine", "Take the file's", "Compare"]
     designer.saving.answer_banner("keep")
     designer.saving.save()
     assert designer.file.read_text() == designer.text

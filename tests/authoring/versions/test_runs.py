@@ -6,52 +6,23 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.versions import Run, changes, check_saving, next_version, runs
+from study_app.authoring.versions.contents import content_hash, kept_content
+from study_app.authoring.versions.runs import (
+    Run,
+    check_saving,
+    check_version,
+    keep_what_was_run,
+    next_version,
+    runs,
+    standing,
+)
 from study_app.authoring.writer.refused import Refused
-from study_app.protocol.load import load, parse
+from study_app.protocol.load import parse
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.receipt import without_conditions
 from tests.authoring.grown import PROTOCOLS
 
 TEXT = (PROTOCOLS / "demo.toml").read_text(encoding="utf-8")
-DEMO = load(PROTOCOLS / "demo.toml")
-
-
-def changed(*pairs: tuple[str, str]) -> Any:
-    text = TEXT
-    for old, new in pairs:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    return parse(text.encode(), "demo")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "effect"),
-    [
-        ('title = "Now reach"', 'title = "Reach"', "comparable"),
-        ('version = "1.0"', 'version = "1.1"', "comparable"),
-        ('short = "Task harder"', 'short = "Harder"', "comparable"),
-        ("delay_ms = 200", "delay_ms = 300", "measured"),
-        ("count = 6", "count = 8", "measured"),
-        ('order = "shuffled"\nrepetitions = 1\ntask = "reach"', 'order = "fixed"\ntask = "reach"', "measured"),
-        ('text = "What I saw made the task harder."', 'text = "It was harder."', "measured"),
-        ('id = "harder"', 'id = "difficult"', "tables"),
-        ('code_prefix = "D"', 'code_prefix = "E"', "tables"),
-        ("lateness_ms = 2 ", "lateness_ms = 3 ", "measured"),
-    ],
-)
-@pytest.mark.parametrize("of_receipt", [False, True])
-def test_changes_are_sorted_by_what_they_do(old: str, new: str, effect: str, *, of_receipt: bool) -> None:
-    after = changed((old, new))
-    found = changes(without_conditions(DEMO) if of_receipt else DEMO, after)
-    if of_receipt and old.startswith("delay_ms"):
-        assert not found
-        return
-    assert {one.effect for one in found} == {effect}, found
-
-
-def test_changes_of_the_same_study_are_none() -> None:
-    assert changes(DEMO, DEMO) == ()
 
 
 def session(folder: Path, participant: str, source: bytes, **facts: Any) -> None:
@@ -79,7 +50,38 @@ def test_runs_counts_sessions_pilots_and_rehearsals_by_content(tmp_path: Path) -
         ("1.1", 1, 0, 1),
     ]
     assert [run.hash for run in found] == [protocol_hash(one), protocol_hash(other)]
+    assert found[0].protocol == json.loads(json.dumps(without_conditions(parse(one, "demo"))))
     assert runs(tmp_path, "other") == ()
+
+
+def test_a_content_that_was_run_is_kept_before_the_file_changes(tmp_path: Path) -> None:
+    file = tmp_path / "demo.toml"
+    file.write_text(TEXT, encoding="utf-8")
+    keep_what_was_run(file, [Run("another", "1.0", sessions=1)])
+    assert kept_content(content_hash(TEXT.encode())) is None
+    keep_what_was_run(file, [Run(content_hash(TEXT.encode()), "1.0", sessions=1)])
+    assert kept_content(content_hash(TEXT.encode())) == TEXT.encode()
+
+
+def test_standing_says_when_saving_asks_and_which_version_is_free() -> None:
+    ran = (Run("abc", "1.0", sessions=2), Run("def", "1.1", sessions=1), Run("pil", "1.2", pilots=3))
+    assert not standing("new", "old", "0.1", [Run("pil", "0.1", pilots=1, rehearsals=2)]).asks
+    same = standing("abc", "abc", "1.0", ran)
+    assert (same.asks, same.version, same.sessions) == (False, "1.0", 2)
+    changed = standing("new", "abc", "1.0", ran)
+    assert (changed.asks, changed.version, changed.was, changed.others) == (True, "1.2", "1.1", 2)
+    raised = standing("new", "def", "2.0", ran)
+    assert (raised.asks, raised.version, raised.others) == (True, "2.0", 0)
+    assert not standing("newer", "new", "2.0", ran).asks
+
+
+@pytest.mark.parametrize("version", ["", "1 2", "1,2", "é"])
+def test_what_cannot_be_a_version_is_refused(version: str) -> None:
+    check_version("1.2-rc+3", [Run("abc", "1.2-rc+3", pilots=1)])
+    with pytest.raises(Refused, match="cannot be a version"):
+        check_version(version, [])
+    with pytest.raises(Refused, match="was run with another content"):
+        check_version("1.0", [Run("abc", "1.0", sessions=1)])
 
 
 def test_a_version_that_was_run_is_never_overwritten_with_other_content() -> None:

@@ -1,0 +1,187 @@
+"""Saving a study's file: never over another program's content, and every content stays under its hash."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final, Literal, TypeAlias
+
+from study_app.errors import StoreError
+from study_app.store.atomic import append_line, write_file
+from study_app.store.journals.parsing import parse_json
+from study_app.store.sessions.folder_lock import open_alone
+from study_app.user_folder import data_folder
+
+Origin: TypeAlias = Literal["saved", "found", "draft"]
+"""Saved here, found in the file when it was saved over, or the draft of another program that had the study open."""
+_ORIGINS: Final = frozenset({"saved", "found", "draft"})
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A content of a study's file that is kept by its hash; ``at`` is ISO 8601 with the time zone."""
+
+    hash: str
+    origin: Origin
+    at: str
+
+
+class ChangedOutsideError(StoreError):
+    """The file is not the one that was edited; nothing was written."""
+
+
+def content_hash(content: bytes) -> str:
+    """Return the SHA-256 of a file's content, in hexadecimal."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def file_key(file: Path) -> str:
+    """Return the name under which the data folder holds what belongs to a study's file."""
+    return content_hash(str(file.resolve()).encode("utf-8", "surrogatepass"))[:32]
+
+
+def save(file: Path, text: str, base: str) -> str:
+    """Write a study's file in one step and return its hash; its previous content is kept (`kept_content`).
+
+    Parameters
+    ----------
+    file : Path
+        The protocol file; its permissions stay, and a link stays a link.
+    text : str
+        The whole text, with its own line breaks.
+    base : str
+        `content_hash` of the content that the text was edited from; "" for a new file.
+
+    Raises
+    ------
+    ChangedOutsideError
+        The file has another content than ``base``, or is already there.
+    StoreError
+        It cannot be written, or another program saves it at this moment.
+    """
+    target, source = file.resolve(), text.encode()
+    with _alone(file):
+        mode = None
+        if target.exists():
+            content, mode = _content(target), target.stat().st_mode & 0o777
+            if content_hash(content) != base:
+                raise ChangedOutsideError(
+                    f"{file} was changed by another program: compare it with the edits, then choose"
+                )
+            keep_version(file, content, "found")
+        elif base:
+            raise ChangedOutsideError(f"{file} was deleted or moved by another program: save it as another study")
+        write_whole(target, source)
+        if mode is not None:
+            target.chmod(mode)
+    keep_version(file, source, "saved")
+    return content_hash(source)
+
+
+def keep_version(file: Path, content: bytes, origin: Origin) -> None:
+    """Keep a content of a study's file by its hash and list it (`kept_versions`); one that is listed stays as it is.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    keep_content(content)
+    hash_ = content_hash(content)
+    if any(one.hash == hash_ for one in kept_versions(file)):
+        return
+    line = {"hash": hash_, "origin": origin, "at": datetime.now(UTC).astimezone().isoformat(timespec="seconds")}
+    path = _list_file(file)
+    _make_folder(path.parent)
+    append_line(path, json.dumps(line).encode() + b"\n")
+
+
+def kept_versions(file: Path) -> tuple[Kept, ...]:
+    """Return the contents of a study's file that are kept, the oldest first; lines that cannot be read are left out."""
+    try:
+        lines = _list_file(file).read_bytes().splitlines()
+    except OSError:
+        return ()
+    found: list[Kept] = []
+    for line in lines:
+        with contextlib.suppress(ValueError):
+            held = parse_json(line)
+            if isinstance(held, dict) and held.get("origin") in _ORIGINS:
+                found.append(Kept(str(held.get("hash")), held["origin"], str(held.get("at"))))
+    return tuple(found)
+
+
+def keep_content(content: bytes) -> None:
+    """Keep one content of a study's file by its hash.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    path = _content_file(content_hash(content))
+    if not path.exists():
+        write_whole(path, content)
+
+
+def kept_content(hash_: str) -> bytes | None:
+    """Return the content of a hash; None where none was kept, or it was changed since."""
+    try:
+        content = _content_file(hash_).read_bytes()
+    except OSError:
+        return None
+    return content if content_hash(content) == hash_ else None
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file in one step, with the folder that it is in.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    _make_folder(path.parent)
+    write_file(path, content)
+
+
+@contextlib.contextmanager
+def _alone(file: Path) -> Iterator[None]:
+    """Let no other program save the file meanwhile."""
+    folder = data_folder() / "saving" / file_key(file)
+    _make_folder(folder)
+    try:
+        opening = open_alone(folder)
+    except StoreError as error:
+        raise StoreError(f"{file} cannot be saved while another program saves it: save again ({error})") from error
+    try:
+        yield
+    finally:
+        opening.release()
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise StoreError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"{path} cannot be made: {error.strerror}") from error
+
+
+def _list_file(file: Path) -> Path:
+    return data_folder() / "versions" / f"{file_key(file)}.jsonl"
+
+
+def _content_file(hash_: str) -> Path:
+    return data_folder() / "contents" / f"{hash_}.toml"

@@ -1,0 +1,108 @@
+"""The card that asks before a study that was run is saved: what differs, under which version, or as another study."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
+
+from study_app.gui.designer.prompts import Prompt
+from study_app.gui.designer.versions.change_list import ChangeList
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.cards import Icon
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import label
+from study_app.viewmodels.designer.versions.standing import SavePrompt
+
+
+class SaveCard(Prompt):
+    """Signals: ``save_asked`` (version), ``another_asked`` (name), ``changes_asked``."""
+
+    save_asked = Signal(str)
+    another_asked = Signal(str)
+    changes_asked = Signal()
+
+    def __init__(self, asked: SavePrompt) -> None:
+        super().__init__("Save another version", asked.explanation)
+        self.asked = asked
+        self.list = ChangeList(can_go=False)
+        self.list.show_groups(asked.groups, can_revert=False)
+        self.column.addWidget(self.list, 1)
+        self.list.setVisible(bool(asked.groups))
+        for icon, words in (("info", asked.note), ("warning", asked.problems)):
+            if words:
+                self.column.addWidget(_line(icon, words))
+        self.version = _field("Version to save as", asked.version, 110)
+        self.name = _field("Short name of the other study", "", 220)
+        self.name.setPlaceholderText("small letters and digits")
+        self.refusal = label("", "label", "bad", wraps=True)
+        self.refusal.hide()
+        self.changes = ActionButton("", "Show in Changes", role="plain", height=40)
+        self.another = ActionButton("copy", "Save as another study …", height=40)
+        self.save = ActionButton("save", "", role="primary", height=40)
+        self._of_version = label("Version", "label")
+        self._of_name = label("Short name", "label")
+        line = QHBoxLayout()
+        line.setSpacing(10)
+        for part in (self._of_version, self.version, self._of_name, self.name):
+            line.addWidget(part)
+        line.addWidget(self.refusal, 1)
+        line.addStretch()
+        self.column.addLayout(line)
+        for button in (self.changes, self.another, self.save):
+            self.buttons.addWidget(button)
+        self.column.addLayout(self.buttons)
+        self.another.setVisible(asked.another)
+        self._naming = False
+        self._show_name(naming=False)
+        self.first: QWidget = self.save
+        self.version.textEdited.connect(lambda _text: self._say())
+        self.version.returnPressed.connect(self._save)
+        self.name.returnPressed.connect(self._save)
+        self.save.clicked.connect(self._save)
+        self.another.clicked.connect(lambda: self._show_name(naming=True))
+        self.changes.clicked.connect(self.changes_asked)
+
+    def refuse(self, sentence: str) -> None:
+        """Say why it cannot be saved so."""
+        self.refusal.setText(f"{sentence[:1].upper()}{sentence[1:]}")
+        self.refusal.setVisible(bool(sentence))
+
+    def _show_name(self, *, naming: bool) -> None:
+        self._naming = naming
+        for part in (self._of_version, self.version):
+            part.setVisible(not naming)
+        for part in (self._of_name, self.name):
+            part.setVisible(naming)
+        self.another.setVisible(self.asked.another and not naming)
+        self._say()
+        if naming:
+            self.name.setFocus()
+
+    def _say(self) -> None:
+        self.refuse("")
+        words = "Save as this study" if self._naming else f"Save {self.version.text().strip()}"
+        self.save.show_action("save", words)
+
+    def _save(self) -> None:
+        if self._naming:
+            self.another_asked.emit(self.name.text().strip())
+        else:
+            self.save_asked.emit(self.version.text().strip())
+
+
+def _field(name: str, text: str, width: int) -> QLineEdit:
+    made = QLineEdit(text)
+    made.setFont(font("body"))
+    made.setAccessibleName(name)
+    made.setFixedWidth(width)
+    return made
+
+
+def _line(icon: str, words: str) -> QWidget:
+    made = QWidget()
+    row = QHBoxLayout(made)
+    row.setContentsMargins(0, 0, 0, 0)
+    row.setSpacing(8)
+    row.addWidget(Icon(icon, "warn" if icon == "warning" else "text2", 18))
+    row.addWidget(label(words, "label", wraps=True), 1)
+    return made

@@ -1,0 +1,1 @@
+"""Versions of a study as the designer shows them. No Qt here."""

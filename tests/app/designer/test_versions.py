@@ -1,0 +1,258 @@
+"""Versions in the window: the chip, the card that asks before saving, the tab Changes, two programs on one study."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
+
+from study_app.authoring.drafts import draft_of
+from study_app.authoring.versions.contents import kept_content, kept_versions
+from study_app.protocol.load import parse
+from study_app.protocol.source.files import protocol_hash
+from study_app.store.receipt import without_conditions
+from study_app.store.sessions.folder_lock import open_alone
+from study_app.viewmodels.designer.requests import SetText, SetValue
+
+REPETITIONS = ("blocks", "liquids", "repetitions")
+
+
+def run(designer: Any, participant: str, source: bytes, study: str = "kitchen", **facts: Any) -> Path:
+    """Write the receipt of a session that was run with a content of the study; return its folder."""
+    folder: Path = designer.results / study / "data" / f"sub-{participant}" / "ses-01"
+    folder.mkdir(parents=True)
+    protocol = json.loads(json.dumps(without_conditions(parse(source, "kitchen"))))
+    held = {
+        "key_hash": "0" * 64, "protocol_hash": protocol_hash(source), "protocol": protocol, "simulated": False,
+        "pilot": False, "started_at": "2026-11-20T12:00:00+00:00", **facts,
+    }  # fmt: skip
+    (folder / "receipt.json").write_text(json.dumps(held))
+    return folder
+
+
+def version_of(designer: Any) -> str:
+    return str(designer.editing.opened.study.document["study"]["version"])
+
+
+@pytest.fixture
+def ran(designer: Any, qtbot: Any) -> Any:
+    """The designer with a study that two participants and a pilot were run with, version 1.0."""
+    source = designer.file.read_bytes()
+    run(designer, "P001", source)
+    run(designer, "P002", source)
+    run(designer, "P001", source, study="kitchen-pilot", pilot=True)
+    designer.controller.open("kitchen")
+    qtbot.waitUntil(lambda: designer.place.header.version.words == "1.0, run by 2")
+    return designer
+
+
+def click(qtbot: Any, part: Any) -> None:
+    qtbot.waitUntil(part.isVisible)
+    qtbot.mouseClick(part, Qt.MouseButton.LeftButton)
+
+
+def rows(designer: Any) -> list[str]:
+    """The sentences of the differences that are shown."""
+    return [line.row.change.sentence for line in designer.controller.changes.card.list.lines]
+
+
+def test_a_study_that_was_not_run_is_saved_without_a_question(designer: Any, qtbot: Any) -> None:
+    run(designer, "P001", designer.file.read_bytes(), study="kitchen-pilot", pilot=True)
+    designer.controller.open("kitchen")
+    qtbot.waitUntil(lambda: designer.place.header.version.words == "Not run yet")
+    assert "1 pilot" in designer.place.header.version.toolTip()
+    designer.editing.ask(SetValue(REPETITIONS, 3))
+    qtbot.wait(250)
+    assert designer.place.header.save.text() == "Save"
+    click(qtbot, designer.place.header.save)
+    assert designer.place.prompt is None
+    assert designer.file.read_text() == designer.text
+
+
+def test_a_study_that_was_run_is_saved_under_the_next_version(ran: Any, qtbot: Any) -> None:
+    before = ran.file.read_bytes()
+    ran.editing.ask(SetValue(REPETITIONS, 3))
+    ran.editing.ask(SetText(("pages", "welcome", "title"), "en", "Hello"))
+    ran.editing.ask(SetValue(("sequence",), ["welcome"]))
+    qtbot.waitUntil(lambda: ran.place.header.save.text() == "Save 1.1 …")
+    assert ran.place.header.version.words == "1.1, was 1.0"
+    qtbot.keyClick(ran.window, Qt.Key.Key_S, Qt.KeyboardModifier.ControlModifier)
+    card = ran.place.prompt
+    assert ran.file.read_bytes() == before
+    assert "2 sessions, 1 pilot with version 1.0" in card.asked.explanation
+    shown = {line.row.change.sentence: line.row.change.effect for line in card.list.lines}
+    assert shown["blocks.liquids.repetitions: 1 before, 3 now"] == "measured"
+    assert shown['pages.welcome.title: "A first look" before, "Hello" now'] == "comparable"
+    assert "new sessions are refused" in card.asked.problems
+    card.version.selectAll()
+    qtbot.keyClicks(card.version, "1.0")
+    qtbot.keyClick(card.version, Qt.Key.Key_Return)
+    assert "was run with another content" in card.refusal.text()
+    assert ran.file.read_bytes() == before
+    card.version.selectAll()
+    qtbot.keyClicks(card.version, "1.1")
+    click(qtbot, card.save)
+    assert ran.place.prompt is None
+    assert version_of(ran) == "1.1"
+    assert ran.file.read_text() == ran.text
+    assert kept_content(protocol_hash(before)) == before
+    ran.editing.ask(SetValue(REPETITIONS, 4))
+    click(qtbot, ran.place.header.save)
+    assert ran.place.prompt is None
+    assert ran.file.read_text() == ran.text
+
+
+def test_what_changes_the_measure_can_be_saved_as_another_study(ran: Any, qtbot: Any) -> None:
+    before = ran.file.read_bytes()
+    ran.editing.ask(SetValue(REPETITIONS, 3))
+    ran.saving.leave()
+    ran.window.activateWindow()
+    ran.saving.save()
+    click(qtbot, ran.place.prompt.another)
+    name = ran.place.prompt.name
+    qtbot.waitUntil(name.hasFocus)
+    qtbot.keyClicks(name, "kitchen")
+    qtbot.keyClick(name, Qt.Key.Key_Return)
+    assert "already there" in ran.place.prompt.refusal.text()
+    name.selectAll()
+    qtbot.keyClicks(name, "longer")
+    qtbot.keyClick(name, Qt.Key.Key_Return)
+    file = ran.file.parent / "longer.toml"
+    assert ran.editing.opened.file == file
+    assert file.read_text() == ran.text
+    assert ran.editing.opened.study.document["blocks"]["liquids"]["repetitions"] == 3
+    assert (ran.file.read_bytes(), draft_of(ran.file)) == (before, None)
+    ran.controller.open("kitchen")
+    assert ran.text.encode() == before
+
+
+def test_changes_lists_what_differs_and_reverts_single_differences(ran: Any, qtbot: Any) -> None:
+    before = ran.text
+    ran.editing.ask(SetValue(REPETITIONS, 3))
+    ran.editing.ask(SetText(("pages", "welcome", "title"), "en", "Hello"))
+    click(qtbot, ran.place.header.version)
+    assert ran.place.pane.tab == "changes"
+    card = ran.controller.changes.card
+    assert card.view.versions[0].words == "The file, without the edits"
+    assert "2 sessions, 1 pilot" in card.version.currentText()
+    assert rows(ran) == [
+        "blocks.liquids.repetitions: 1 before, 3 now", 'pages.welcome.title: "A first look" before, "Hello" now'
+    ]  # fmt: skip
+    click(qtbot, card.list.lines[1].go)
+    assert ran.place.view.form.path == ("pages", "welcome")
+    click(qtbot, card.list.lines[0].revert)
+    assert rows(ran) == ['pages.welcome.title: "A first look" before, "Hello" now']
+    assert "Revert Liquids, Repetitions" in ran.place.header.undo.accessibleName()
+    click(qtbot, card.how.buttons[1])
+    assert card.sides.place.text() == "1 of 1"
+    click(qtbot, card.sides.revert)
+    assert ran.text == before
+    assert card.view.note == "The study does not differ from this version."
+    ran.editing.undo()
+    ran.editing.undo()
+    qtbot.waitUntil(lambda: len(rows(ran)) == 2)
+
+
+def test_of_a_version_without_a_copy_the_receipt_says_what_differs(ran: Any, qtbot: Any) -> None:
+    source = (
+        ran.file.read_bytes()
+        .replace(b'version = "1.0"', b'version = "0.9"')
+        .replace(b"delay_ms = 200", b"delay_ms = 300")
+    )
+    run(ran, "P009", source, started_at="2026-11-18T12:00:00+00:00")
+    ran.controller.enter()
+    qtbot.waitUntil(lambda: len(ran.controller.runs.known) == 2)
+    ran.controller.changes.compare_with(protocol_hash(source))
+    card = ran.controller.changes.card
+    assert "No copy of this version is kept" in card.note.text()
+    assert rows(ran) == [
+        "conditions: may differ, no copy of this version is kept", 'study.version: "0.9" before, "1.0" now'
+    ]  # fmt: skip
+    assert not card.how.isVisible()
+    assert all(line.revert is None for line in card.list.lines)
+
+
+def test_a_change_by_another_program_is_noticed_while_the_place_is_shown(designer: Any, qtbot: Any) -> None:
+    designer.controller.open("kitchen")
+    before = designer.file.read_text()
+    designer.file.write_text(before + "# outside\n")
+    qtbot.waitUntil(lambda: designer.text.endswith("# outside\n"))
+    designer.editing.ask(SetValue(REPETITIONS, 3))
+    other = designer.file.with_suffix(".new")
+    other.write_text(before.replace("A first look", "Another look"))
+    other.replace(designer.file)
+    qtbot.waitUntil(designer.place.banner.isVisible)
+    click(qtbot, designer.place.banner_buttons[2])
+    assert designer.controller.changes.card.view.chosen == "file"
+    assert 'pages.welcome.title: "Another look" before, "A first look" now' in rows(designer)
+    click(qtbot, designer.place.banner_buttons[1])
+    assert "Another look" in designer.text
+    designer.editing.undo()
+    assert "repetitions = 3" in designer.text
+
+
+def test_a_session_under_way_makes_the_study_read_only_until_it_ends(ran: Any) -> None:
+    ran.editing.ask(SetValue(REPETITIONS, 3))
+    text = ran.file.read_text()
+    opening = open_alone(ran.results / "kitchen" / "data" / "sub-P001" / "ses-01")
+    ran.saving.save()
+    assert "session of this study is under way" in ran.place.banner_words.text()
+    assert (ran.place.prompt, ran.file.read_text()) == (None, text)
+    opening.release()
+    ran.controller.enter()
+    assert not ran.place.banner.isVisible()
+    ran.editing.ask(SetValue(REPETITIONS, 4))
+    assert "repetitions = 4" in ran.text
+
+
+OTHER = """
+import sys
+from pathlib import Path
+from PySide6.QtTest import QTest
+from study_app.app.designer.controller import DesignerController
+from study_app.gui.application import application_here
+from study_app.viewmodels.designer.requests import SetText
+application = application_here()
+designer = DesignerController(Path(sys.argv[1]))
+designer.open("kitchen")
+designer.editing.ask(SetText(("pages", "welcome", "title"), "en", sys.argv[2]))
+if sys.argv[3] == "save":
+    designer.saving.save()
+else:
+    designer.saving.leave()
+"""
+
+
+@pytest.mark.slow
+def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any, qtbot: Any) -> None:
+    def other(words: str, then: str) -> None:
+        command = [sys.executable, "-c", OTHER, str(designer.results), words, then]
+        subprocess.run(command, check=True, env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
+
+    designer.controller.open("kitchen")
+    designer.editing.ask(SetValue(REPETITIONS, 3))
+    other("Saved elsewhere", "save")
+    assert "Saved elsewhere" in designer.file.read_text()
+    designer.saving.save()
+    assert "Saved elsewhere" in designer.file.read_text()
+    assert designer.place.banner_words.text().startswith("Another program changed this file")
+    designer.saving.answer_banner("keep")
+    designer.saving.save()
+    assert "repetitions = 3" in designer.file.read_text()
+    kept = [kept_content(one.hash) or b"" for one in kept_versions(designer.file)]
+    assert any(b"Saved elsewhere" in content for content in kept)
+
+    designer.editing.ask(SetValue(REPETITIONS, 4))
+    other("Typed elsewhere", "leave")
+    designer.saving.leave()
+    assert designer.place.banner_words.text().startswith("Another window of the program edits this study, too")
+    designer.place.banner_buttons[0].click()
+    QApplication.processEvents()
+    assert any("Typed elsewhere" in sentence for sentence in rows(designer))
