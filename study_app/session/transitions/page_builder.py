@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.orders.schedule import FormStep, Trial
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.number import NumberView
+from study_app.protocol.questions.question import Context, Question
 from study_app.protocol.trials.design import ORDINALS
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import Words, words
@@ -131,23 +134,50 @@ def _answer_page(state: SessionState) -> Page:
 
 
 def _questionnaire_page(state: SessionState) -> QuestionnairePage:
-    questionnaire, context, step = state.questionnaire, state.context, state.step
+    questionnaire, step = state.questionnaire, state.step
     trial = step if isinstance(step, Trial) else None
     form = step.form if isinstance(step, FormStep) else None
     label = (form or "").replace("_", " ").capitalize() if trial is None else _label(state, trial)
-    statements = len(questionnaire.statements) == len(questionnaire.items)
-    scale = state.plan.protocol.scales[questionnaire.scale or ""] if statements else None
-    off_scale = None if scale is None else scale.cannot_judge
-    return QuestionnairePage(
+    made = questions_page(state.plan.protocol, questionnaire, state.questions, state.context, label)
+    return replace(
+        made,
         trial=None if trial is None else trial.number,
-        title=label if questionnaire.title is None else _text(state, questionnaire.title),
-        intro="" if trial is not None and state.design is not None else _text(state, questionnaire.intro),
-        items=tuple(item.view(number, context) for number, item in enumerate(state.questions, 1)),
-        labels=() if scale is None else scale.labels[context.language],
-        cannot_judge=None if off_scale is None else _text(state, off_scale),
+        intro="" if trial is not None and state.design is not None else made.intro,
         progress=None if trial is None else _progress(state, trial),
         chosen=tuple((item, answer.value) for item, answer in state.answers.items() if answer.given),
         form=form,
+    )
+
+
+def questions_page(
+    protocol: Protocol, questionnaire: Questionnaire, questions: Sequence[Question], context: Context, label: str
+) -> QuestionnairePage:
+    """Return the page of some questions of a questionnaire before any answer, outside a session.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study.
+    questionnaire : Questionnaire
+        What is asked.
+    questions : sequence of Question
+        Its questions, in the order shown.
+    context : Context
+        What they are asked with.
+    label : str
+        What the page is called where the questionnaire has no title.
+    """
+    statements = len(questionnaire.statements) == len(questionnaire.items)
+    scale = protocol.scales[questionnaire.scale or ""] if statements else None
+    off_scale = None if scale is None else scale.cannot_judge
+    return QuestionnairePage(
+        trial=None,
+        title=label if questionnaire.title is None else protocol.text(questionnaire.title, context.language),
+        intro=protocol.text(questionnaire.intro, context.language),
+        items=tuple(item.view(number, context) for number, item in enumerate(questions, 1)),
+        labels=() if scale is None else scale.labels[context.language],
+        cannot_judge=None if off_scale is None else protocol.text(off_scale, context.language),
+        progress=None,
     )
 
 

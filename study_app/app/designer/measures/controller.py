@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final
 
 from PySide6.QtCore import QObject, QTimer
 
 from study_app.app.designer.editing import Editing
+from study_app.app.designer.measures.page_fit import PageFit
 from study_app.app.designer.measures.slow_numbers import SlowNumbers
 from study_app.app.designer.measures.wanted import LAPSES, participants_of, precision_of, threshold_of, wanted_of
 from study_app.app.designer.measures.worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
@@ -50,6 +52,7 @@ class MeasuresController(QObject):
         super().__init__(editing)
         self._editing, self._place = editing, place
         self.slow = SlowNumbers(self)
+        self.fit = PageFit(self)
         self._participants: int | None = None
         self._thresholds: dict[str, float] = {}
         self._lapses = LAPSES
@@ -64,6 +67,7 @@ class MeasuresController(QObject):
         editing.changed.connect(self._idle.start)
         repairs.found.connect(self._take_repairs)
         self.slow.came.connect(self._idle.start)
+        self.fit.found.connect(self._idle.start)
         place.pane.tab_shown.connect(self._idle.start)
         place.entered.connect(self._idle.start)
         measures = place.measures
@@ -87,7 +91,9 @@ class MeasuresController(QObject):
         wanted = () if protocol is None else wanted_of(protocol, focus, controls)
         self.slow.want(wanted if self._is_looked_at else ())
         repairs = {row: self._repairs.get(row, ()) for row in problem_rows(study)}
-        view = measures_view(study, facts(study), path, controls, self._results(wanted, focus, controls), repairs)
+        parts = self.fit.parts(protocol, focus, path) if self._is_looked_at else None
+        results = replace(self._results(wanted, focus, controls), parts=parts)
+        view = measures_view(study, facts(study), path, controls, results, repairs)
         self._place.measures.show_measures(view)
         self._place.pane.facts.show_measures(view)
 

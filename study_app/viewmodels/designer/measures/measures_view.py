@@ -79,6 +79,8 @@ class SlowResults:
         Sentences.
     waits : bool
         Whether a number is still to come.
+    parts : int or None
+        On how many parts the questions stand on a small screen; None: not known.
     """
 
     simulated: Simulated = field(default_factory=Simulated)
@@ -86,6 +88,7 @@ class SlowResults:
     detectable_anew: bool = False
     warnings: tuple[str, ...] = ()
     waits: bool = False
+    parts: int | None = None
 
 
 def focus_of(protocol: Protocol | None, path: Path) -> Focus:
@@ -168,7 +171,7 @@ def _others(study: Study, facts: Facts, path: Path, slow: SlowResults) -> list[C
 def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, slow: SlowResults) -> list[Card]:
     """Return the cards of an element without simulated tracks, those that concern it first."""
     protocol, block = valid_part(study).protocol, focus.block
-    found: list[Card] = [cards.session_card(study, facts, path)]
+    found: list[Card] = [cards.session_card(study, facts, path, slow.parts)]
     if protocol is None:
         return [*found, cards.texts_card(study)]
     if block is not None and (balance := cards.balance_card(study, protocol, block, controls.participants)):

@@ -38,9 +38,24 @@ MOST_ROWS: Final = 6
 NO_ICON: Final[Verdict] = ("neutral", "", "")
 
 
-def session_card(study: Study, facts: Facts, path: Path) -> SessionCard:
-    """Return the session in numbers, with the step that is looked at."""
+def session_card(study: Study, facts: Facts, path: Path, parts: int | None = None) -> SessionCard:
+    """Return the session in numbers, with the step that is looked at.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    facts : Facts
+        Its facts.
+    path : tuple of str or int
+        The selected element.
+    parts : int, optional
+        On how many parts its questions stand on a small screen.
+    """
     verdicts = tuple(text_verdicts(study, facts))
+    if parts is not None:
+        fits: Verdict = ("ok", "check", "One page, no scrolling at 1366 × 768")
+        verdicts = (fits if parts == 1 else ("neutral", "info", f"{parts} pages at 1366 × 768"), *verdicts)
     if facts.expected_s is None or facts.range_s is None:
         unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials"))
         return SessionCard("Session", unknown, verdicts=verdicts)
