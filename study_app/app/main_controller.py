@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from study_app.gui.designer.view import DesignerPlace
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.results.view import ResultsPlace
+    from study_app.viewmodels.sessions import SessionFacts
 
 
 def home(results: Path | None = None, *, then: Callable[[MainController], None] = lambda _visit: None) -> int:
@@ -178,6 +179,7 @@ class MainController(QObject):
         from study_app.app.results import ResultsController  # noqa: PLC0415 - only once it is needed
 
         self.desk = ResultsController(self.results)
+        self.desk.place.version_asked.connect(self.show_version)
         return self.desk.place
 
     def _designer(self) -> DesignerPlace:
@@ -199,6 +201,12 @@ class MainController(QObject):
         assert self.designer is not None  # noqa: S101 - made with its place
         self.designer.open(source)
         self.window.go("designer")
+
+    def show_version(self, session: SessionFacts) -> None:
+        """Go to the study designer, to what changed in a session's study since it was run."""
+        self.open_designer(session.study)
+        assert self.designer is not None  # noqa: S101 - made with its place
+        self.designer.changes.compare_with_session(session.study, session.folder)
 
     def begin_study(self, source: str = "", name: str = "") -> None:
         """Go to the study designer with what a new study can begin from; with a name begin it at once."""

@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+from study_app.authoring.versions.runs import run_of
 from study_app.errors import StoreError
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import StudyFolder
@@ -28,7 +29,8 @@ class SessionFacts:
 
     ``status`` is the table's, or "running" where a program has the session open. ``excluded`` is why the analysis
     excludes all of it, None where it does not; ``lost`` counts recordings that could not be stored, ``reconnected`` how
-    often the device failed and was connected again.
+    often the device failed and was connected again. ``version`` is the study's version that it was run with, "" where
+    its receipt does not say.
     """
 
     participant: str
@@ -45,6 +47,7 @@ class SessionFacts:
     excluded: str | None = None
     lost: int = 0
     reconnected: int = 0
+    version: str = ""
 
     @property
     def kind(self) -> Kind:
@@ -108,6 +111,7 @@ def session_facts(
             excluded=reasons.get((row["participant"], int(row["session"]))),
             lost=lost,
             reconnected=reconnected,
+            version="" if (run := run_of(session.receipt)) is None else run.version,
         )
         for (row, session), (lost, reconnected) in zip(placed, counts, strict=True)
     ]

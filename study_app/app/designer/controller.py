@@ -67,6 +67,7 @@ class DesignerController(QObject):
         self._resting.setInterval(REST_MS)
         self._resting.setSingleShot(True)
         self._resting.timeout.connect(self._show_outline)
+        place.destroyed.connect(self.deleteLater)  # else a timer or thread would show what is gone
         place.entered.connect(self.enter)
         place.asked.connect(editing.ask)
         place.selected.connect(editing.select)

@@ -17,8 +17,6 @@ from study_app.store import receipt
 from study_app.store.folders import StudyFolder
 
 _VERSION: Final = re.compile(r"[0-9A-Za-z.+-]+")
-Fact = tuple[str, str, str, str]
-"""Of a receipt: hash, version, what kind of session it is, and when it began."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,23 +71,33 @@ def runs(results: Path, study: str) -> tuple[Run, ...]:
     folders = (results / study, results / f"{study}-pilot", *sorted(results.glob(f"{study}-rehearsal-*")))
     for folder in folders:
         for session in StudyFolder(folder).sessions():
-            try:
-                hash_, version, kind, began = _facts(session.receipt, session.receipt.stat().st_mtime_ns)
-            except (StoreError, OSError):
-                continue
-            run = found.get(hash_, Run(hash_, version, receipt=session.receipt))
-            counted = {kind: getattr(run, kind) + 1}
-            found[hash_] = replace(run, last=max(run.last, began), **counted)
+            if (one := run_of(session.receipt)) is not None:
+                run = found.get(one.hash, replace(one, sessions=0, pilots=0, rehearsals=0))
+                found[one.hash] = replace(
+                    run,
+                    sessions=run.sessions + one.sessions,
+                    pilots=run.pilots + one.pilots,
+                    rehearsals=run.rehearsals + one.rehearsals,
+                    last=max(run.last, one.last),
+                )
     return tuple(sorted(found.values(), key=lambda run: run.last))
 
 
+def run_of(path: Path) -> Run | None:
+    """Return the content that the session of a receipt was run with; None where the receipt cannot be read."""
+    try:
+        return _run(path, path.stat().st_mtime_ns)
+    except (StoreError, OSError):
+        return None
+
+
 @lru_cache(maxsize=4096)
-def _facts(path: Path, _changed_ns: int) -> Fact:
+def _run(path: Path, _changed_ns: int) -> Run:
     held = receipt.read(path)
-    protocol = held.get("protocol", {})
-    kind = "rehearsals" if held.get("simulated") else "pilots" if held.get("pilot") else "sessions"
-    version = str(protocol.get("study", {}).get("version", ""))
-    return str(held.get("protocol_hash")), version, kind, str(held.get("started_at") or "")
+    version = str(held.get("protocol", {}).get("study", {}).get("version", ""))
+    simulated, pilot = bool(held.get("simulated")), bool(held.get("pilot"))
+    counted = (int(not simulated and not pilot), int(pilot and not simulated), int(simulated))
+    return Run(str(held.get("protocol_hash")), version, *counted, str(held.get("started_at") or ""), path)
 
 
 def source_of(run: Run) -> str | None:

@@ -12,7 +12,7 @@ from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import Card, Rule
-from study_app.gui.widgets.controls import ActionButton, Choice
+from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.results import LeftOut, in_figures
 from study_app.viewmodels.session.columns import Column, matching, states_of
@@ -22,6 +22,7 @@ COLUMNS = (
     Column("participant", "Participant", 90, 76),
     Column("status", "Status", 120, 112),
     Column("validity", "Validity", 110, 114),
+    Column("version", "Version", 60, 60),
 )
 EVERY = "All states"
 
@@ -49,13 +50,16 @@ class SessionsCard(Card):
         filters.setSpacing(8)
         filters.addWidget(self.search, 1)
         filters.addWidget(self.state, 1)
-        self.details = ActionButton("file", "", role="plain", height=36)
-        self.details.setAccessibleName("Details of the selected session")
-        self.details.setToolTip("Details of the selected session")
+        self.details = IconButton("file", "Details of the selected session", size=36, role="plain")
         self.details.setEnabled(False)
         self.details.clicked.connect(self.rows.open_chosen)
-        self.rows.chosen_changed.connect(lambda: self.details.setEnabled(self.rows.chosen is not None))
+        words = "What changed in the study since the selected session"
+        self.version = IconButton("designer", words, size=36, role="plain")
+        self.version.setEnabled(False)
+        self.version.clicked.connect(self.rows.ask_for_version)
+        self.rows.chosen_changed.connect(self._enable)
         filters.addWidget(self.details)
+        filters.addWidget(self.version)
         self.column.addLayout(filters)
         self.column.addWidget(self.rows, 1)
         self.column.addWidget(Rule())
@@ -67,6 +71,11 @@ class SessionsCard(Card):
         self.column.addLayout(foot)
         self.search.textChanged.connect(self._filter)
         self.state.currentIndexChanged.connect(self._filter)
+
+    def _enable(self) -> None:
+        chosen = self.rows.chosen
+        self.details.setEnabled(chosen is not None)
+        self.version.setEnabled(chosen is not None and bool(chosen.version))
 
     def show_sessions(self, found: Sequence[SessionFacts]) -> None:
         """Show these sessions in place of those before; the filters stay."""

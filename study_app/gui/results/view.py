@@ -24,7 +24,7 @@ from study_app.viewmodels.results import LeftOut, ResultsView
 from study_app.viewmodels.sessions import SessionFacts
 
 STACKED_BELOW = 1160
-PANEL_PX, PANEL_WIDE_PX, WIDE_FROM = 374, 420, 1700
+PANEL_PX, PANEL_WIDE_PX, WIDE_FROM = 400, 430, 1700
 STACKED_HEIGHT, EXCLUSIONS = 330, 360
 MOST = 16_777_215
 REASON_SIGNS = 40
@@ -42,7 +42,7 @@ class ResultsPlace(Place):
     Signals: ``entered`` and ``left``; ``study_asked`` (folder); ``remedy_asked`` (a `Remedy`); ``leave_out_asked``
     and ``take_back_asked`` (participant, session, trial or None, by, reason); ``unblind_asked`` (by, reason);
     ``tables_asked`` and ``report_asked`` (folder, extras); ``stop_asked`` (giving up what is being written);
-    ``open_asked`` (path).
+    ``open_asked`` (path); ``version_asked`` (the `SessionFacts` of a session, to compare the study with its version).
     """
 
     entered = Signal()
@@ -56,6 +56,7 @@ class ResultsPlace(Place):
     report_asked = Signal(object, object)
     stop_asked = Signal()
     open_asked = Signal(object)
+    version_asked = Signal(object)
 
     def __init__(self, *, handed_to: Path, no_sav: str = "") -> None:
         super().__init__()
@@ -91,6 +92,7 @@ class ResultsPlace(Place):
         self.exclusions.list_asked.connect(lambda: self.open_asked.emit(self.view.exclusions_file))
         self.figures.asked.connect(self._remedy)
         self.sessions.rows.opened.connect(self._open_session)
+        self.sessions.rows.version_asked.connect(self.version_asked)
 
     def _lay_out(self) -> None:
         self._chips_there = QWidget()

@@ -23,7 +23,7 @@ class SessionsModel(QAbstractTableModel):
 
     def __init__(self, columns: Sequence[Column]) -> None:
         super().__init__()
-        self._columns = tuple(columns)
+        self.columns = tuple(columns)
         self._every: tuple[SessionFacts, ...] = ()
         self._matches: Callable[[SessionFacts], bool] = lambda _facts: True
         self._now = datetime.now().astimezone()
@@ -47,17 +47,17 @@ class SessionsModel(QAbstractTableModel):
 
     def columnCount(self, parent: Index = NOWHERE) -> int:  # noqa: N802 - Qt's name
         """Return how many columns there are."""
-        return 0 if parent.isValid() else len(self._columns)
+        return 0 if parent.isValid() else len(self.columns)
 
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:  # noqa: N802 - Qt's name
         """Return a column's heading; of a row, whose session it is."""
         if role == Qt.ItemDataRole.DisplayRole:
-            return self._columns[section].heading if orientation == Qt.Orientation.Horizontal else None
+            return self.columns[section].heading if orientation == Qt.Orientation.Horizontal else None
         return None
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """Return what a cell says."""
-        facts, name = self.shown[index.row()], self._columns[index.column()].name
+        facts, name = self.shown[index.row()], self.columns[index.column()].name
         chip = {"status": status_chip, "validity": validity_chip}.get(name)
         match role:
             case Qt.ItemDataRole.DisplayRole:
@@ -66,12 +66,18 @@ class SessionsModel(QAbstractTableModel):
                 words = chip(facts)[2] if chip else self._words(facts, name)
                 return ", ".join(filter(None, (words, self._below(facts, name))))
             case Qt.ItemDataRole.ToolTipRole:
+                if name == "version" and facts.version:
+                    return f"Show what changed in the study since version {facts.version}"
                 if name == "validity" and facts.excluded is not None:
                     return f"Excluded from the analysis: {facts.excluded}"
                 said = f"{facts.name}: began {started_words(facts.started, self._now)}, {answers_words(facts)} answers"
                 return ", ".join(filter(None, (said, incidents(facts))))
             case Qt.ItemDataRole.FontRole if name == "participant":
                 return font("label", weight=600, scale=1.08)
+            case Qt.ItemDataRole.FontRole if name == "version":
+                face = font("label", weight=400, tabular=True)
+                face.setUnderline(True)
+                return face
             case _ if role == CHIP_ROLE:
                 return chip(facts) if chip else None
             case _ if role == BELOW_ROLE:
@@ -94,13 +100,16 @@ class SessionsModel(QAbstractTableModel):
                 return facts.study
             case "started":
                 return started_words(facts.started, self._now)
+            case "version":
+                return facts.version
         return answers_words(facts)
 
 
 class SessionsTable(QWidget):
     """The table of sessions, or a sentence in its place; ``opened`` carries the `SessionFacts` of a row.
 
-    ``chosen_changed`` comes when another row, or none, is chosen.
+    ``version_asked`` carries those of the row whose version was clicked; ``chosen_changed`` comes when another row, or
+    none, is chosen.
 
     Parameters
     ----------
@@ -111,6 +120,7 @@ class SessionsTable(QWidget):
     """
 
     opened = Signal(object)
+    version_asked = Signal(object)
     chosen_changed = Signal()
 
     def __init__(self, columns: Sequence[Column], none: str) -> None:
@@ -125,6 +135,7 @@ class SessionsTable(QWidget):
         column.addWidget(self.none)
         column.addWidget(self.table, 1)
         self.table.opened.connect(lambda index: self.opened.emit(self.model.shown[index.row()]))
+        self.table.clicked.connect(self._click)
         self.table.selectionModel().selectionChanged.connect(lambda *_changes: self.chosen_changed.emit())
         self.model.modelReset.connect(self._tell_rows)
         self._tell_rows()
@@ -156,6 +167,16 @@ class SessionsTable(QWidget):
         """Open the row that is chosen."""
         if self.chosen is not None:
             self.opened.emit(self.chosen)
+
+    def ask_for_version(self) -> None:
+        """Ask for the version of the row that is chosen."""
+        if self.chosen is not None and self.chosen.version:
+            self.version_asked.emit(self.chosen)
+
+    def _click(self, index: Index) -> None:
+        facts = self.model.shown[index.row()]
+        if self.model.columns[index.column()].name == "version" and facts.version:
+            self.version_asked.emit(facts)
 
     def _choose(self, before: SessionFacts | None) -> None:
         places = [one.folder for one in self.shown]

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 from study_app.viewmodels.sessions import SessionFacts, counted
 
-Name: TypeAlias = Literal["participant", "study", "started", "status", "validity", "answers"]
+Name: TypeAlias = Literal["participant", "study", "started", "status", "validity", "answers", "version"]
 Tone: TypeAlias = Literal["ok", "warn", "bad", "accent", "neutral"]
 Chipped: TypeAlias = tuple[Tone, str, str]
 """Tone, icon and word of a chip."""

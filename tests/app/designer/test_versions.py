@@ -6,13 +6,16 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
+from study_app.app.main_controller import MainController
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.versions.contents import kept_content, kept_versions
 from study_app.protocol.load import parse
@@ -20,6 +23,8 @@ from study_app.protocol.source.files import protocol_hash
 from study_app.store.receipt import without_conditions
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.viewmodels.designer.requests import SetText, SetValue
+from study_app.viewmodels.sessions import SessionFacts
+from tests.app.designer.conftest import Designer
 
 REPETITIONS = ("blocks", "liquids", "repetitions")
 
@@ -210,6 +215,45 @@ def test_a_session_under_way_makes_the_study_read_only_until_it_ends(ran: Any) -
     assert not ran.place.banner.isVisible()
     ran.editing.ask(SetValue(REPETITIONS, 4))
     assert "repetitions = 4" in ran.text
+
+
+def test_the_version_of_a_session_in_results_leads_to_what_changed(
+    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    designer = Designer(tmp_path)
+    source = designer.file.read_bytes()
+    folder = run(designer, "P001", source, study="elsewhere")
+    designer.file.write_bytes(source.replace(b"repetitions = 1", b"repetitions = 3", 1))
+    designer.window.close()
+    visit = MainController(designer.results)
+    visit.window.show()
+    visit.window.place("results")
+    assert visit.desk is not None
+    card = visit.desk.place.sessions
+    facts = SessionFacts(
+        "P001", 1, "kitchen", datetime.now().astimezone(), "completed", "valid", 8, 8, False, False, folder
+    )
+    card.show_sessions([replace(facts, version="1.0"), replace(facts, participant="P002", folder=folder.parent)])
+    table = card.rows.table
+    words = [[str(table.model().index(row, column).data()) for column in range(4)] for row in range(2)]
+    assert [row[3] for row in words] == ["1.0", ""]
+    card.rows.table.selectRow(1)
+    assert not card.version.isEnabled()
+    card.rows.table.selectRow(0)
+    assert card.version.isEnabled()
+    table.clicked.emit(table.model().index(0, 3))
+    assert visit.window.here == "designer"
+    assert visit.designer is not None
+    changes = visit.designer.changes.card
+    assert changes.view.chosen == protocol_hash(source)
+    assert changes.version.currentText().startswith("1.0: 1 session")
+    assert visit.designer.place.pane.tab == "changes"
+    visit.window.close()
+    visit.end()
+    visit.window.deleteLater()
+    designer.window.deleteLater()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 OTHER = """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QObject, QTimer
@@ -12,10 +13,12 @@ from study_app.app.designer.open_study import OpenStudy
 from study_app.app.designer.versions.comparison import Version, compare, file_version, kept_version, newest, version_of
 from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.authoring.versions.contents import kept_versions
+from study_app.authoring.versions.runs import Run, run_of
 from study_app.authoring.writer.refused import Refused
 from study_app.gui.designer.pane.right_pane import PanePage
 from study_app.gui.designer.versions.changes_card import ChangesCard
 from study_app.gui.designer.view import DesignerPlace
+from study_app.store.folders import SessionFolder
 from study_app.viewmodels.designer.file_text import retyped
 from study_app.viewmodels.designer.versions.change_rows import ChangeRow
 from study_app.viewmodels.designer.versions.changes_view import FILE, ChangesView, VersionChoice, version_choices
@@ -33,6 +36,7 @@ class ChangesController(QObject):
         self.editing, self.place, self.runs = editing, place, runs
         self.card = ChangesCard()
         self._chosen = ""
+        self._asked: Run | None = None
         place.pane.add_page(PanePage(TAB, "Changes", self.card, with_facts=False))
         self._resting = QTimer(self)
         self._resting.setInterval(REST_MS)
@@ -54,8 +58,17 @@ class ChangesController(QObject):
         self.place.show_tab(TAB)
         self.show()
 
+    def compare_with_session(self, study: str, folder: Path) -> None:
+        """Show the tab with the version that a session was run with, if its study is the one that is open."""
+        opened = self.editing.opened
+        run = run_of(SessionFolder(folder, "", 0).receipt)
+        if opened is None or run is None or opened.name != study:
+            return
+        self._asked = run
+        self.compare_with(run.hash)
+
     def _begin(self) -> None:
-        self._chosen = ""
+        self._chosen, self._asked = "", None
         self._resting.start()
 
     def show(self) -> None:
@@ -81,7 +94,13 @@ class ChangesController(QObject):
         if opened.base and opened.file.exists() and (opened.edited or opened.changed_outside()):
             file = "The file as another program wrote it" if opened.changed_outside() else "The file, without the edits"
         now = datetime.now().astimezone()
-        return version_choices(self.runs.known, kept_versions(opened.file), file, now)
+        return version_choices(self._known(), kept_versions(opened.file), file, now)
+
+    def _known(self) -> tuple[Run, ...]:
+        """Return what was run, with the session's version that was asked for, wherever its results are."""
+        known = self.runs.known
+        asked = self._asked
+        return known if asked is None or any(run.hash == asked.hash for run in known) else (asked, *known)
 
     def _default(self, keys: list[str]) -> str:
         run = newest(self.runs.known)
@@ -90,7 +109,7 @@ class ChangesController(QObject):
     def _version(self, opened: OpenStudy, key: str) -> Version:
         if key == FILE:
             return file_version(opened.file)
-        run = next((one for one in self.runs.known if one.hash == key), None)
+        run = next((one for one in self._known() if one.hash == key), None)
         return kept_version(key) if run is None else version_of(opened, run)
 
     # one step each

@@ -19,7 +19,7 @@ REST_MS: Final = 150
 
 
 class KnownRuns(QObject):
-    """The contents of the open study that sessions were run with; ``changed`` is emitted when the chip changes."""
+    """The contents of the open study that sessions were run with; ``changed`` comes when they or the chip change."""
 
     changed = Signal()
 
@@ -58,8 +58,10 @@ class KnownRuns(QObject):
 
     def _take(self, found: tuple[str, tuple[Run, ...]]) -> None:
         if self.editing.opened is not None and self.editing.opened.name == found[0]:
-            self.known = found[1]
+            fresh, self.known = found[1] != self.known, found[1]
             self._stand()
+            if fresh:
+                self.changed.emit()
 
     def _stand(self) -> None:
         standing = self.standing()
