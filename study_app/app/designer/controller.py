@@ -20,6 +20,7 @@ from study_app.app.designer.saving import Saving
 from study_app.app.designer.studies import header_state, new_choices, studies
 from study_app.app.designer.versions.changes import ChangesController
 from study_app.app.designer.versions.known_runs import KnownRuns
+from study_app.app.designer.versions.renaming import Renaming
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.facts import facts
 from study_app.authoring.names import renamed
@@ -58,6 +59,7 @@ class DesignerController(QObject):
         self.saving = Saving(editing, place, self.runs)
         self.changes = ChangesController(editing, place, self.runs)
         Clipboard(editing, place)
+        Renaming(editing, place, self.runs)
         self._others: dict[Path, OpenStudy] = {}
         self._warnings: tuple[str, ...] = ()
         self._find = ""

@@ -100,6 +100,17 @@ def _run(path: Path, _changed_ns: int) -> Run:
     return Run(str(held.get("protocol_hash")), version, *counted, str(held.get("started_at") or ""), path)
 
 
+def recorded_items(known: Iterable[Run]) -> dict[tuple[str, str], int]:
+    """Return how many sessions of participants were asked each item, by its questionnaire and id."""
+    found: dict[tuple[str, str], int] = {}
+    for run in known:
+        held = run.protocol if run.sessions else None
+        for name, questionnaire in (held or {}).get("questionnaires", {}).items():
+            for item in questionnaire.get("items", ()):
+                found[name, item["id"]] = found.get((name, item["id"]), 0) + run.sessions
+    return found
+
+
 def source_of(run: Run) -> str | None:
     """Return the text of a content that was run, with its liquid files; None where no copy is kept."""
     content = kept_content(run.hash)

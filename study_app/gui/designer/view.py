@@ -317,8 +317,7 @@ class DesignerPlace(Place):
 
     def _rename(self) -> None:
         if self.form.head.id.isVisible() and not self.view.header.read_only:
-            self.form.head.id.setFocus(Qt.FocusReason.ShortcutFocusReason)
-            self.form.head.id.selectAll()
+            self.form.head.edit_id()
 
     # parts of the place
 

@@ -256,6 +256,48 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
+def test_the_id_of_a_question_with_answers_is_locked_until_it_is_said_what_breaks(ran: Any, qtbot: Any) -> None:
+    question = ("questionnaires", "delay", "items", 0)
+    ran.editing.select(question)
+    head = ran.place.form.head
+    qtbot.waitUntil(head.unlock.isVisible)
+    assert head.id.isReadOnly()
+    click(qtbot, head.unlock)
+    card = ran.place.prompt
+    assert "Answers of 2 sessions" in card.accessibleName() + ran.place.form.head.unlock.toolTip()
+    click(qtbot, card.go_on)
+    assert ran.place.prompt is None
+    assert not head.id.isReadOnly()
+    qtbot.keyClicks(head.id, "difficult")
+    qtbot.keyClick(head.id, Qt.Key.Key_Return)
+    assert 'id = "difficult"' in ran.text
+    assert not head.unlock.isVisible()
+    ran.editing.select(("pages", "welcome"))
+    assert not head.id.isReadOnly()
+    ran.editing.undo()
+    ran.editing.select(question)
+    assert head.id.isReadOnly()
+
+
+def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(designer: Any, qtbot: Any) -> None:
+    text = designer.file.read_text()
+    designer.file.write_text(f"{text}# The pages thanks and thanks_2 are short.\n")
+    designer.controller.open("kitchen")
+    designer.editing.select(("pages", "thanks"))
+    head = designer.place.form.head
+    head.edit_id()
+    qtbot.keyClicks(head.id, "goodbye")
+    qtbot.keyClick(head.id, Qt.Key.Key_Return)
+    assert "[pages.goodbye]" in designer.text
+    card = designer.place.prompt
+    lines = [line.accessibleName() for line in card.lines]
+    count = len(designer.text.splitlines())
+    assert lines == [f"Go to line {count}: # The pages thanks and thanks_2 are short."]
+    click(qtbot, card.lines[0])
+    assert designer.place.file.editor.textCursor().blockNumber() == count - 1
+    assert designer.text.endswith("# The pages thanks and thanks_2 are short.\n")
+
+
 OTHER = """
 import sys
 from pathlib import Path

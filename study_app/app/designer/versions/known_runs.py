@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -10,7 +11,7 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.app.designer.editing import Editing
-from study_app.authoring.versions.runs import Run, Standing, keep_what_was_run, runs
+from study_app.authoring.versions.runs import Run, Standing, keep_what_was_run, recorded_items, runs
 from study_app.errors import StoreError
 from study_app.gui.widgets.background import Background
 from study_app.viewmodels.designer.versions.standing import VersionChip, version_chip
@@ -19,7 +20,10 @@ REST_MS: Final = 150
 
 
 class KnownRuns(QObject):
-    """The contents of the open study that sessions were run with; ``changed`` comes when they or the chip change."""
+    """The contents of the open study that sessions were run with; ``changed`` comes when they or the chip change.
+
+    ``items`` counts the sessions of participants by questionnaire and id of the questions that they were asked.
+    """
 
     changed = Signal()
 
@@ -27,6 +31,7 @@ class KnownRuns(QObject):
         super().__init__(editing)
         self.editing = editing
         self.known: tuple[Run, ...] = ()
+        self.items: Mapping[tuple[str, str], int] = {}
         self.chip = VersionChip()
         self._reader = Background(self)
         self._reader.done.connect(self._take)
@@ -53,12 +58,13 @@ class KnownRuns(QObject):
         return None if self.editing.opened is None else self.editing.opened.standing(self.known)
 
     def _begin(self) -> None:
-        self.known, self.chip = (), VersionChip()
+        self.known, self.items, self.chip = (), {}, VersionChip()
         self.look()
 
-    def _take(self, found: tuple[str, tuple[Run, ...]]) -> None:
+    def _take(self, found: tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]) -> None:
         if self.editing.opened is not None and self.editing.opened.name == found[0]:
-            fresh, self.known = found[1] != self.known, found[1]
+            fresh = found[1:] != (self.known, self.items)
+            _, self.known, self.items = found
             self._stand()
             if fresh:
                 self.changed.emit()
@@ -71,8 +77,8 @@ class KnownRuns(QObject):
             self.changed.emit()
 
 
-def _read(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, ...]]:
+def _read(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]:
     found = runs(results, study)
     with contextlib.suppress(StoreError):  # a draft that cannot be written says so
         keep_what_was_run(file, found)
-    return study, found
+    return study, found, recorded_items(found)

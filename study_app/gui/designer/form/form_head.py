@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, Signal
+from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
@@ -10,7 +10,7 @@ from study_app.gui.designer.form.typed_fields import TypedLine
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.controls import IconButton
+from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.designer.form_rows import Form
 from study_app.viewmodels.designer.requests import DuplicateElement, MoveElement, RenameElement
@@ -38,10 +38,14 @@ class Tile(Themed, QWidget):
 
 
 class FormHead(QWidget):
-    """Signals: ``asked`` (a request), ``delete_asked`` (path), ``id_typed`` (path, what is typed so far)."""
+    """Signals: ``asked`` (a request), ``delete_asked`` (path), ``id_typed`` (path, what is typed so far).
+
+    ``unlock_asked`` is emitted where a locked id is to be changed.
+    """
 
     asked = Signal(object)
     id_typed = Signal(object, str)
+    unlock_asked = Signal()
     delete_asked = Signal(object)
 
     def __init__(self) -> None:
@@ -53,6 +57,11 @@ class FormHead(QWidget):
         self.id = TypedLine("Id")
         self.id.setFixedWidth(230)
         self.id.rests = False
+        self.unlock = ActionButton("lock", "Change anyway …", height=34)
+        self.unlock.setProperty("dense", "true")
+        self.unlock.hide()
+        self._lock: tuple[object, str] = ((), "")
+        self._read_only = False
         self.refusal = label("", "label", "bad", wraps=True)
         self.refusal.hide()
         self.up = IconButton("arrow_up", "Move up", "Move up (Alt+Up)", size=34)
@@ -82,12 +91,14 @@ class FormHead(QWidget):
         words_of_id.setFixedWidth(LABEL_PX)
         line.addWidget(words_of_id)
         line.addWidget(self.id)
+        line.addWidget(self.unlock)
         line.addStretch()
         grid.addWidget(self.id_line, 1, 0, 1, 6)
         grid.addWidget(self.refusal, 2, 0, 1, 6)
         grid.setColumnStretch(1, 1)
         self.id.typed.connect(self._rename)
         self.id.textEdited.connect(self._type_id)
+        self.unlock.clicked.connect(self.unlock_asked)
         self.up.clicked.connect(lambda: self.move_by(-1))
         self.down.clicked.connect(lambda: self.move_by(1))
         self.copy.clicked.connect(self.duplicate)
@@ -104,7 +115,8 @@ class FormHead(QWidget):
         at = "" if form.position is None else f"  ·  {form.position[0]} of {form.position[1]}"
         self.kind.setText(f"{form.kind}{at}")
         self.id_line.setVisible(form.id is not None)
-        self.id.setReadOnly(read_only)
+        self._read_only = read_only
+        self._apply_lock()
         if not self.refusal.text():
             self.id.show_text(form.id or "")
         place, count = form.position or (0, 0)
@@ -116,6 +128,25 @@ class FormHead(QWidget):
         self.down.setEnabled(not read_only and 0 < place < count)
         for button in (self.copy, self.delete):
             button.setEnabled(not read_only and len(form.path) > 1 and form.id is not None)
+
+    def show_lock(self, path: object, why: str) -> None:
+        """Lock the id of the element at ``path``, or with "" unlock it."""
+        self._lock = (path, why)
+        self._apply_lock()
+
+    def _apply_lock(self) -> None:
+        path, why = self._lock
+        locked = bool(why) and self.form is not None and self.form.path == path
+        self.id.setReadOnly(self._read_only or locked)
+        self.id.setToolTip(why if locked else "")
+        self.unlock.setVisible(locked and not self._read_only)
+        self.unlock.setToolTip(why)
+        self.unlock.setAccessibleDescription(why)
+
+    def edit_id(self) -> None:
+        """Go to the id."""
+        self.id.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.id.selectAll()
 
     def refuse(self, sentence: str) -> None:
         """Say why the id cannot be changed."""

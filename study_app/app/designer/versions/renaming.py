@@ -1,0 +1,91 @@
+"""What a new id does beyond the references: answers recorded under the old one, and comments that mention it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from PySide6.QtCore import QObject
+
+from study_app.app.designer.editing import Editing
+from study_app.app.designer.versions.known_runs import KnownRuns
+from study_app.authoring.writer.comments import comments_naming
+from study_app.gui.designer.versions.rename_cards import CommentsCard, UnlockCard
+from study_app.gui.designer.view import DesignerPlace
+from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.form_rows import value_at
+from study_app.viewmodels.designer.requests import RenameElement, Request
+from study_app.viewmodels.sessions import counted
+
+BREAKS: Final = (
+    "answers before and after are in different columns of the tables",
+    "figures and tests take them as two questions",
+    "an analysis that was decided before and names the old id does not find the new one",
+)
+
+
+class Renaming(QObject):
+    """Locks the ids of questions with recorded answers, and lists comments after a rename.
+
+    It notes a rename before `Editing` makes it: construct it before requests are connected to that.
+    """
+
+    def __init__(self, editing: Editing, place: DesignerPlace, runs: KnownRuns) -> None:
+        super().__init__(editing)
+        self.editing, self.place, self.runs = editing, place, runs
+        self._unlocked: Path = ()
+        self._renamed: tuple[Path, str] | None = None
+        place.asked.connect(self._note)
+        editing.changed.connect(self._lock)
+        editing.edited.connect(self._list_comments)
+        runs.changed.connect(self._lock)
+        place.form.head.unlock_asked.connect(self._explain)
+
+    def _id(self, path: Path) -> str:
+        """Return the id of an element, "" where it has none."""
+        opened = self.editing.opened
+        value = None if opened is None else value_at(opened.study.document, path)
+        if not isinstance(value, dict):
+            return ""
+        return str(value.get("id", path[-1]))
+
+    def _why(self, path: Path) -> str:
+        """Return why an id is locked, "" where it is not."""
+        if len(path) != 4 or path[2] != "items" or path == self._unlocked:
+            return ""
+        sessions = self.runs.items.get((str(path[1]), self._id(path)), 0)
+        return f"Answers of {counted(sessions, 'session')} are recorded under this id." if sessions else ""
+
+    def _lock(self) -> None:
+        path = self.editing.selected
+        if path != self._unlocked:
+            self._unlocked = ()
+        self.place.form.head.show_lock(path, self._why(path))
+
+    def _explain(self) -> None:
+        path = self.editing.selected
+        card = UnlockCard(self._id(path), self._why(path), BREAKS)
+        card.answered.connect(lambda _id: self._unlock(path))
+        self.place.show_prompt(card, card.first)
+
+    def _unlock(self, path: Path) -> None:
+        self._unlocked = path
+        self._lock()
+        self.place.form.head.edit_id()
+
+    def _note(self, asked: Request) -> None:
+        self._renamed = (asked.path, self._id(asked.path)) if isinstance(asked, RenameElement) else None
+
+    def _list_comments(self) -> None:
+        renamed, self._renamed = self._renamed, None
+        opened = self.editing.opened
+        if renamed is None or opened is None:
+            return
+        found = comments_naming(opened.study.text, renamed[1])
+        if found:
+            card = CommentsCard(renamed[1], found)
+            card.line_asked.connect(self._go_to)
+            self.place.show_prompt(card, card.first)
+
+    def _go_to(self, line: int) -> None:
+        self.place.show_tab("file")
+        self.place.file.editor.go_to(line - 1)
