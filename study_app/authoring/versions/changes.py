@@ -7,6 +7,8 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path as Folder
 from typing import Any, Final, Literal, TypeAlias
 
 from study_app.authoring.study import Study
@@ -69,13 +71,13 @@ def changes(version: str, study: Study) -> tuple[Change, ...]:
     Where both mean the same protocol every difference is one of notation, and answers stay comparable.
     """
     text, liquids = unbundled(version.encode())
-    old = tomllib.loads(version)
+    old = _document(version)
     if TABLE not in old:  # kept without its liquid files
-        new = tomllib.loads(study.text)
+        new = _document(study.text)
     else:
-        new = tomllib.loads(with_liquid_files(study.text.encode(), study.folder).decode())
+        new = _document(with_liquid_files(study.text.encode(), study.folder).decode())
     found = document_differences(old, new)
-    same = bool(found) and not liquids and _same(Study(text.decode(), study.folder).protocol, study.protocol)
+    same = bool(found) and not liquids and _same(_version(text.decode(), study.folder).protocol, study.protocol)
     return tuple(_change(one, old, new, comparable=same) for one in found)
 
 
@@ -93,6 +95,17 @@ def effect_of(sentence: str) -> Effect:
     if _TABLES.match(sentence):
         return "tables"
     return "comparable" if _COMPARABLE.match(sentence) else "measured"
+
+
+@lru_cache(maxsize=4)
+def _document(text: str) -> dict[str, Any]:
+    """Return the document of a text, which must not be changed."""
+    return tomllib.loads(text)
+
+
+@lru_cache(maxsize=2)
+def _version(text: str, folder: Folder) -> Study:
+    return Study(text, folder)
 
 
 def _same(one: Protocol | None, other: Protocol | None) -> bool:

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.typed_fields import TypedLine
 from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import RADIUS_CONTROL
+from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
@@ -55,10 +55,12 @@ class FormHead(QWidget):
         self.title = Elided("card")
         self.kind = label("", "small", "text2")
         self.id = TypedLine("Id")
-        self.id.setFixedWidth(230)
+        self.id.setMinimumWidth(110)
+        self.id.setMaximumWidth(230)
         self.id.rests = False
         self.unlock = ActionButton("lock", "Change anyway …", height=34)
         self.unlock.setProperty("dense", "true")
+        self.unlock.setFont(font("label"))
         self.unlock.hide()
         self._lock: tuple[object, str] = ((), "")
         self._read_only = False
@@ -90,9 +92,9 @@ class FormHead(QWidget):
         words_of_id = label("Id", "label")
         words_of_id.setFixedWidth(LABEL_PX)
         line.addWidget(words_of_id)
-        line.addWidget(self.id)
+        line.addWidget(self.id, 8)
         line.addWidget(self.unlock)
-        line.addStretch()
+        line.addStretch(1)
         grid.addWidget(self.id_line, 1, 0, 1, 6)
         grid.addWidget(self.refusal, 2, 0, 1, 6)
         grid.setColumnStretch(1, 1)
