@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Final
@@ -12,12 +12,13 @@ from study_app.authoring.drafts import Draft, Keeper, draft_of, drafted_files
 from study_app.authoring.history import History
 from study_app.authoring.new_study import check_free, copy_of
 from study_app.authoring.study import Study, read
-from study_app.authoring.versions.contents import content_hash, keep_content, save
+from study_app.authoring.versions.contents import content_hash, keep_content, save, write_whole
 from study_app.authoring.versions.runs import Run, Standing, check_saving, standing
 from study_app.authoring.writer.edits import Set
+from study_app.authoring.writer.refused import Refused
 from study_app.errors import StoreError
 from study_app.protocol.source.files import shipped, shipped_file
-from study_app.protocol.source.liquid_files import with_liquid_files
+from study_app.protocol.source.liquid_files import unbundled, with_liquid_files
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import is_open
 from study_app.viewmodels.designer.form_rows import first_element, value_at
@@ -162,11 +163,24 @@ class OpenStudy:
         """
         source = self.source()
         check_saving(content_hash(source), self.version, known)
+        self._bring_liquid_files(source)
         self.base = save(self.file, self.study.text, self.base)
         self.saved = self.study.text
         self.keeper.saved(self.base)
         self.kept = self.draft = None
         keep_content(source)
+
+    def _bring_liquid_files(self, source: bytes) -> None:
+        """Write the liquid files that the study names into its own folder, where it was copied from another one."""
+        folder = self.file.resolve().parent
+        if self.study.folder.resolve() == folder:
+            return
+        for name, text in unbundled(source)[1].items():
+            path = folder / name
+            if path.exists() and _content(path) != text.encode():
+                raise Refused(f"{path} is there with another liquid: rename one of the two files")
+            write_whole(path, text.encode())
+        self.history = replace(self.history, study=replace(self.study, folder=folder))
 
     def saved_as(self, name: str) -> OpenStudy:
         """Return the study with its edits under another name, as one step; this one goes back to its file.

@@ -15,11 +15,12 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
+from study_app.app.designer.controller import DesignerController
 from study_app.app.main_controller import MainController
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.versions.contents import kept_content, kept_versions
 from study_app.protocol.load import parse
-from study_app.protocol.source.files import protocol_hash
+from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.receipt import without_conditions
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.viewmodels.designer.requests import SetText, SetValue
@@ -296,6 +297,28 @@ def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(d
     click(qtbot, card.lines[0])
     assert designer.place.file.editor.textCursor().blockNumber() == count - 1
     assert designer.text.endswith("# The pages thanks and thanks_2 are short.\n")
+
+
+def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_path: Path) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    liquid = shipped_file("demo").read_text().split("[liquids.thick]")[1].split("\n\n")[0]
+    (elsewhere / "syrup.toml").write_text(f"[liquids.syrup]{liquid}\n")
+    text = designer.file.read_text().replace(f"[liquids.thick]{liquid}", '[liquids.thick]\nfile = "syrup.toml"')
+    (elsewhere / "kitchen.toml").write_text(text)
+    designer.controller.open(str(elsewhere / "kitchen.toml"))
+    assert designer.editing.opened.study.faults == ()
+    designer.controller.begin(str(elsewhere / "kitchen.toml"), "mine")
+    designer.saving.save()
+    assert designer.editing.opened.file.exists()
+    assert (designer.file.parent / "syrup.toml").read_bytes() == (elsewhere / "syrup.toml").read_bytes()
+    designer.controller.open("kitchen")
+    again = DesignerController(designer.results)
+    again.open("mine")
+    assert again.editing.opened is not None
+    assert again.editing.opened.study.faults == ()
+    assert kept_content(protocol_hash(again.editing.opened.source())) is not None
+    again.place.deleteLater()
 
 
 OTHER = """
