@@ -33,7 +33,7 @@ def named_at(document: Document, place: Path) -> Path | None:
 
 def references_to(document: Document, thing: Path) -> tuple[Path, ...]:
     """Return the places of the texts that name a table, as ``("liquids", "water")``, or an item."""
-    return tuple(place for place, named in _references(document) if named == thing)
+    return tuple(place for place, named in named_places(document) if named == thing)
 
 
 def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
@@ -89,7 +89,7 @@ def with_references(document: Document, thing: Path, needs: Callable[[Path], boo
         Returns whether the table around a key would be incomplete without it (`Study.needs`); then it goes, too.
     """
     named: dict[Path, list[Path]] = {}
-    for place, target in _references(document):
+    for place, target in named_places(document):
         named.setdefault(place, []).append(target)
     gone = [thing]
     for inner in gone:  # grows while it is read
@@ -138,7 +138,7 @@ def _covered(path: Path, outer: Iterable[Path]) -> bool:
     return any(_within(path, one) for one in outer)
 
 
-def _references(document: Document) -> Iterator[tuple[Path, Path]]:
+def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
     """Yield every place of a text that names something, with what it names."""
     for pattern, sections in CHOICES.items():
         for place, name in entries(document, pattern):

@@ -1,0 +1,1 @@
+"""Playing the study that is edited, from a step on."""
