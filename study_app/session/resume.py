@@ -42,7 +42,9 @@ class Start:
 FIRST = Start()
 
 
-def resume_at(protocol: Protocol, schedule: Schedule, lines: Iterable[Line], key: Key | None = None) -> Start:
+def resume_at(
+    protocol: Protocol, schedule: Schedule, lines: Iterable[Line], key: Key | None = None, *, exactly: bool = False
+) -> Start:
     """Return where the session with these journal lines goes on.
 
     The levels of answered trials are those of the journal, opened with the study's ``key``; without it `Start.heard`
@@ -50,7 +52,7 @@ def resume_at(protocol: Protocol, schedule: Schedule, lines: Iterable[Line], key
 
     A trial whose answers are not all confirmed is presented again as its next attempt, so that nobody answers what they
     felt before the gap; one that asks nothing and was done is over. With ``resume = "block"`` the whole block is
-    presented again.
+    presented again, unless the session is to go on ``exactly`` where it was.
 
     Raises
     ------
@@ -61,7 +63,7 @@ def resume_at(protocol: Protocol, schedule: Schedule, lines: Iterable[Line], key
     progress = progress_of(lines)
     step = reached = _next_step(protocol, schedule, progress)
     heard = () if key is None else heard_in(protocol, opened(lines, key))
-    if protocol.study.resume == "block":
+    if protocol.study.resume == "block" and not exactly:
         step = _block_start(schedule, step)
         before = {trial.number for trial in schedule.steps[:step] if isinstance(trial, Trial)}
         heard = tuple(one for one in heard if one.trial in before)

@@ -9,9 +9,12 @@ participant felt answers word for word as in the rehearsal.
 from __future__ import annotations
 
 import time
+import typing
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
@@ -30,11 +33,11 @@ from study_app.session.simulated.participant import SimulatedParticipant
 from study_app.session.simulated.trial_features import FEELING, Feelings, feelings
 from study_app.session.transitions.commands import Adjust, Command, Finish, ShowPage, StartTrial, Write
 from study_app.session.transitions.events import Begin, Continue, Event, Stepped, TaskDone, TimeUp
-from study_app.session.transitions.state import FINAL
+from study_app.session.transitions.state import FINAL, SessionState
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.clock import SessionClock
 from study_app.store.folders import rehearsal_folder
-from study_app.store.sessions.simulated_sessions import SimulatedSession, SimulatedStudy
+from study_app.store.sessions.simulated_sessions import SimulatedStudy
 from study_app.workspace import workspace
 
 DEVICE = {"name": "answers-only", "measured": False}
@@ -87,44 +90,92 @@ def rehearse_answers(
     said_s = time.monotonic()
     with kept:
         for number, person in enumerate(people, start=1):
-            _Answering(study, person, seed, kept, felt).run()
+            _answer(study, person, seed, kept, felt)
             if progress is not None and (time.monotonic() - said_s >= SAY_EVERY_S or number == participants):
                 said_s = time.monotonic()
                 progress(f"{person}: {number} of {participants} answered (simulated)")
     return folder
 
 
-class _Answering(SimulatedParticipant):
-    """One session that is answered without being held."""
+def _answer(study: Protocol, who: str, seed: int, kept: SimulatedStudy, felt: Feelings) -> None:
+    """Answer one session of a study."""
+    time_passed = SimulatedTime()
+    store = kept.begin(who, SessionClock(time_passed.ns, datetime.now().astimezone()))
+    own = store.protocol
+    schedule = build_schedule(own, who, seed)
+    state = open_session(own, schedule, kept.key.codes, study.study.languages[0], secret=kept.key.nonce)
+    Answering(study, state, store, time_passed, lambda block, condition: felt[block, condition]).run()
 
-    def __init__(self, study: Protocol, who: str, seed: int, kept: SimulatedStudy, felt: Feelings) -> None:
-        self._feelings = felt
+
+class Kept(typing.Protocol):
+    """Where the events of a session go."""
+
+    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None: ...  # noqa: D102
+    def finish(self, status: str, reason: str = "") -> None: ...  # noqa: D102
+
+
+@dataclass(slots=True)
+class SimulatedTime:
+    """The time of a session that nobody waits for [s]."""
+
+    seconds: float = 0.0
+
+    def ns(self) -> int:
+        """Return it in ns, as a clock."""
+        return round(self.seconds * 1e9)
+
+
+class Answering(SimulatedParticipant):
+    """One session that is answered without being held.
+
+    Parameters
+    ----------
+    study : Protocol
+        What is run, with all its groups.
+    state : SessionState
+        The session before its first step.
+    kept : Kept
+        Where its events go.
+    time_passed : SimulatedTime
+        Its clock.
+    felt : callable
+        Returns what was felt in a condition of a block, of which one is drawn for each trial.
+    """
+
+    def __init__(
+        self,
+        study: Protocol,
+        state: SessionState,
+        kept: Kept,
+        time_passed: SimulatedTime,
+        felt: Callable[[str, str], Sequence[Felt]],
+    ) -> None:
+        self._felt_in = felt
         self._feels = NOTHING_FELT
         self._sensed_in: dict[int, list[float]] = {}  # by trial, interval by interval
-        self._now_s = 0.0
-        clock = SessionClock(lambda: round(self._now_s * 1e9), datetime.now().astimezone())
-        self._store: SimulatedSession = kept.begin(who, clock)
-        own = self._store.protocol
-        schedule = build_schedule(own, who, seed)
-        super().__init__(study, schedule, OBSERVER)
-        self._state = open_session(own, schedule, kept.key.codes, study.study.languages[0], secret=kept.key.nonce)
+        self._time = time_passed
+        self._store = kept
+        super().__init__(study, state.plan.schedule, OBSERVER)
+        self.state = state
 
-    def run(self) -> None:
-        """Go from the first page to the last."""
-        self._post(Begin(self._now_s))
-        while self._state.phase not in FINAL:
+    def run(self, until: int | None = None) -> None:
+        """Go from the first page to the last, or to the beginning of the step of that index."""
+        if until == 0:
+            return
+        self._post(Begin(self._time.seconds))
+        while self.state.phase not in FINAL and (until is None or self.state.index < until):
             match self.page:
                 case TextPage() as page:
                     self._pass(reading_s(page))
-                    self._post(Continue(self._now_s))
+                    self._post(Continue(self._time.seconds))
                 case TaskPage(interval=Interval(resting=True)) | FeedbackPage():
-                    self._pass(max(0.0, (self._state.until_s or 0.0) - self._now_s) + 0.001)  # time comes in whole ms
-                    self._post(TimeUp(self._now_s))
+                    self._pass(max(0.0, (self.state.until_s or 0.0) - self._time.seconds) + 0.001)  # time comes in whole ms
+                    self._post(TimeUp(self._time.seconds))
                 case TaskPage(adjusts=True) as page:
                     self._set(page)
                 case TaskPage() as page:
                     self._pass(_least_s(page.task))
-                    self._post(TaskDone(self._now_s, "complete", {}))
+                    self._post(TaskDone(self._time.seconds, "complete", {}))
                 case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
                 case _:
@@ -132,18 +183,18 @@ class _Answering(SimulatedParticipant):
 
     def _set(self, page: TaskPage) -> None:
         """Set the level by what was sensed, exactly as it is, until it is done or the time is over."""
-        observer, began_s = self._adjusting(page.trial), self._now_s
+        observer, began_s = self._adjusting(page.trial), self._time.seconds
         sensed = self._sensed_in[page.trial]
         self._pass(page.task.lead_s)
         while True:
             self._pass(LOOK_S)
             steps = observer.steps(sensed[-1], self._remembered(page.trial, sensed[-1]))
-            over = self._now_s - began_s >= page.task.limit_s
+            over = self._time.seconds - began_s >= page.task.limit_s
             if over or not steps:
                 break
-            self._post(Stepped(self._now_s, steps))
+            self._post(Stepped(self._time.seconds, steps))
         self.answers += 1
-        self._post(TaskDone(self._now_s, "timeout" if over else "complete", {}))
+        self._post(TaskDone(self._time.seconds, "timeout" if over else "complete", {}))
 
     def _felt(self, _trial: int | None) -> Felt:
         return self._feels
@@ -153,26 +204,26 @@ class _Answering(SimulatedParticipant):
 
     def _sense(self, trial: int, presented: Stimulated) -> None:
         """Take what a trial presents: a varied number exactly as it was requested, a condition as it was felt."""
-        block = self._state.trial.block
+        block = self.state.trial.block
         if presented.vary is not None:
             sensed = presented.value / 1000 if presented.vary in DELAYS else presented.value
             self._sensed_in.setdefault(trial, []).append(sensed)
             return
-        felt = self._feelings[block, presented.condition]
+        felt = self._felt_in(block, presented.condition)
         self._feels = felt[int(len(felt) * self._stream(f"{trial}/felt")())]
-        if self._state.due is not None:
+        if self.state.due is not None:
             attended = Comparison.of(self._study, self._study.blocks[block], self.observer)
             self._sensed_in.setdefault(trial, []).append(attended.sensed(self._feels))
 
     def _seconds(self) -> float:
-        return self._now_s
+        return self._time.seconds
 
     def _pass(self, seconds: float) -> None:
         """Let time pass, in whole milliseconds as a servo's clock has them."""
-        self._now_s = round(self._now_s + seconds, 3)
+        self._time.seconds = round(self._time.seconds + seconds, 3)
 
     def _post(self, event: Event) -> None:
-        self._state, commands = advance(self._state, event)
+        self.state, commands = advance(self.state, event)
         for command in commands:
             self._carry_out(command, event.at_s)
 
