@@ -187,10 +187,11 @@ class MainController(QObject):
 
         self.designer = DesignerController(self.results)
         self.designer.saving.saved.connect(self._show_saved)
+        self.designer.playing.kept.connect(self._show_saved)
         return self.designer.place
 
     def _show_saved(self, _file: Path) -> None:
-        """Show the study that was saved on home's cards."""
+        """Show the study, or the pilot, that was saved on home's cards."""
         if self._home_place is not None:
             self._home_place.show_studies()
             self._home_place.show_sessions()
@@ -244,6 +245,8 @@ class MainController(QObject):
         patience = Patience(BY_SIGNAL_S if self.code else OPENING_PATIENCE_S)
         if self._home_place is not None:
             self._home_place.end()
+        if self.designer is not None:
+            self.designer.playing.end(patience)
         if self.lab is not None:
             self.lab.end(patience)
         self.devices.end(patience.left_s)
@@ -255,6 +258,8 @@ class MainController(QObject):
         self.code = 128 + number
         if self.live is not None:
             self.live.end_by_signal(number)
+        if self.designer is not None:
+            self.designer.playing.end_by_signal(number)
         self.window.close()
         self.loop.quit()
 

@@ -26,6 +26,7 @@ from study_app.store.sessions.reopen import reopen
 from study_app.store.tables.study_description import check_study
 
 MEASURED_S = 2.0  # so long the servo is looked at before a session
+PLAYED_MEASURED_S = 0.5  # and before one that is played from the designer
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,7 @@ def measured(rig: Rig, chosen: NewSession, *, sleep: Callable[[float], object] =
         screen=Screen(refresh_hz=0.0, scaling=1.0),
         participant=chosen.row_of or chosen.participant,
         recordings=chosen.recordings,
-        lasts_s=MEASURED_S,
+        lasts_s=PLAYED_MEASURED_S if chosen.played else MEASURED_S,
         sleep=sleep,
     )
 

@@ -82,6 +82,26 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True,
     return True
 
 
+def copy_folder(folder: Path, to: Path) -> None:
+    """Copy a folder with all that it holds to ``to``, which must not exist, whole or not at all.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    half = temporary_path(to)
+    try:
+        to.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copytree(folder, half)
+        half.rename(to)
+        sync_folder(to.parent)
+    except OSError as error:  # shutil.Error, too
+        raise cannot_write(to, error) from error
+    finally:
+        shutil.rmtree(half, ignore_errors=True)
+
+
 def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
     """Add ``line`` (which ends in a newline) to the end of ``path`` and, with ``waits``, flush it to the disk.
 

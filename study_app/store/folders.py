@@ -185,7 +185,17 @@ def study_folder(results: Path, study: str, *, pilot: bool = False) -> StudyFold
 
 def rehearsal_folder(results: Path, study: str) -> Path:
     """Return a folder for a rehearsal that does not exist yet, apart from every participant's data."""
+    return _free(results, f"{study}-rehearsal")
+
+
+def kept_pilot_folder(results: Path, study: str) -> Path:
+    """Return a folder for a pilot that was played and is kept; each has a key, and so a folder, of its own."""
+    return _free(results, f"{study}-pilot")
+
+
+def _free(results: Path, name: str) -> Path:
+    """Return the first of NAME-1, NAME-2 … that does not exist."""
     number = 1
-    while (folder := results / f"{study}-rehearsal-{number}").exists():
+    while (folder := results / f"{name}-{number}").exists():
         number += 1
     return folder

@@ -15,6 +15,7 @@ from study_app.app.designer.editing import Editing
 from study_app.app.designer.element_steps import Step, delete_prompt
 from study_app.app.designer.measures.controller import MeasuresController
 from study_app.app.designer.open_study import OpenStudy, open_file, open_new, open_unsaved
+from study_app.app.designer.play.playing import Playing
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.app.designer.saving import Saving
 from study_app.app.designer.studies import header_state, new_choices, studies
@@ -58,6 +59,7 @@ class DesignerController(QObject):
         self.runs = KnownRuns(editing)
         self.saving = Saving(editing, place, self.runs)
         self.changes = ChangesController(editing, place, self.runs)
+        self.playing = Playing(editing, place)
         Clipboard(editing, place)
         Renaming(editing, place, self.runs)
         self._others: dict[Path, OpenStudy] = {}

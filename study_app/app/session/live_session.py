@@ -228,7 +228,8 @@ class LiveSession(QObject):
         protocol = self._store.as_recorded(protocol)
         protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
         schedule = chosen.schedule(protocol)
-        start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines, self._store.key)
+        lines, key = self._store.lines, self._store.key
+        start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, lines, key, exactly=chosen.played)
         if descriptor_of(chosen.device).kind == "seen":
             protocol = without_force(protocol)
         text_scale = text_scale_on(self.settings, shown_on)

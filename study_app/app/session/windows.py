@@ -69,7 +69,7 @@ def open_windows(
         theme=theme,
     )
     shown_on, operated_on = choose_screens(chosen.screen)
-    strip = Strip() if shown_on is operated_on else None
+    strip = Strip() if shown_on is operated_on and not chosen.played else None
     participant = ParticipantWindow(
         words(chosen.language),
         clock=clock,
@@ -101,8 +101,9 @@ def open_windows(
     )
     rate_hz = refresh_hz or shown_on.refreshRate() or 60.0
     bridge = SessionBridge(parts, participant, operator, refresh_hz=rate_hz, strip=strip)
-    place(operator, operated_on, corner=shown_on is operated_on)
-    operator.show()
+    if not chosen.played:
+        place(operator, operated_on, corner=shown_on is operated_on)
+        operator.show()
     participant.open_on(shown_on)
     return bridge
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
+from study_app.gui.designer.play.play_controls import PlayControls
+from study_app.gui.designer.play.play_strip import PlayStrip
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
@@ -16,6 +18,7 @@ from study_app.viewmodels.designer.view import HeaderState
 from study_app.viewmodels.tones import Tone
 
 NEW, OPEN = "\0new", "\0open"
+WIDE_FROM = 1180
 
 
 class ChipButton(Themed, PressedByEnter):
@@ -80,7 +83,13 @@ class DesignerHeader(QWidget):
         self.undo = IconButton("undo", "Undo")
         self.redo = IconButton("redo", "Redo")
         self.save = ActionButton("save", "Save", role="primary")
-        row = QHBoxLayout(self)
+        self.play = PlayControls()
+        self.strip = PlayStrip()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        row = self._row = QHBoxLayout()
+        column.addLayout(row)
+        column.addWidget(self.strip)
         row.setContentsMargins(SHADOW, 0, SHADOW, 0)
         row.setSpacing(10)
         self.title = label("Study designer", "title")
@@ -91,7 +100,7 @@ class DesignerHeader(QWidget):
         row.addWidget(self.draft)
         row.addWidget(self.version)
         row.addStretch()
-        for part in (self.undo, self.redo, self.save):
+        for part in (self.undo, self.redo, self.play, self.save):
             row.addWidget(part)
         self.study.activated.connect(self._choose)
         self.problems.clicked.connect(self.problems_asked)
@@ -115,7 +124,7 @@ class DesignerHeader(QWidget):
                 self.study.addItem("Open file …", OPEN)
                 self.study.setCurrentIndex(self.study.findData(state.chosen) if state.chosen else -1)
         there = bool(state.chosen)
-        for part in (self.problems, self.undo, self.redo, self.save):
+        for part in (self.problems, self.undo, self.redo, self.play, self.save):
             part.setVisible(there)
         self.problems.show_state(*state.problems)
         self.draft.show_state("neutral", "save", state.draft)
@@ -134,19 +143,13 @@ class DesignerHeader(QWidget):
 
     def _make_room(self) -> None:
         """Hide the title, the draft and the version, in this order, where the window is too narrow for them."""
-        row, state = self.layout(), self.state
-        assert row is not None  # noqa: S101 - it was given one
+        state = self.state
         self.title.show()
         self.draft.setVisible(bool(state.chosen and state.draft))
         self.version.setVisible(bool(state.chosen and state.version.words))
         for part in (self.title, self.draft, self.version):
-            row.invalidate()
-            part.setVisible(part.isVisibleTo(self) and row.minimumSize().width() <= self.width())
-
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Make room."""
-        super().resizeEvent(event)
-        self._make_room()
+            self._row.invalidate()
+            part.setVisible(part.isVisibleTo(self) and self._row.minimumSize().width() <= self.width())
 
     def _announce(self, before: HeaderState, state: HeaderState) -> None:
         """Have said once what changes by itself: the problems, and that a draft is kept."""
@@ -156,6 +159,12 @@ class DesignerHeader(QWidget):
             say(self, state.problems[2])
         if state.draft.startswith("Draft") and not before.draft.startswith("Draft"):
             say(self, state.draft)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Say fewer words where there is little room."""
+        super().resizeEvent(event)
+        self.play.show_wide(self.width() >= WIDE_FROM)
+        self._make_room()
 
     def _choose(self, at: int) -> None:
         source = self.study.itemData(at)

@@ -169,7 +169,9 @@ class Answering(SimulatedParticipant):
                     self._pass(reading_s(page))
                     self._post(Continue(self._time.seconds))
                 case TaskPage(interval=Interval(resting=True)) | FeedbackPage():
-                    self._pass(max(0.0, (self.state.until_s or 0.0) - self._time.seconds) + 0.001)  # time comes in whole ms
+                    self._pass(
+                        max(0.0, (self.state.until_s or 0.0) - self._time.seconds) + 0.001
+                    )  # time comes in whole ms
                     self._post(TimeUp(self._time.seconds))
                 case TaskPage(adjusts=True) as page:
                     self._set(page)

@@ -1,0 +1,63 @@
+"""The header's button that plays the study from here, and the list of devices to play with."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QActionGroup
+from PySide6.QtWidgets import QHBoxLayout, QMenu, QWidget
+
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.controls import ActionButton, IconButton
+from study_app.viewmodels.designer.play import PlayDevices
+
+PLAY, PLAY_NARROW = "Play from here", "Play"
+
+
+class PlayControls(QWidget):
+    """Signals: ``asked``, ``device_chosen`` (name)."""
+
+    asked = Signal()
+    device_chosen = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.devices = PlayDevices()
+        self.play = ActionButton("play", PLAY, key="F5")
+        self.play.setAccessibleName(PLAY)
+        self.play.setToolTip("Play from here (F5)")
+        self.device = IconButton("device", "Device to play with")
+        self.menu = QMenu(self)
+        self.menu.setFont(font("label"))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        row.addWidget(self.play)
+        row.addWidget(self.device)
+        self.play.clicked.connect(self.asked)
+        self.device.clicked.connect(self._show_menu)
+
+    def show_devices(self, devices: PlayDevices) -> None:
+        """Offer devices, of which one is chosen."""
+        self.devices = devices
+        self.menu.clear()
+        group = QActionGroup(self.menu)
+        for name, words in devices.choices:
+            action = self.menu.addAction(words)
+            action.setCheckable(True)
+            action.setChecked(name == devices.chosen)
+            group.addAction(action)
+            action.triggered.connect(lambda _checked=False, name=name: self.device_chosen.emit(name))
+        self.device.setToolTip(f"Device: {devices.title}")
+        self.device.setAccessibleName(f"Device to play with: {devices.title}")
+
+    def show_playing(self, playing: bool) -> None:
+        """Offer to play unless a pilot is played."""
+        self.play.setEnabled(not playing)
+        self.device.setEnabled(not playing)
+
+    def show_wide(self, wide: bool) -> None:
+        """Say all words, or as few as needed."""
+        self.play.show_action("play", PLAY if wide else PLAY_NARROW)
+
+    def _show_menu(self) -> None:
+        self.menu.popup(self.device.mapToGlobal(self.device.rect().bottomLeft()))

@@ -1,0 +1,75 @@
+"""The line below the header that says what is played, and asks before and after."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.widgets.cards import SHADOW, Card, Icon
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Ink, label
+from study_app.viewmodels.designer.play import PlayState
+
+INKS: dict[str, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}
+ROLES = {"play": "primary", "stop": "danger", "delete": "danger"}
+ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
+
+
+class PlayStrip(Card):
+    """Signal: ``asked`` (action)."""
+
+    asked = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__(padding=10, gap=6)
+        self.setAccessibleName("Playing")
+        self.state: PlayState | None = None
+        self.icon = Icon("play")
+        self.words = label("", "body", wraps=True)
+        self.buttons: dict[str, ActionButton] = {}
+        self._row = QHBoxLayout()
+        self._row.setSpacing(10)
+        self._row.addWidget(self.icon)
+        self._row.addWidget(self.words, 1)
+        self._listed = QVBoxLayout()
+        self._listed.setContentsMargins(30 + SHADOW, 0, 0, 0)
+        self._listed.setSpacing(2)
+        self.column.addLayout(self._row)
+        self.column.addLayout(self._listed)
+        self.hide()
+
+    def show_state(self, state: PlayState | None) -> None:
+        """Show another state, None for nothing; the first button takes the keyboard."""
+        if state == self.state:
+            return
+        self.state = state
+        shown: list[QWidget] = [*self.buttons.values()]
+        shown += [item.widget() for at in range(self._listed.count()) if (item := self._listed.itemAt(at)) is not None]
+        for part in shown:
+            take_away(part)
+        self.buttons = {}
+        self.setVisible(state is not None)
+        if state is None:
+            return
+        self.icon.show_icon(state.icon, INKS[state.tone])
+        self.words.setText(state.words)
+        self.setAccessibleDescription(state.words)
+        for line in state.listed:
+            self._listed.addWidget(label(line, "label", "text2", wraps=True))
+        for action, words in state.actions:
+            made = ActionButton(ICONS.get(action, ""), words, role=ROLES.get(action, ""), height=36)
+            made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
+            self._row.addWidget(made)
+            self.buttons[action] = made
+        dress(self, self.theme)
+        if self.buttons and self.window().isActiveWindow():
+            next(iter(self.buttons.values())).setFocus()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Close what can be closed at Esc."""
+        if event.key() == Qt.Key.Key_Escape and "close" in self.buttons:
+            self.asked.emit("close")
+        else:
+            super().keyPressEvent(event)
