@@ -32,9 +32,3 @@ def test_every_table_leads_to_the_first_step_that_shows_it(name: str, seed: int)
         if condition in presented:
             assert first_step(shown, ("conditions", condition)) == presented[condition]
     assert first_step(shown, ("study",)) == 0
-
-
-def test_a_preview_draws_what_a_rehearsal_with_its_seed_draws() -> None:
-    study = load("delayjnd")
-    assert preview(study, 3).codes == preview(study, 3).codes
-    assert preview(study, 3).secret != preview(study, 4).secret

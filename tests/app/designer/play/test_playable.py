@@ -11,6 +11,8 @@ from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.orders.schedule import Trial
 from study_app.session.preview import preview
 
+pytestmark = pytest.mark.slow
+
 
 def edited(name: str, *edits: Edit) -> Study:
     return Study(source_bytes(name).decode()).edited(*edits)[0]

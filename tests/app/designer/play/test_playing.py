@@ -1,0 +1,226 @@
+"""Play from here in its window: by F5, to the end and stopped, its data kept and deleted, and nothing left over."""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QObject, Qt, QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from study_app.app.designer.play import playing
+from study_app.app.designer.play.playable import Position
+from study_app.app.session.termination import Patience
+from study_app.authoring.new_study import template
+from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.session.pages import ChoicePage, FeedbackPage, PausePage, QuestionnairePage, TaskPage, TextPage
+from study_app.session.preview import preview
+from study_app.store.verification.verify_study import verify
+from tests.app.people import window
+from tests.compiled import needs_servo
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+UNLIMITED = ("lateness_ms", "worst_gap_ms", "frame_gap_ms", "delay_error_ms")
+"""A busy computer repeats no trial with these limits."""
+SESSION_MS = 120_000
+
+
+class Player(QObject):
+    """Answers every page by keys; the scripted hand moves. ``pages`` are those that were seen."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.pages: list[Any] = []
+        self.operated = False
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self.look)
+        self._timer.start(20)
+
+    def look(self) -> None:
+        participant = window(ParticipantWindow)
+        self.operated = self.operated or window(OperatorWindow) is not None
+        if participant is None or participant.page is None or participant.page in self.pages[-1:]:
+            return
+        page = participant.page
+        self.pages.append(page)
+        if isinstance(page, TextPage | PausePage):
+            QTest.keyClick(participant.widget, Qt.Key.Key_Return)
+        elif isinstance(page, ChoicePage):
+            QTest.keyClick(participant.focusWidget(), Qt.Key.Key_Left)
+        elif isinstance(page, QuestionnairePage):
+            for number in range(len(page.items)):
+                QTest.keyClick(participant.focusWidget(), Qt.Key(Qt.Key.Key_1 + number))
+            QTest.keyClick(participant.focusWidget(), Qt.Key.Key_Return)
+
+
+@pytest.fixture
+def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the temporary folders of pilots are."""
+    made = tmp_path / "temporary"
+    made.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(made))
+    return made
+
+
+@pytest.fixture
+def likert(designer: Any) -> Any:
+    """The workspace's study with tasks of a second, open."""
+    text = designer.file.read_text()
+    for key, value in (("min_s", "0.3"), ("count", "1"), ("dwell_s", "0.05"), *((one, "1000") for one in UNLIMITED)):
+        text = re.sub(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
+    designer.file.write_text(text)
+    designer.controller.open("kitchen")
+    return designer
+
+
+def press_f5(qtbot: Any, designer: Any) -> None:
+    designer.window.activateWindow()
+    qtbot.waitUntil(designer.window.isActiveWindow)
+    with qtbot.waitSignal(designer.place.header.play.asked):
+        qtbot.keyClick(QApplication.focusWidget() or designer.window, Qt.Key.Key_F5)
+
+
+def lines_of(study: Path) -> list[dict[str, Any]]:
+    journal = study / "data" / "sub-P001" / "ses-01" / "journal.jsonl"
+    return [json.loads(line) for line in journal.read_text().splitlines()]
+
+
+def play_to_the_end(qtbot: Any, designer: Any) -> Player:
+    player, pilots = Player(), designer.controller.playing
+    press_f5(qtbot, designer)
+    assert pilots.under_way, (designer.messages, designer.place.header.strip.state)
+    qtbot.waitUntil(lambda: not pilots.under_way, timeout=SESSION_MS)
+    assert not designer.messages
+    return player
+
+
+def kept(qtbot: Any, designer: Any) -> Path:
+    qtbot.mouseClick(designer.place.header.strip.buttons["keep"], Qt.MouseButton.LeftButton)
+    (study,) = designer.results.iterdir()
+    assert verify(study).sound, verify(study)
+    return Path(study)
+
+
+def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, folders: Path) -> None:
+    threads = {thread.name for thread in threading.enumerate()}
+    likert.editing.select(("blocks", "delays"))
+    player = play_to_the_end(qtbot, likert)
+    assert [page.trial for page in player.pages if isinstance(page, TaskPage)] == [3, 4]
+    assert not player.operated
+    assert "to the end" in likert.place.header.strip.words.text()
+    assert list(folders.iterdir())
+    study = kept(qtbot, likert)
+    lines = lines_of(study)
+    assert lines[0]["pilot"] is True
+    assert lines[0]["simulated"] is True
+    resumed = next(at for at, line in enumerate(lines) if line["event"] == "session_resumed")
+    notes = [line["text"] for line in lines[:resumed] if line["event"] == "note"]
+    assert notes == ["Steps 1 to 4 were answered by a simulated participant who felt no force."]
+    assert [line["trial"] for line in lines[:resumed] if line["event"] == "responses"] == [1, 2]
+    assert [line["trial"] for line in lines[resumed:] if line["event"] == "responses"] == [3, 4]
+    assert lines[-1]["status"] == "completed"
+    assert not list(folders.iterdir())
+    assert not likert.controller.playing.under_way
+    qtbot.waitUntil(lambda: {thread.name for thread in threading.enumerate()} <= threads | {"background"})
+
+
+def test_holding_escape_ends_at_zero_force_and_the_data_are_deleted(qtbot: Any, likert: Any, folders: Path) -> None:
+    pilots = likert.controller.playing
+    likert.editing.select(("blocks", "liquids"))
+    press_f5(qtbot, likert)
+    qtbot.waitUntil(lambda: window(ParticipantWindow) is not None, timeout=SESSION_MS)
+    participant = window(ParticipantWindow)
+    qtbot.waitUntil(lambda: isinstance(participant.page, TaskPage))
+    servo = pilots.pilot.session.rig.servo
+    QTest.keyPress(participant, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: not pilots.under_way, timeout=10_000)
+    assert window(ParticipantWindow) is None
+    assert not any(servo.telemetry.latest()["device_force_n"])
+    assert not any(thread.name.startswith("servo") for thread in threading.enumerate())
+    (study,) = folders.glob("*/results/*")
+    last = lines_of(study)[-1]
+    assert (last["event"], last["status"]) == ("session_ended", "aborted")
+    qtbot.mouseClick(likert.place.header.strip.buttons["delete"], Qt.MouseButton.LeftButton)
+    assert not list(folders.iterdir())
+    assert not likert.results.exists()
+    assert not likert.place.header.strip.isVisible()
+
+
+def test_closing_the_window_or_leaving_the_place_stops(qtbot: Any, likert: Any, folders: Path) -> None:
+    pilots = likert.controller.playing
+    for leave in (lambda: window(ParticipantWindow).close(), lambda: likert.window.go("home")):
+        likert.window.go("designer")
+        press_f5(qtbot, likert)
+        qtbot.waitUntil(lambda: window(ParticipantWindow) is not None, timeout=SESSION_MS)
+        leave()
+        qtbot.waitUntil(lambda: not pilots.under_way, timeout=10_000)
+        assert window(ParticipantWindow) is None
+    likert.window.go("designer")
+    press_f5(qtbot, likert)
+    pilots.end(Patience(10.0))  # while it is prepared
+    assert not pilots.under_way
+    assert not list(folders.iterdir())
+
+
+def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
+    qtbot: Any, likert: Any, folders: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    header, opened = likert.place.header, []
+    monkeypatch.setattr(playing.PlayedSession, "open", lambda session: opened.append(session.chosen))
+    mouse = next(action for action in header.play.menu.actions() if action.text().startswith("Mouse"))
+    mouse.trigger()
+    press_f5(qtbot, likert)
+    assert "with Mouse?" in header.strip.words.text()
+    qtbot.keyClick(header.strip.buttons["close"], Qt.Key.Key_Escape)
+    assert not header.strip.isVisible()
+    press_f5(qtbot, likert)
+    qtbot.keyClick(header.strip.buttons["play"], Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: bool(opened))
+    assert (opened[0].device, opened[0].pilot, opened[0].windowed) == ("mouse", True, True)
+    likert.controller.playing.pilot.session.over.emit()
+    likert.editing.select(("pages", "thanks"))
+    field = likert.place.file.editor
+    field.setPlainText(field.toPlainText().replace("[pages.thanks]\n", "[pages.thanks]\nnonsense = 3\n", 1))
+    press_f5(qtbot, likert)
+    assert "cannot be played" in header.strip.words.text()
+    assert any("pages.thanks" in line for line in header.strip.state.listed)
+    qtbot.mouseClick(header.strip.buttons["problems"], Qt.MouseButton.LeftButton)
+    assert likert.place.problems.isVisible()
+    assert len(opened) == 1
+    assert not list(folders.iterdir())
+
+
+@pytest.mark.nightly
+def test_an_adaptive_study_is_played_from_its_tenth_trial(qtbot: Any, designer: Any, folders: Path) -> None:
+    text = template("viscosity-jnd").text
+    limits = "".join(f"{one} = 1000\n" for one in UNLIMITED)
+    for old, new in (
+        ("trials = 80", "trials = 12"),
+        ("cycles = 3", "cycles = 1"),
+        ("repetitions = 16", "repetitions = 8"),
+        ("break_every = 44", "break_every = 6"),
+        ("[analysis]", f"[limits]\n{limits}\n[analysis]"),
+    ):
+        assert old in text
+        text = text.replace(old, new, 1)
+    designer.file.write_text(text.replace('name = "viscosity"', 'name = "kitchen"'))
+    designer.controller.open("kitchen")
+    protocol = designer.editing.opened.study.protocol
+    assert protocol is not None
+    designer.controller.playing.where = lambda: Position("viscosity", trial=10, language="en", seed=5)
+    player = play_to_the_end(qtbot, designer)
+    trials = {trial.number: trial for trial in preview(protocol, 5).schedule.trials}
+    played = [page.trial for page in player.pages if isinstance(page, TaskPage)]
+    assert (trials[played[0]].block, trials[played[0]].index) == ("viscosity", 10)
+    assert played[-1] == max(trials)
+    assert not any(isinstance(page, FeedbackPage) for page in player.pages)
+    assert kept(qtbot, designer).name == "kitchen-pilot-1"
+    assert not list(folders.iterdir())

@@ -1,0 +1,79 @@
+"""A session that begins at a later step: exactly there, under the preview's key, with levels that answers led to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from study_app.errors import SessionError
+from study_app.protocol.load import parse, source_bytes
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.trials.due import next_level
+from study_app.protocol.trials.keyed import Key
+from study_app.session.preview import preview
+from study_app.session.resume import Start, resume_at
+from study_app.session.simulated.skipping import begin_at
+from study_app.store.blinded.blinding import read_key
+from study_app.store.folders import locate
+from study_app.store.journals import journal
+from study_app.store.sessions.begin import SessionStart
+
+pytestmark = pytest.mark.slow
+
+
+def started(tmp_path: Path, study: Protocol, source: bytes, step: int, *, exactly: bool = True) -> Start:
+    start = SessionStart(
+        "P001",
+        seed=4,
+        operator="",
+        language=study.study.languages[0],
+        device={"name": "scripted"},
+        screens={},
+        simulated=True,
+        pilot=True,
+    )
+    study_folder, session = locate(begin_at(tmp_path / study.study.name, study, source, start, step))
+    shown, key = preview(study, 4), read_key(study_folder.path)
+    assert (key.codes, key.nonce) == (shown.codes, shown.secret)
+    return resume_at(shown.protocol, shown.schedule, journal.read(session.journal), key, exactly=exactly)
+
+
+@pytest.mark.parametrize(("name", "step"), [("rek2024", 0), ("rek2024", 9), ("viscosityjnd", 60), ("delayjnd", 30)])
+def test_a_session_goes_on_at_any_step(tmp_path: Path, name: str, step: int) -> None:
+    source = source_bytes(name)
+    study = parse(source, name)
+    found = started(tmp_path, study, source, step)
+    assert found.step == step
+    shown = preview(study, 4)
+    trial = shown.schedule.steps[step]
+    if found.heard:
+        assert isinstance(trial, Trial)
+        due, first = (next_level(shown.protocol, Key(shown.codes, shown.secret), shown.schedule, trial, heard)
+                      for heard in (found.heard, ()))  # fmt: skip
+        assert due is not None
+        assert first is not None
+        assert name != "viscosityjnd" or due.level != first.level  # the track has followed the simulated answers
+
+
+def test_a_study_that_resumes_by_blocks_goes_on_within_one(tmp_path: Path) -> None:
+    source = source_bytes("rek2024").replace(b'resume = "trial"', b'resume = "block"')
+    study = parse(source, "rek2024")
+    steps = preview(study, 4).schedule.steps
+    third = next(at for at, step in enumerate(steps) if isinstance(step, Trial) and step.index == 3)
+    assert started(tmp_path / "exactly", study, source, third).step == third
+    assert started(tmp_path / "by-blocks", study, source, third, exactly=False).step < third
+
+
+def test_a_step_behind_a_criterion_that_is_missed_is_not_reached(tmp_path: Path) -> None:
+    source = source_bytes("viscosityjnd")
+    for old, new in (
+        (b"until = { right = 8, of = 10 }", b'until = { right = 10, of = 10, missed = "end" }'),
+        (b"levels = [0.5] ", b"levels = [0.02]"),
+    ):
+        assert old in source
+        source = source.replace(old, new)
+    study = parse(source, "viscosityjnd")
+    with pytest.raises(SessionError, match="criterion"):
+        started(tmp_path, study, source, 60)
