@@ -28,12 +28,14 @@ LOOK_AFTER_MS = 300  # the window stands by then
 
 if TYPE_CHECKING:
     from study_app.app.designer.controller import DesignerController
+    from study_app.app.designer.feeling import Felt
     from study_app.app.lab.controller import LabController
     from study_app.app.lab.initial_settings import InitialSettings
     from study_app.app.results import ResultsController
     from study_app.gui.designer.view import DesignerPlace
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.results.view import ResultsPlace
+    from study_app.lab.ab_comparison import Setting, Side
     from study_app.viewmodels.sessions import SessionFacts
 
 
@@ -100,6 +102,7 @@ class MainController(QObject):
         self.desk: ResultsController | None = None
         self.designer: DesignerController | None = None
         self.lab: LabController | None = None
+        self._felt: Felt | None = None
         self.window.closed.connect(self._leave)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
@@ -188,6 +191,8 @@ class MainController(QObject):
         self.designer = DesignerController(self.results)
         self.designer.saving.saved.connect(self._show_saved)
         self.designer.playing.kept.connect(self._show_saved)
+        self.designer.feeling.asked.connect(self._feel)
+        self.designer.feeling.returned.connect(lambda: self.window.go("designer"))
         return self.designer.place
 
     def _show_saved(self, _file: Path) -> None:
@@ -218,6 +223,23 @@ class MainController(QObject):
         if name:
             self.designer.begin(source, name)
 
+    def _feel(self, felt: Felt) -> None:
+        """Go to the lab with liquids of the study that is edited."""
+        self._felt = felt
+        self.window.go("lab")
+        self._open_felt()
+
+    def _open_felt(self) -> None:
+        """Open what waits for the lab, once that is made."""
+        if self.lab is not None and self._felt is not None:
+            self.lab.feel_of_study(self._felt.a, self._felt.b, self._felt.study)
+            self._felt = None
+
+    def _put_back(self, side: Side, setting: Setting) -> None:
+        """Put a liquid back into the study that is edited, and go there."""
+        if self.designer is not None:
+            self.designer.feeling.put_back(side, setting)
+
     def _prepare_lab(self) -> bool:
         """Load the lab in the background, from when home stands; return whether that is done."""
         if self._lab_first is None and not self._preparing.busy:
@@ -235,6 +257,8 @@ class MainController(QObject):
         made = LabPlace()
         settings = self.machine.settings
         self.lab = compose_lab(made, device=settings.device, options=settings.device_options, first=self._lab_first)
+        made.put_back_asked.connect(self._put_back)
+        self._open_felt()
         return made
 
     def end(self) -> None:

@@ -13,6 +13,7 @@ from PySide6.QtCore import QObject, QTimer
 from study_app.app.designer.clipboard import Clipboard
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.element_steps import Step, delete_prompt
+from study_app.app.designer.feeling import Feeling
 from study_app.app.designer.measures.controller import MeasuresController
 from study_app.app.designer.open_study import OpenStudy, open_file, open_new, open_unsaved
 from study_app.app.designer.play.playing import Playing
@@ -60,6 +61,7 @@ class DesignerController(QObject):
         self.saving = Saving(editing, place, self.runs)
         self.changes = ChangesController(editing, place, self.runs)
         self.playing = Playing(editing, place)
+        self.feeling = Feeling(editing, place)
         Clipboard(editing, place)
         Renaming(editing, place, self.runs)
         self._others: dict[Path, OpenStudy] = {}

@@ -85,7 +85,7 @@ class LabController(QObject):
         self.live: Live | None = None
         self.device = device
         self.bench = first.bench
-        self.trouble = ""
+        self.trouble = self.study = ""
         self._refused: tuple[str, str] | None = None
         self._entered = False
         self._prices = Prices(make_appraiser)
@@ -197,7 +197,13 @@ class LabController(QObject):
             trouble=self.trouble,
             refused=self._refused,
             said=self._saving.said,
+            study=self.study,
         )
+
+    def feel_of_study(self, a: Setting, b: Setting, study: str) -> None:
+        """Feel liquids of a study that is edited, which takes the felt one back; "" where it cannot."""
+        self.study = study
+        self.feel(Workbench(a, b), anew=True)
 
     @guarded
     def _enter(self) -> None:

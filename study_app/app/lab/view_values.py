@@ -29,6 +29,7 @@ def lab_view(
     trouble: str,
     refused: tuple[str, str] | None,
     said: str,
+    study: str = "",
 ) -> LabView:
     """Return the view of the lab at this moment.
 
@@ -42,6 +43,7 @@ def lab_view(
     trouble : what failed, "" if nothing did
     refused : name of a parameter and why its value was refused
     said : the last message about presets
+    study : the study that takes the felt setting back, "" without one
     """
     reading = None if live is None else live.reading()
     fault = "" if reading is None else reading.fault
@@ -78,5 +80,6 @@ def lab_view(
         trouble=trouble or fault,
         refused=refused,
         said=said,
+        study=study,
         **shown,
     )

@@ -16,6 +16,7 @@ from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.lab.ab_comparison import Setting, other
 from study_app.viewmodels.lab import FormSection, LabView, form
 
+USE = "Use in a study …"
 HIDDEN = "Hidden during a blind comparison"
 
 
@@ -101,7 +102,7 @@ class FormPanel(Card):
         self.copy.setProperty("dense", "true")
         self.copy.clicked.connect(self.copied)
         self.open = ActionButton("file", "Open preset …", height=32)
-        self.use = ActionButton("layers", "Use in a study …", height=32)
+        self.use = ActionButton("layers", USE, height=32)
         self.said = Clamped("", 2, "small", "text2")
         for button, asked in ((self.open, self.open_asked), (self.use, self.use_asked)):
             button.setProperty("dense", "true")
@@ -152,6 +153,7 @@ class FormPanel(Card):
         self._show_liquids(view)
         self.said.show_text(view.said)
         self.said.setVisible(bool(view.said))
+        self.use.show_action("layers", f"Put back into {view.study}" if view.study else USE)
         setting = bench.in_hand
         if setting != self._setting or bench.felt != self._side:
             refused = self._side != bench.felt

@@ -42,6 +42,7 @@ class LabPlace(Place):
     ``hand_moved`` [m, hand frame] and ``hand_pressed`` are the mouse's while it moves the ball; ``entered`` and
     ``left`` come as the place is shown and hidden; ``save_asked`` is a file and the `Setting` that was felt when it was
     asked for; ``use_asked`` a study's file and that `Setting`, ``preset_opened`` the file of a preset.
+    ``put_back_asked`` is the felt side and its `Setting`, for the study that is edited.
     """
 
     changed = Signal(str, object, bool)
@@ -57,6 +58,7 @@ class LabPlace(Place):
     cancel_asked = Signal()
     save_asked = Signal(Path, object)
     use_asked = Signal(Path, object)
+    put_back_asked = Signal(str, object)
     preset_opened = Signal(Path)
     copied = Signal()
     hand_moved = Signal(float, float, float)
@@ -213,8 +215,12 @@ class LabPlace(Place):
             dialog.show()
 
     def ask_which_study(self) -> None:
-        """Ask for the study that is to use the felt setting."""
-        if (setting := self._free_to_ask()) is not None:
+        """Ask for the study that is to use the felt setting; the one that is edited takes it at once."""
+        if (setting := self._free_to_ask()) is None or self._view is None:
+            return
+        if self._view.study:
+            self.put_back_asked.emit(self._view.felt, setting)
+        else:
             dialog = self._file_dialog(f"Use {setting.title} in a study", "Protocols")
             dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
             dialog.fileSelected.connect(lambda name: self.use_asked.emit(Path(name), setting))

@@ -26,6 +26,9 @@ DEEPEST: Final = 3
 NO_QUESTIONS: Final = QuestionLines((), ())
 LEAST, MOST = "at least ", "at most "
 
+FELT = ("liquids", "conditions", "blocks")
+"""Sections whose elements can be felt in the lab."""
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -127,6 +130,8 @@ class Form:
         The questions of the questionnaire that it is in, itself included; none where it is no question.
     around : tuple of (path, str)
         The section and the elements that it is in, with their titles, and itself.
+    feel : str
+        What the button says that opens the lab with its liquids, "" where it has none.
     """
 
     path: Path
@@ -139,6 +144,7 @@ class Form:
     position: tuple[int, int] | None = None
     questions: QuestionLines = NO_QUESTIONS
     around: tuple[tuple[Path, str], ...] = ()
+    feel: str = ""
 
     @property
     def rows(self) -> tuple[FormRow, ...]:
@@ -165,10 +171,12 @@ def form(study: Study, path: Path) -> Form:
     name = value.get("id") if isinstance(value, Mapping) else None
     if name is None and len(path) == 2 and isinstance(value, Mapping):
         name = str(path[1])
+    title = title_of(document, path)
     return Form(
-        path, title_of(document, path), icon_of(path), _kind(path), None if name is None else str(name), sections, own,
+        path, title, icon_of(path), _kind(path), None if name is None else str(name), sections, own,
         position_of(document, path), question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
         tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
+        f"Feel {title}" if len(path) == 2 and path[0] in FELT else "",
     )  # fmt: skip
 
 

@@ -38,7 +38,7 @@ class Tile(Themed, QWidget):
 
 
 class FormHead(QWidget):
-    """Signals: ``asked`` (a request), ``delete_asked`` (path), ``id_typed`` (path, what is typed so far).
+    """Signals: ``asked`` (a request), ``delete_asked`` and ``feel_asked`` (path), ``id_typed`` (path, text so far).
 
     ``unlock_asked`` is emitted where a locked id is to be changed.
     """
@@ -47,6 +47,7 @@ class FormHead(QWidget):
     id_typed = Signal(object, str)
     unlock_asked = Signal()
     delete_asked = Signal(object)
+    feel_asked = Signal(object)
 
     def __init__(self) -> None:
         super().__init__()
@@ -66,6 +67,7 @@ class FormHead(QWidget):
         self._read_only = False
         self.refusal = label("", "label", "bad", wraps=True)
         self.refusal.hide()
+        self.feel = IconButton("drop", "Feel", size=34)
         self.up = IconButton("arrow_up", "Move up", "Move up (Alt+Up)", size=34)
         self.down = IconButton("arrow_down", "Move down", "Move down (Alt+Down)", size=34)
         self.copy = IconButton("copy", "Duplicate", "Duplicate (Ctrl+D)", size=34)
@@ -83,7 +85,7 @@ class FormHead(QWidget):
         grid.setHorizontalSpacing(8)
         grid.addWidget(self.tile, 0, 0)
         grid.addLayout(words, 0, 1)
-        for at, part in enumerate((self.up, self.down, self.copy, self.delete), start=2):
+        for at, part in enumerate((self.feel, self.up, self.down, self.copy, self.delete), start=2):
             grid.addWidget(part, 0, at)
         self.id_line = QWidget()
         line = QHBoxLayout(self.id_line)
@@ -95,8 +97,8 @@ class FormHead(QWidget):
         line.addWidget(self.id, 8)
         line.addWidget(self.unlock)
         line.addStretch(1)
-        grid.addWidget(self.id_line, 1, 0, 1, 6)
-        grid.addWidget(self.refusal, 2, 0, 1, 6)
+        grid.addWidget(self.id_line, 1, 0, 1, 7)
+        grid.addWidget(self.refusal, 2, 0, 1, 7)
         grid.setColumnStretch(1, 1)
         self.id.typed.connect(self._rename)
         self.id.textEdited.connect(self._type_id)
@@ -105,6 +107,7 @@ class FormHead(QWidget):
         self.down.clicked.connect(lambda: self.move_by(1))
         self.copy.clicked.connect(self.duplicate)
         self.delete.clicked.connect(self.ask_to_delete)
+        self.feel.clicked.connect(self._ask_to_feel)
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
         """Show which element it is."""
@@ -121,6 +124,9 @@ class FormHead(QWidget):
         self._apply_lock()
         if not self.refusal.text():
             self.id.show_text(form.id or "")
+        self.feel.setVisible(bool(form.feel))
+        self.feel.setAccessibleName(form.feel or "Feel")
+        self.feel.setToolTip(f"{form.feel} in the lab")
         place, count = form.position or (0, 0)
         for button in (self.up, self.down):
             button.setVisible(form.position is not None and not read_only)
@@ -174,6 +180,10 @@ class FormHead(QWidget):
     def _type_id(self, name: str) -> None:
         if self.form is not None:
             self.id_typed.emit(self.form.path, name)
+
+    def _ask_to_feel(self) -> None:
+        if self.form is not None:
+            self.feel_asked.emit(self.form.path)
 
     def _rename(self, name: str) -> None:
         if self.form is not None and self.form.id is not None:

@@ -1,0 +1,101 @@
+"""Feel it: from the form to the lab with unsaved values, and back into the study as one step, in the main window."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QApplication
+
+from study_app.app.main_controller import MainController
+from study_app.authoring.writer.edits import Set
+from study_app.protocol.source.files import shipped_file
+from tests.compiled import needs_servo
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+OPENS_MS = 60_000
+
+
+@pytest.fixture
+def visit(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[MainController]:
+    """The main window, with a copy of the demo open in the designer."""
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    file = tmp_path / "protocols" / "kitchen.toml"
+    file.parent.mkdir()
+    file.write_bytes(shipped_file("demo").read_bytes().replace(b'name = "demo"', b'name = "kitchen"'))
+    made = MainController(tmp_path / "results")
+    made.window.resize(1600, 1000)
+    made.window.show()
+    made.open_designer("kitchen")
+    yield made
+    made.window.close()
+    made.end()
+    assert made.designer is not None
+    made.designer.deleteLater()
+    made.window.deleteLater()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+def feel(qtbot: Any, visit: MainController, *path: str) -> Any:
+    """Select an element, press its button, and return the lab once it is felt."""
+    assert visit.designer is not None
+    visit.designer.editing.select(path)
+    head = visit.designer.place.form.head
+    qtbot.mouseClick(head.feel, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: visit.lab is not None and visit.lab.live is not None, timeout=OPENS_MS)
+    assert visit.window.here == "lab"
+    return visit.lab
+
+
+def test_a_liquid_is_felt_with_unsaved_values_and_put_back_as_one_step(qtbot: Any, visit: MainController) -> None:
+    assert visit.designer is not None
+    editing = visit.designer.editing
+    assert editing.opened is not None
+    saved = editing.opened.file.read_bytes()
+    editing.make("Denser", Set(("liquids", "thick", "density_kg_m3"), 1500))
+    assert visit.designer.place.form.head.feel.isHidden()  # the first step is a page
+    lab = feel(qtbot, visit, "liquids", "thick")
+    assert visit.designer.place.form.head.feel.accessibleName() == "Feel Thick"
+    assert (lab.bench.a.name, lab.bench.a.value("liquid.density_kg_m3")) == ("Thick", 1500)
+    lab.place.changed.emit("liquid.density_kg_m3", 1234.5, False)
+    lab.place.changed.emit("effects.added_mass", "on", False)
+    qtbot.waitUntil(lambda: lab.place.view.workbench == lab.bench)
+    assert lab.place.form.use.text() == "Put back into kitchen"
+    steps = len(editing.opened.history.done)
+    qtbot.mouseClick(lab.place.form.use, Qt.MouseButton.LeftButton)
+    assert visit.window.here == "designer"
+    assert editing.selected == ("liquids", "thick")
+    assert [step.words for step in editing.opened.history.done[steps:]] == ["Put Thick back from the lab"]
+    liquid = editing.opened.study.document["liquids"]["thick"]
+    assert liquid["density_kg_m3"] == 1234.5
+    assert set(liquid["effects"]) == {"drag", "added_mass"}
+    assert "density_kg_m3 = 1000         # Density [kg/m³]." in editing.opened.study.text
+    assert editing.opened.study.protocol is not None
+    assert editing.opened.study.protocol.scene_of("thick").liquids[0] == lab.bench.a.scene.liquids[0]
+    assert editing.opened.file.read_bytes() == saved
+    editing.undo()
+    assert editing.opened.study.document["liquids"]["thick"]["density_kg_m3"] == 1500
+
+
+def test_a_block_is_felt_as_two_liquids_and_each_goes_back_to_its_own(qtbot: Any, visit: MainController) -> None:
+    lab = feel(qtbot, visit, "blocks", "liquids")
+    assert visit.designer is not None
+    assert (lab.bench.a.name, lab.bench.b.name) == ("Thin", "Thick")
+    lab.place.switched.emit()
+    lab.place.changed.emit("liquid.density_kg_m3", 1700.0, False)
+    qtbot.waitUntil(lambda: lab.place.view.workbench.felt == "B" and lab.place.view.workbench.b.is_edited)
+    qtbot.mouseClick(lab.place.form.use, Qt.MouseButton.LeftButton)
+    assert visit.designer.editing.opened is not None
+    liquids = visit.designer.editing.opened.study.document["liquids"]
+    assert (liquids["thin"]["density_kg_m3"], liquids["thick"]["density_kg_m3"]) == (1000, 1700)
+
+
+def test_a_study_that_ships_is_felt_and_takes_nothing_back(qtbot: Any, visit: MainController) -> None:
+    visit.open_designer("rek2024")
+    lab = feel(qtbot, visit, "conditions", "honey")
+    assert lab.bench.a.name == "Honey"
+    qtbot.waitUntil(lambda: lab.place.view is not None and lab.place.form.use.text() == "Use in a study …")
