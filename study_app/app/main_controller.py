@@ -28,7 +28,7 @@ LOOK_AFTER_MS = 300  # the window stands by then
 
 if TYPE_CHECKING:
     from study_app.app.designer.controller import DesignerController
-    from study_app.app.designer.feeling import Felt
+    from study_app.app.designer.feeling import LabLiquids
     from study_app.app.lab.controller import LabController
     from study_app.app.lab.initial_settings import InitialSettings
     from study_app.app.results import ResultsController
@@ -102,7 +102,7 @@ class MainController(QObject):
         self.desk: ResultsController | None = None
         self.designer: DesignerController | None = None
         self.lab: LabController | None = None
-        self._felt: Felt | None = None
+        self._for_lab: LabLiquids | None = None
         self.window.closed.connect(self._leave)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
@@ -223,17 +223,17 @@ class MainController(QObject):
         if name:
             self.designer.begin(source, name)
 
-    def _feel(self, felt: Felt) -> None:
+    def _feel(self, liquids: LabLiquids) -> None:
         """Go to the lab with liquids of the study that is edited."""
-        self._felt = felt
+        self._for_lab = liquids
         self.window.go("lab")
-        self._open_felt()
+        self._open_liquids()
 
-    def _open_felt(self) -> None:
+    def _open_liquids(self) -> None:
         """Open what waits for the lab, once that is made."""
-        if self.lab is not None and self._felt is not None:
-            self.lab.feel_of_study(self._felt.a, self._felt.b, self._felt.study)
-            self._felt = None
+        if self.lab is not None and self._for_lab is not None:
+            self.lab.feel_of_study(self._for_lab.a, self._for_lab.b, self._for_lab.study)
+            self._for_lab = None
 
     def _put_back(self, side: Side, setting: Setting) -> None:
         """Put a liquid back into the study that is edited, and go there."""
@@ -258,7 +258,7 @@ class MainController(QObject):
         settings = self.machine.settings
         self.lab = compose_lab(made, device=settings.device, options=settings.device_options, first=self._lab_first)
         made.put_back_asked.connect(self._put_back)
-        self._open_felt()
+        self._open_liquids()
         return made
 
     def end(self) -> None:

@@ -81,7 +81,7 @@ class LabView:
     not be changed and one line why, a new pair for every refusal; ``said`` tells what was saved or opened last.
     ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet, a tail also where the setting
     has no wake. ``cost`` and ``errors`` are of the felt setting, empty until they are measured; ``measuring`` while
-    they are measured anew. ``study`` is the study that is edited and takes the felt setting back, "" without one.
+    they are measured anew. ``study`` is the study that is edited and takes changes back, "" without one.
     """
 
     workbench: Workbench

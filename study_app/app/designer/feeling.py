@@ -28,7 +28,7 @@ OF_THE_STUDY: Final = frozenset({"scene", "velocity", "knee", "body"})
 
 
 @dataclass(frozen=True, slots=True)
-class Felt:
+class LabLiquids:
     """Settings A and B for the lab; ``study`` is what takes them back, "" where the study cannot be changed."""
 
     a: Setting
@@ -39,7 +39,7 @@ class Felt:
 class Feeling(QObject):
     """Opens liquids of the open study in the lab.
 
-    ``asked`` carries a `Felt`, ``returned`` comes when a liquid was put back.
+    ``asked`` carries a `LabLiquids`, ``returned`` comes when a liquid was put back.
     """
 
     asked = Signal(object)
@@ -62,16 +62,16 @@ class Feeling(QObject):
         try:
             protocol = study.protocol or playable(study, path).protocol
         except NotPlayableError as refused:
-            self.place.message.emit("It cannot be felt yet", f"Correct this first: {refused.problems[0]}.")
+            self.place.message.emit("It cannot be opened in the lab yet", f"Correct this first: {refused.problems[0]}.")
             return
         names = _liquids(protocol, path)
         if not names:
-            self.place.message.emit("It cannot be felt", "It has no liquid.")
+            self.place.message.emit("It cannot be opened in the lab", "It has no liquid.")
             return
         settings = [_setting(protocol, study.document, name) for name in (names[0], names[-1])]
         self._sides = {"A": settings[0].scene.liquids[0], "B": settings[1].scene.liquids[0]}
         self._file = opened.file
-        self.asked.emit(Felt(settings[0], settings[1], "" if opened.read_only else opened.file.stem))
+        self.asked.emit(LabLiquids(settings[0], settings[1], "" if opened.read_only else opened.file.stem))
 
     def put_back(self, side: Side, setting: Setting) -> None:
         """Give the liquid of a side the values of a setting, as one step."""

@@ -201,7 +201,7 @@ class LabController(QObject):
         )
 
     def feel_of_study(self, a: Setting, b: Setting, study: str) -> None:
-        """Feel liquids of a study that is edited, which takes the felt one back; "" where it cannot."""
+        """Feel liquids of a study that is edited, which takes changes back; "" where it cannot."""
         self.study = study
         self.feel(Workbench(a, b), anew=True)
 

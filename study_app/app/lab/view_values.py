@@ -43,7 +43,7 @@ def lab_view(
     trouble : what failed, "" if nothing did
     refused : name of a parameter and why its value was refused
     said : the last message about presets
-    study : the study that takes the felt setting back, "" without one
+    study : the study that takes changes back, "" without one
     """
     reading = None if live is None else live.reading()
     fault = "" if reading is None else reading.fault

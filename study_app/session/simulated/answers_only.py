@@ -116,7 +116,7 @@ class Kept(typing.Protocol):
 
 @dataclass(slots=True)
 class SimulatedTime:
-    """The time of a session that nobody waits for [s]."""
+    """The time of a session that is not held [s]."""
 
     seconds: float = 0.0
 
@@ -139,7 +139,7 @@ class Answering(SimulatedParticipant):
     time_passed : SimulatedTime
         Its clock.
     felt : callable
-        Returns what was felt in a condition of a block, of which one is drawn for each trial.
+        Returns the features of trials in a condition of a block; one is drawn for each trial.
     """
 
     def __init__(

@@ -64,7 +64,7 @@ def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart,
         if store.key.codes != shown.codes:
             raise SessionError(f"{results} holds sessions with another seed: use a new folder")
         if step:
-            text = f"Steps 1 to {step} were answered by a simulated participant who felt no force."
+            text = f"Steps 1 to {step} were answered by a simulated participant, without force."
             store.append("note", t_s=0.0, waits=False, kind="note", text=text)
         for event, at_s, fields in lines.kept:
             store.append(event, t_s=at_s, waits=False, **fields)

@@ -26,8 +26,8 @@ DEEPEST: Final = 3
 NO_QUESTIONS: Final = QuestionLines((), ())
 LEAST, MOST = "at least ", "at most "
 
-FELT = ("liquids", "conditions", "blocks")
-"""Sections whose elements can be felt in the lab."""
+WITH_LIQUIDS = ("liquids", "conditions", "blocks")
+"""Sections whose elements the lab opens."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +176,7 @@ def form(study: Study, path: Path) -> Form:
         path, title, icon_of(path), _kind(path), None if name is None else str(name), sections, own,
         position_of(document, path), question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
         tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
-        f"Feel {title}" if len(path) == 2 and path[0] in FELT else "",
+        f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
     )  # fmt: skip
 
 

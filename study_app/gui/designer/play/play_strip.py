@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
+from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton
@@ -56,6 +57,7 @@ class PlayStrip(Card):
         self.icon.show_icon(state.icon, INKS[state.tone])
         self.words.setText(state.words)
         self.setAccessibleDescription(state.words)
+        say(self, state.words)
         for line in state.listed:
             self._listed.addWidget(label(line, "label", "text2", wraps=True))
         for action, words in state.actions:
