@@ -85,6 +85,7 @@ class DesignerHeader(QWidget):
         self.save = ActionButton("save", "Save", role="primary")
         self.play = PlayControls()
         self.strip = PlayStrip()
+        self.strip.left.connect(self.play.play.setFocus)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         row = self._row = QHBoxLayout()

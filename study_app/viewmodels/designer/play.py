@@ -36,9 +36,10 @@ class PlayDevices:
         return dict(self.choices).get(self.chosen, "")
 
 
-def asks_for_device(title: str, step: str) -> PlayState:
-    """Return the question before a device other than the simulated hand is used."""
-    words = f"Play from {step} with {title}? The force fades in when a trial begins; hold Esc to stop."
+def asks_for_device(title: str, step: str, *, has_force: bool) -> PlayState:
+    """Return the question before a device other than the scripted hand is used."""
+    force = "The force fades in when a trial begins; hold" if has_force else "It has no force. Hold"
+    words = f"Play from {step}, with the device {title}? {force} Esc to stop."
     return PlayState("warn", "device", words, (("play", "Play"), ("close", "Cancel")))
 
 
@@ -52,7 +53,7 @@ def refuses(problems: tuple[str, ...], most: int = 6) -> PlayState:
 
 def under_way(step: str, title: str) -> PlayState:
     """Return what is said while a pilot is played."""
-    words = f"Playing from {step} with {title}. Hold Esc to stop."
+    words = f"Playing from {step}, with the device {title}. Hold Esc to stop."
     return PlayState("ok", "play", words, (("stop", "Stop"),))
 
 

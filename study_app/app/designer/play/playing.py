@@ -102,7 +102,8 @@ class Playing(QObject):
         if self.device == SIMULATED:
             self._prepare()
         else:
-            self._show(shown.asks_for_device(title_of(self.device), found.words))
+            has_force = descriptor_of(self.device).kind == "felt"
+            self._show(shown.asks_for_device(title_of(self.device), found.words, has_force=has_force))
 
     def stop(self) -> None:
         """Stop what is played: zero force first."""

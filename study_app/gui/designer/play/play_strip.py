@@ -19,9 +19,10 @@ ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
 
 
 class PlayStrip(Card):
-    """Signal: ``asked`` (action)."""
+    """Signals: ``asked`` (action), ``left`` when it goes that had the keyboard."""
 
     asked = Signal(str)
+    left = Signal()
 
     def __init__(self) -> None:
         super().__init__(padding=10, gap=6)
@@ -46,6 +47,8 @@ class PlayStrip(Card):
         if state == self.state:
             return
         self.state = state
+        focused = self.window().focusWidget()
+        had_focus = focused is not None and self.isAncestorOf(focused)
         shown: list[QWidget] = [*self.buttons.values()]
         shown += [item.widget() for at in range(self._listed.count()) if (item := self._listed.itemAt(at)) is not None]
         for part in shown:
@@ -53,6 +56,8 @@ class PlayStrip(Card):
         self.buttons = {}
         self.setVisible(state is not None)
         if state is None:
+            if had_focus:
+                self.left.emit()
             return
         self.icon.show_icon(state.icon, INKS[state.tone])
         self.words.setText(state.words)
@@ -64,10 +69,11 @@ class PlayStrip(Card):
             made = ActionButton(ICONS.get(action, ""), words, role=ROLES.get(action, ""), height=36)
             made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
             self._row.addWidget(made)
+            made.show()  # at once: a part that is not shown cannot take the keyboard
             self.buttons[action] = made
         dress(self, self.theme)
-        if self.buttons and self.window().isActiveWindow():
-            next(iter(self.buttons.values())).setFocus()
+        if self.buttons:
+            next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
         """Close what can be closed at Esc."""
