@@ -17,6 +17,7 @@ from study_app.app.designer.editing import Editing
 from study_app.app.designer.play.playable import NotPlayableError, Playable, Position, playable
 from study_app.app.designer.play.played_session import PlayedSession
 from study_app.app.lab_rows import device_choices
+from study_app.app.session.live_session import BUG
 from study_app.app.session.termination import Patience
 from study_app.app.workstation import settings_here
 from study_app.devices.registry import descriptor_of, title_of
@@ -163,6 +164,8 @@ class Playing(QObject):
         self._left = [earlier for earlier in (*self._left, session) if earlier.opening]
         if session.error is not None:
             self.place.message.emit("Playing was stopped", f"{session.error}.")
+        elif session.code == BUG:
+            self.place.message.emit("A bug in the program stopped the pilot", "The terminal shows the details.")
         if session.began:
             self._show(shown.ended(pilot.what.words, OUTCOMES.get(session.status or "", "stopped")))
         else:

@@ -18,6 +18,7 @@ from study_app.app.designer.play import playing
 from study_app.app.designer.play.playable import Position
 from study_app.app.session.termination import Patience
 from study_app.authoring.new_study import template
+from study_app.errors import DeviceLost
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import ChoicePage, FeedbackPage, PausePage, QuestionnairePage, TaskPage, TextPage
@@ -154,15 +155,25 @@ def test_holding_escape_ends_at_zero_force_and_the_data_are_deleted(qtbot: Any, 
     assert not likert.place.header.strip.isVisible()
 
 
-def test_closing_the_window_or_leaving_the_place_stops(qtbot: Any, likert: Any, folders: Path) -> None:
+def test_closing_the_window_a_failure_and_leaving_the_place_stop(
+    qtbot: Any, likert: Any, folders: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     pilots = likert.controller.playing
-    for leave in (lambda: window(ParticipantWindow).close(), lambda: likert.window.go("home")):
+    for leave in (
+        lambda: window(ParticipantWindow).close(),
+        lambda: pilots.pilot.session.bridge.fail(DeviceLost("the device is gone")),
+        lambda: likert.window.go("home"),
+    ):
         likert.window.go("designer")
         press_f5(qtbot, likert)
         qtbot.waitUntil(lambda: window(ParticipantWindow) is not None, timeout=SESSION_MS)
         leave()
         qtbot.waitUntil(lambda: not pilots.under_way, timeout=10_000)
         assert window(ParticipantWindow) is None
+    ((title, sentence),) = likert.messages
+    assert title == "Playing was stopped"
+    assert "the device is gone" in sentence
+    caplog.clear()
     likert.window.go("designer")
     press_f5(qtbot, likert)
     pilots.end(Patience(10.0))  # while it is prepared
