@@ -16,7 +16,6 @@ from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.lab.ab_comparison import Setting, other
 from study_app.viewmodels.lab import FormSection, LabView, form
 
-USE = "Use in a study …"
 HIDDEN = "Hidden during a blind comparison"
 
 
@@ -84,6 +83,7 @@ class FormPanel(Card):
     copied = Signal()
     open_asked = Signal()
     use_asked = Signal()
+    put_back_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__(padding=16, gap=8)
@@ -102,9 +102,15 @@ class FormPanel(Card):
         self.copy.setProperty("dense", "true")
         self.copy.clicked.connect(self.copied)
         self.open = ActionButton("file", "Open preset …", height=32)
-        self.use = ActionButton("layers", USE, height=32)
+        self.use = ActionButton("layers", "Use in a study …", height=32)
+        self.back = ActionButton("designer", "Put back into the study", height=32)
+        self.back.hide()
         self.said = Clamped("", 2, "small", "text2")
-        for button, asked in ((self.open, self.open_asked), (self.use, self.use_asked)):
+        for button, asked in (
+            (self.open, self.open_asked),
+            (self.use, self.use_asked),
+            (self.back, self.put_back_asked),
+        ):
             button.setProperty("dense", "true")
             button.clicked.connect(asked)
         self._lay_out()
@@ -137,6 +143,7 @@ class FormPanel(Card):
         foot.addWidget(self.use, 1)
         column.addWidget(Rule())
         column.addWidget(self.said)  # above the buttons, which stay in their place when it appears
+        column.addWidget(self.back)
         column.addLayout(foot)
         self.hidden = MaskedPanel(HIDDEN, "Parameters would reveal which is which.")
         self._stack = QStackedLayout()
@@ -153,7 +160,8 @@ class FormPanel(Card):
         self._show_liquids(view)
         self.said.show_text(view.said)
         self.said.setVisible(bool(view.said))
-        self.use.show_action("layers", f"Put back into {view.study}" if view.study else USE)
+        self.back.setVisible(bool(view.study))
+        self.back.setToolTip(f"{view.study} is open in the study designer")
         setting = bench.in_hand
         if setting != self._setting or bench.felt != self._side:
             refused = self._side != bench.felt

@@ -164,6 +164,7 @@ class LabPlace(Place):
         header.save_asked.connect(self.ask_where_to_save)
         form.open_asked.connect(self.ask_which_to_open)
         form.use_asked.connect(self.ask_which_study)
+        form.put_back_asked.connect(self.put_back)
         self._escape.held.connect(self._stop)
 
     def _shortcuts(self) -> None:
@@ -215,16 +216,17 @@ class LabPlace(Place):
             dialog.show()
 
     def ask_which_study(self) -> None:
-        """Ask for the study that is to use the felt setting; the one that is edited takes it at once."""
-        if (setting := self._free_to_ask()) is None or self._view is None:
-            return
-        if self._view.study:
-            self.put_back_asked.emit(self._view.felt, setting)
-        else:
+        """Ask for the study that is to use the felt setting."""
+        if (setting := self._free_to_ask()) is not None:
             dialog = self._file_dialog(f"Use {setting.title} in a study", "Protocols")
             dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
             dialog.fileSelected.connect(lambda name: self.use_asked.emit(Path(name), setting))
             dialog.show()
+
+    def put_back(self) -> None:
+        """Ask that the study that is edited takes the felt setting back."""
+        if (setting := self._free_to_ask()) is not None and self._view is not None:
+            self.put_back_asked.emit(self._view.felt, setting)
 
     def _free_to_ask(self) -> Setting | None:
         """Return the felt setting; None while another question is open, or the comparison is blind."""

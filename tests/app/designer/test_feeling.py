@@ -64,9 +64,9 @@ def test_a_liquid_is_felt_with_unsaved_values_and_put_back_as_one_step(qtbot: An
     lab.place.changed.emit("liquid.density_kg_m3", 1234.5, False)
     lab.place.changed.emit("effects.added_mass", "on", False)
     qtbot.waitUntil(lambda: lab.place.view.workbench == lab.bench)
-    assert lab.place.form.use.text() == "Put back into kitchen"
+    assert lab.place.form.back.isVisible()
     steps = len(editing.opened.history.done)
-    qtbot.mouseClick(lab.place.form.use, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(lab.place.form.back, Qt.MouseButton.LeftButton)
     assert visit.window.here == "designer"
     assert editing.selected == ("liquids", "thick")
     assert [step.words for step in editing.opened.history.done[steps:]] == ["Put Thick back from the lab"]
@@ -88,7 +88,7 @@ def test_a_block_is_felt_as_two_liquids_and_each_goes_back_to_its_own(qtbot: Any
     lab.place.switched.emit()
     lab.place.changed.emit("liquid.density_kg_m3", 1700.0, False)
     qtbot.waitUntil(lambda: lab.place.view.workbench.felt == "B" and lab.place.view.workbench.b.is_edited)
-    qtbot.mouseClick(lab.place.form.use, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(lab.place.form.back, Qt.MouseButton.LeftButton)
     assert visit.designer.editing.opened is not None
     liquids = visit.designer.editing.opened.study.document["liquids"]
     assert (liquids["thin"]["density_kg_m3"], liquids["thick"]["density_kg_m3"]) == (1000, 1700)
@@ -98,4 +98,5 @@ def test_a_study_that_ships_is_felt_and_takes_nothing_back(qtbot: Any, visit: Ma
     visit.open_designer("rek2024")
     lab = feel(qtbot, visit, "conditions", "honey")
     assert lab.bench.a.name == "Honey"
-    qtbot.waitUntil(lambda: lab.place.view is not None and lab.place.form.use.text() == "Use in a study …")
+    qtbot.waitUntil(lambda: lab.place.view is not None and lab.place.view.workbench == lab.bench)
+    assert not lab.place.form.back.isVisible()
