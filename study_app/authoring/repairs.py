@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -17,6 +19,8 @@ from study_app.protocol.source.problems import Fault, shown
 _MEANT: Final = re.compile(r'did you mean "([^"]+)"\?')
 _BOUND: Final = re.compile(r"must be (?:at least |at most )?([\d.e+-]+)(?: |$)")
 _LANGUAGE: Final = re.compile(r'is missing in "([a-z]{2})"$')
+_ORDER: Final = re.compile(r'belongs to order = "([a-z]+)"')
+_OUTSIDE: Final = re.compile(r"([xyz]) = [-\d.e+]+ mm with radius ([\d.e+-]+) mm leaves the tank")
 _HALVINGS: Final = 12
 
 
@@ -61,6 +65,15 @@ def _meant(study: Study, fault: Fault) -> Iterator[Repair]:
         yield Repair(f'Use "{word}"', (edit,))
 
 
+def _missing(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield an initial value for a key that is missing."""
+    from study_app.authoring.additions import initial  # noqa: PLC0415 - new elements need repairs, too
+
+    if fault.message == "is missing" and fault.path:
+        with suppress(Refused):
+            yield Repair("Add it", (Set(fault.path, initial(study.document, fault.path)),))
+
+
 def _surplus(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield the removal of what does not belong there."""
     message = fault.message
@@ -68,6 +81,26 @@ def _surplus(study: Study, fault: Fault) -> Iterator[Repair]:
         yield Repair("Remove", (Unset(fault.path),))
     if message == "is not a language of the study":
         yield Repair("Remove this text", (Unset(fault.path),))
+
+
+def _constrained(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the order that a key belongs to."""
+    if found := _ORDER.match(fault.message):
+        edit = Set((*fault.path[:-1], "order"), found[1])
+        yield Repair(f'Use order = "{found[1]}"', (edit,))
+
+
+def _targets(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the nearest place in the tank for a target."""
+    found, point = _OUTSIDE.match(fault.message), _value(study, fault.path)
+    size = _value(study, ("device", "workspace_mm"))
+    if found is None or not isinstance(point, tuple) or not isinstance(size, tuple):
+        return
+    axis = "xyz".index(found[1])
+    most = math.floor(size[axis] / 2 - float(found[2]))
+    if most >= 0:
+        place = math.copysign(most, point[axis])
+        yield Repair(f"Move to {place:g} mm", (Set((*fault.path, axis), int(place)),))
 
 
 def _within_bounds(study: Study, fault: Fault) -> Iterator[Repair]:
@@ -139,5 +172,5 @@ def _exponent(value: float, digits: int) -> int:
 
 
 _KINDS: Final[tuple[Callable[[Study, Fault], Iterator[Repair]], ...]] = (
-    _meant, _within_bounds, _levels, _texts, _steps, _surplus,
+    _meant, _within_bounds, _levels, _targets, _texts, _steps, _constrained, _missing, _surplus,
 )  # fmt: skip

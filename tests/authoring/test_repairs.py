@@ -38,6 +38,12 @@ def _repaired(case: Case) -> int:
     [
         ("demo", ('liquid = "thick"', 'liquid = "thik"'), 'Use "thick"'),
         ("demo", ("force_limit_n = 6", "force_limit_n = 60"), "Use 8"),
+        ("demo", ("targets_mm = [[-30, 0, 0], [30, 0, 0]]", "targets_mm = [[-30, 0, 0], [48, 0, 0]]"), "Move to 44 mm"),
+        (
+            "demo",
+            ('repetitions = 1\ntask = "reach"', 'repetitions = 4\nmax_repeats = 2\ntask = "reach"'),
+            'Use order = "constrained"',
+        ),
         ("demo", ("blinding =", "blindin ="), 'Use "blinding"'),
         ("demo", ('sequence = ["welcome", ', "sequence = ["), "Add to the session"),
         (

@@ -11,12 +11,13 @@ from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, dress
-from study_app.gui.widgets.cards import Card, Icon
+from study_app.gui.widgets.cards import Card, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 HIGHEST = 290
+HEAD_PX, ROW_PX, LINE_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 39, 56, 190, 110
 
 
 class ProblemLine(Themed, QWidget):
@@ -39,7 +40,7 @@ class ProblemLine(Themed, QWidget):
         self.go.setStyleSheet("text-align: left;")
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         across = QHBoxLayout(self)
-        across.setContentsMargins(10, 4, 6, 4)
+        across.setContentsMargins(10, 2, 6, 2)
         across.setSpacing(10)
         across.addWidget(Icon("warning", "bad", 18))
         across.addWidget(Icon(row.icon, "text2", 18))
@@ -52,12 +53,17 @@ class ProblemLine(Themed, QWidget):
         said = Clamped(words, 2, "label")
         said.setAlignment(Qt.AlignmentFlag.AlignVCenter)
         across.addWidget(said, 1)
-        across.addWidget(figures("" if row.line is None else f"line {row.line}", "small", "text2"))
-        self._repairs = QHBoxLayout()
+        line = figures("" if row.line is None else f"line {row.line}", "small", "text2")
+        line.setMinimumWidth(LINE_PX)
+        across.addWidget(line)
+        buttons = QWidget()
+        buttons.setMinimumWidth(NARROW_REPAIR_PX if narrow else REPAIR_PX)
+        self._repairs = QHBoxLayout(buttons)
+        self._repairs.setContentsMargins(0, 0, 0, 0)
         self._repairs.setSpacing(6)
-        across.addLayout(self._repairs)
+        across.addWidget(buttons)
         self.repairs: list[ActionButton] = []
-        self.setMinimumHeight(44)
+        self.setMinimumHeight(ROW_PX)
         self.show_repairs(repairs)
 
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
@@ -136,22 +142,23 @@ class ProblemsCard(Card):
         self.heading.setText(f"{len(rows)} problem{'s' * (len(rows) != 1)}" if rows else "No problems")
         self.limit.show_values(((False, "All"), (True, "Here only")), self._here_only)
         self.next.setEnabled(bool(rows))
-        self.setFixedHeight(min(HIGHEST, 92 + 48 * max(1, len(rows))))
+        self.setFixedHeight(min(HIGHEST, HEAD_PX + (ROW_PX + 1) * max(1, len(rows))))
         if unchanged and self.lines:
             return
         inside = QWidget()
         column = QVBoxLayout(inside)
         column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
+        column.setSpacing(0)
         self.lines = []
         for row in rows:
             if self._here_only and row.element != element:
                 continue
-            made = ProblemLine(row, repairs.get(row, ()), narrow=self.width() < 900)
+            made = ProblemLine(row, repairs.get(row, ()), narrow=(self.parentWidget() or self).width() < 900)
             made.opened.connect(lambda row=row: self._open(row))
             made.repair_asked.connect(lambda words, row=row: self.repair_asked.emit(row, words))
             made.here = row == self._at
             column.addWidget(made)
+            column.addWidget(Rule())
             self.lines.append(made)
         column.addStretch()
         dress(inside, self.theme)

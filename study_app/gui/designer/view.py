@@ -130,6 +130,7 @@ class DesignerPlace(Place):
         self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
         self.problems.opened.connect(self._open_problem)
         self.problems.repair_asked.connect(self.repair_asked)
+        form.repair_asked.connect(self.repair_asked)
         self.problems.close_asked.connect(self.problems.hide)
         self.new_page.begin_asked.connect(self.begin_asked)
         self.new_page.given_up.connect(self.close_new)
@@ -165,6 +166,7 @@ class DesignerPlace(Place):
         self.form.show_form(view.form, read_only=view.header.read_only)
         self.file.show_file(view.file, scroll=elsewhere, read_only=view.header.read_only)
         self._repairs = {row: words for row, words in self._repairs.items() if row in view.problems}
+        self.form.show_repairs(self._repairs)
         self.problems.show_problems(view.problems, view.form.path, self._repairs)
         self.outline.duplicate.setEnabled(self.form.head.copy.isEnabled())
         self.outline.add.setEnabled(not view.header.read_only)
@@ -186,6 +188,7 @@ class DesignerPlace(Place):
     def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
         """Offer the repairs of a problem."""
         self._repairs[row] = words
+        self.form.show_repairs(self._repairs)
         self.problems.show_repairs(row, words)
 
     def show_new(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:

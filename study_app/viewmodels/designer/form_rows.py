@@ -100,12 +100,13 @@ class FormRow:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Rows under one heading ("" for those of the element itself), and the keys that can be added to them."""
+    """Rows under one heading ("" for those of the element itself), keys that can be added, and faults of no row."""
 
     path: Path
     title: str
     rows: tuple[FormRow, ...]
     absent: tuple[Row, ...] = ()
+    faults: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +123,8 @@ class Form:
         Its name in the file, None where it has none of its own.
     sections : tuple of Section
         Its rows.
-    faults : tuple of str
-        What is wrong with it that belongs to no row.
+    faults, id_faults : tuple of str
+        What is wrong with it that belongs to no row, and what is wrong with its id.
     position : tuple of int or None
         Its place in the session or list and how many there are, from 1; None where it has no order.
     questions : QuestionLines
@@ -141,6 +142,7 @@ class Form:
     id: str | None = None
     sections: tuple[Section, ...] = ()
     faults: tuple[str, ...] = ()
+    id_faults: tuple[str, ...] = ()
     position: tuple[int, int] | None = None
     questions: QuestionLines = NO_QUESTIONS
     around: tuple[tuple[Path, str], ...] = ()
@@ -162,19 +164,22 @@ def form(study: Study, path: Path) -> Form:
     else:
         sections = tuple(_sections(study, path, places, 0))
     shown = {row.row.path for section in sections for row in section.rows}
-    own = tuple(
-        _sentence(study, fault.message, fault.hint)
-        for fault in study.faults
-        if fault.path[: len(path)] == path and not any(fault.path[: len(one)] == one for one in shown)
-    )
+    shown |= {section.path for section in sections if section.path != path}
+    within = [fault for fault in study.faults if fault.path[: len(path)] == path]
+    within = [fault for fault in within if not any(fault.path[: len(one)] == one for one in shown)]
+    own = tuple(_sentence(study, one.message, one.hint) for one in within if one.path != (*path, "id"))
+    of_id = tuple(_sentence(study, one.message, one.hint) for one in within if one.path == (*path, "id"))
     value = value_at(document, path)
     name = value.get("id") if isinstance(value, Mapping) else None
     if name is None and len(path) == 2 and isinstance(value, Mapping):
         name = str(path[1])
+    if name is None and of_id:
+        name = ""
     title = title_of(document, path)
     return Form(
         path, title, icon_of(path), _kind(path), None if name is None else str(name), sections, own,
-        position_of(document, path), question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
+        of_id, position_of(document, path),
+        question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
         tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
         f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
     )  # fmt: skip
@@ -221,6 +226,10 @@ def _kind(path: Path) -> str:
 
 
 def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[Section]:
+    whole = row_at(study.document, path) if len(path) == 1 else None
+    if whole is not None and whole.kind not in {"table", "tables"}:
+        yield Section(path, "", (_form_row(study, whole, places),))
+        return
     shown: list[FormRow] = []
     absent: list[Row] = []
     below: list[Path] = []
@@ -253,6 +262,15 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
         elif row.path[-1] != "id" or len(path) < 3:
             shown.append(_form_row(study, row, places))
     title = "" if depth == 0 else label_of(path[-1])
+    inside = {row.row.path for row in shown}
+    faults = tuple(
+        _sentence(study, fault.message, fault.hint)
+        for fault in study.faults
+        if depth
+        and fault.path[: len(path)] == path
+        and not any(fault.path[: len(one)] == one for one in inside)
+        and not any(fault.path[: len(one)] == one for one in below)
+    )
     rest = (title, tuple(row.path[-1] for row in (*(one.row for one in shown), *absent)))
     for words, keys in (*sections_of(study.document, path), rest):
         own = tuple(row for key in keys for row in shown if row.row.path[len(path)] == key)
@@ -260,7 +278,8 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
         shown = [row for row in shown if row not in own]
         absent = [row for row in absent if row not in missing]
         if own or missing:
-            yield Section(path, words, own, missing)
+            yield Section(path, words, own, missing, faults)
+            faults = ()
     for table in below:
         yield from _sections(study, table, places, depth + 1)
 

@@ -203,3 +203,30 @@ def test_points_of_a_scale_are_written_added_and_removed_in_every_language(qtbot
     designer.editing.undo()
     designer.editing.undo()
     assert designer.text == text
+
+
+def test_a_repair_is_offered_at_its_field_and_made_there(qtbot: Any, designer: Any) -> None:
+    text = designer.file.read_text()
+    designer.file.write_text(text.replace('conditions = ["thin", "thick"]', 'conditions = ["thin", "thik"]'))
+    designer.controller.open("kitchen")
+    designer.editing.select(("blocks", "liquids"))
+    row = designer.row("blocks", "liquids", "conditions")
+    assert row.field.rows[1].faulty
+    assert row.field.rows[1].note.whole == "not in the study"
+    qtbot.waitUntil(lambda: bool(row.repairs))
+    press(qtbot, row.repairs[0])
+    assert designer.text == text
+    assert not designer.row("blocks", "liquids", "conditions").repairs
+
+
+def test_a_question_without_an_id_says_so_at_its_id_and_gets_one(qtbot: Any, designer: Any) -> None:
+    designer.file.write_text(designer.file.read_text().replace('id = "like_honey"\n', ""))
+    designer.controller.open("kitchen")
+    designer.editing.select((*ITEMS, 1))
+    head = designer.place.form.head
+    assert head.refusal.isVisible()
+    assert "Is missing" in head.refusal.text()
+    qtbot.keyClicks(head.id, "honey")
+    qtbot.keyClick(head.id, Qt.Key.Key_Return)
+    assert designer.editing.opened.study.document["questionnaires"]["liquid"]["items"][1]["id"] == "honey"
+    assert not designer.place.form.head.refusal.isVisible()

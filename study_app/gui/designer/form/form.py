@@ -2,132 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.form_foot import FormFoot
 from study_app.gui.designer.form.form_head import LABEL_PX, FormHead
-from study_app.gui.designer.form.list_fields import field, structure
 from study_app.gui.designer.form.question_rows import Panel, QuestionRow, QuestionRows
-from study_app.gui.designer.form.row_fields import LanguagesField, add_button, stacked
-from study_app.gui.designer.form.special import EDITORS
-from study_app.gui.designer.form.special_editor import SpecialEditor
+from study_app.gui.designer.form.row_fields import add_button, stacked
+from study_app.gui.designer.form.row_widget import RowWidget, is_wide, language_heads, structure_of
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.themed import dress, take_away
-from study_app.gui.widgets.cards import Card, Icon, Rule
+from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form_rows import Form, FormRow, Section
-from study_app.viewmodels.designer.requests import AddKey, RemoveKey, SwitchKey
+from study_app.viewmodels.designer.problem_rows import ProblemRow
+from study_app.viewmodels.designer.requests import AddKey, RemoveKey
 from study_app.viewmodels.designer.special.questions import QuestionLine
 
 ACROSS = 2
 
 
-class RowWidget(QWidget):
-    """A row: its label, its editor, its bounds, a button that removes the key, and what is wrong with it."""
-
-    def __init__(self, row: FormRow) -> None:
-        super().__init__()
-        self.row = row
-        self.key = structure_of(row)
-        self.refusal = ""
-        special, wide = special_editor_of(row), is_wide(row)
-        self.field = field(row) if special is None else special.make(row)
-        self.keys = Segments("Which of the two is given") if row.instead else None
-        self.words = label(row.row.label, "label", wraps=True)
-        if not wide:
-            self.words.setFixedWidth(LABEL_PX)
-        self.words.setMinimumHeight(FIELD_PX)
-        self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
-        self.words.setBuddy(self.field)
-        self.remove = IconButton("cross", f"Remove {row.row.label} from the file", size=FIELD_PX, role="plain")
-        self.remove.clicked.connect(lambda: self.field.asked.emit(RemoveKey(self.row.row.path)))
-        across = QHBoxLayout()
-        across.setSpacing(8)
-        top = Qt.AlignmentFlag.AlignTop
-        across.addWidget(self.words, int(wide), top)
-        across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
-        across.addWidget(self.remove, 0, top)
-        policy = self.remove.sizePolicy()
-        policy.setRetainSizeWhenHidden(True)
-        self.remove.setSizePolicy(policy)
-        self.wrong = QWidget()
-        beside = QHBoxLayout(self.wrong)
-        beside.setContentsMargins(LABEL_PX + 8, 0, 0, 0)
-        beside.setSpacing(8)
-        beside.addWidget(Icon("warning", "bad", 16), 0, top)
-        self.sentence = label("", "label", "bad", wraps=True)
-        beside.addWidget(self.sentence, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
-        column.addLayout(across)
-        if self.keys is not None:
-            self.keys.show_values(row.instead, row.row.path[-1])
-            self.keys.chosen.connect(self._switch)
-            above = QHBoxLayout()
-            above.setContentsMargins(0 if wide else LABEL_PX + 8, 0, 0, 0)
-            above.addWidget(self.keys, 0, Qt.AlignmentFlag.AlignLeft)
-            column.insertLayout(0, above)
-        if wide and len(row.languages) > 1 and not stacked(row):
-            column.addLayout(language_heads(row.languages))
-        if wide:
-            column.addWidget(self.field)
-        column.addWidget(self.wrong)
-        self.remove.setVisible(row.removable)  # in its layout by now: it would be shown as a window before
-        self.show_row(row)
-
-    def _switch(self, key: object) -> None:
-        if key != self.row.row.path[-1]:
-            self.field.asked.emit(SwitchKey(self.row.row.path, str(key)))
-
-    def show_row(self, row: FormRow) -> None:
-        """Show the row's value and faults."""
-        if row != self.row:
-            self.refusal = ""
-            self.row = row
-            self.field.show_row(row)
-        self.say()
-
-    def say(self) -> None:
-        """Show what is wrong."""
-        found = [sentence for sentence in (self.refusal, self.field.refusal, *self.row.faults) if sentence]
-        self.sentence.setText("\n".join(found))
-        self.wrong.setVisible(bool(found))
-        row = self.row.row
-        self.field.setAccessibleDescription(". ".join(filter(None, (row.help, self.row.bounds, *found))))
-        some_missing = isinstance(self.field, LanguagesField) and self.field.some_missing
-        for part in self.field.findChildren(QWidget):
-            if isinstance(part, TypedLine | TypedText):
-                part.setAccessibleDescription(self.field.accessibleDescription())
-            if isinstance(part, TypedLine) and not self.field.refusal:
-                blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
-                part.show_refused(bool(self.row.faults) and blamed)
-
-    @property
-    def help(self) -> str:
-        """What the row edits: the description, or the sentence of what is chosen, and what is permitted."""
-        row = self.row.row
-        shown = row.default if row.value is None else row.value
-        sentence = next((choice.sentence for choice in row.choices if choice.value == shown), "")
-        reason = f" ({row.reason})" if row.reason else ""
-        permitted = f"Permitted: {self.row.bounds}{reason}." if self.row.bounds and not row.choices else ""
-        words = " ".join(filter(None, (sentence or row.help, permitted)))
-        return " ".join(words.replace("`", "").split())
-
-
 class FormCard(Card):
     """Draws a `Form`.
 
-    Signals: ``asked`` (a request), ``open_asked`` (path), ``delete_asked`` (path), ``copy_asked`` (paths).
+    Signals: ``asked`` (a request), ``open_asked`` (path), ``delete_asked`` (path), ``copy_asked`` (paths),
+    ``repair_asked`` (problem, words).
     """
 
     asked = Signal(object)
     copy_asked = Signal(object)
     open_asked = Signal(object)
     delete_asked = Signal(object)
+    repair_asked = Signal(object, str)
 
     def __init__(self) -> None:
         super().__init__(padding=18, gap=8)
@@ -197,6 +106,8 @@ class FormCard(Card):
                 sections.addWidget(Rule())
             if section.title:
                 sections.addLayout(self._heading(section, removable=section.path != form.path))
+            if section.faults:
+                sections.addWidget(label("\n".join(section.faults), "label", "bad", wraps=True))
             heads: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
                 beside = () if stacked(row) or is_wide(row) else row.languages
@@ -250,6 +161,7 @@ class FormCard(Card):
     def _row(self, row: FormRow) -> RowWidget:
         made = RowWidget(row)
         made.field.asked.connect(self.asked)
+        made.repair_asked.connect(self.repair_asked)
         made.field.open_asked.connect(self.open_asked)
         made.field.write_asked.connect(self.write)
         made.field.copy_asked.connect(lambda path: self.copy_asked.emit((path,)))
@@ -306,6 +218,11 @@ class FormCard(Card):
             self.own.setText(sentence)
             self.own.setVisible(True)
 
+    def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
+        """Offer repairs at the rows that their problems are in."""
+        for row in self.rows:
+            row.show_repairs({} if self.read_only else known)
+
     def _come(self, row: RowWidget) -> None:
         self._focused = row
         row.say()
@@ -320,37 +237,10 @@ class FormCard(Card):
             self.foot.show_help(row.row.row.label, row.row.place, row.help)
 
 
-def special_editor_of(row: FormRow) -> SpecialEditor | None:
-    """Return the special editor of a row, None where its kind's editor is used."""
-    return EDITORS.get((row.row.model, str(row.row.path[-1])))
-
-
-def is_wide(row: FormRow) -> bool:
-    """Return whether the editor of a row takes the width of the form."""
-    special = special_editor_of(row)
-    return row.row.kind == "paragraphs" if special is None else special.wide
-
-
-def structure_of(row: FormRow) -> object:
-    """Return what makes another editor of a row necessary."""
-    special = special_editor_of(row)
-    return structure(row), None if special is None else special.structure(row)
-
-
-def language_heads(languages: tuple[tuple[str, str], ...], inset: tuple[int, int] = (0, 0)) -> QHBoxLayout:
-    """Return the names of languages above the columns of their texts; ``inset`` is the room left and right [px]."""
-    heads = QHBoxLayout()
-    heads.setContentsMargins(inset[0], 0, inset[1], 0)
-    heads.setSpacing(8)
-    for _code, language in languages:
-        heads.addWidget(label(language, "small", "text2"), 1)
-    return heads
-
-
 def _shape(form: Form) -> object:
     others = [line for line in form.questions.lines if line.path != form.path]
     return (
         others,
         form.questions.languages,
-        [(section.path, section.title, tuple(row.path for row in section.absent)) for section in form.sections],
+        [(one.path, one.title, tuple(row.path for row in one.absent), one.faults) for one in form.sections],
     )

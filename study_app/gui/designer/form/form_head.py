@@ -13,7 +13,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.designer.form_rows import Form
-from study_app.viewmodels.designer.requests import DuplicateElement, MoveElement, RenameElement
+from study_app.viewmodels.designer.requests import DuplicateElement, MoveElement, RenameElement, SetValue
 
 TILE = 40
 LABEL_PX = 124
@@ -52,6 +52,7 @@ class FormHead(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.form: Form | None = None
+        self._faulty = False
         self.tile = Tile()
         self.title = Elided("card")
         self.kind = label("", "small", "text2")
@@ -122,7 +123,12 @@ class FormHead(QWidget):
         self.id_line.setVisible(form.id is not None)
         self._read_only = read_only
         self._apply_lock()
-        if not self.refusal.text():
+        if form.id_faults:
+            self.refuse("\n".join(form.id_faults))
+        elif self._faulty:
+            self.refuse("")
+        self._faulty = bool(form.id_faults)
+        if not self.refusal.text() or self._faulty:
             self.id.show_text(form.id or "")
         self.feel.setVisible(bool(form.feel))
         self.feel.setAccessibleName(form.feel or "Feel")
@@ -189,5 +195,7 @@ class FormHead(QWidget):
         if self.form is not None and self.form.id is not None:
             if name == self.form.id:
                 self.refuse("")
+            elif not self.form.id:
+                self.asked.emit(SetValue((*self.form.path, "id"), name))
             else:
                 self.asked.emit(RenameElement(self.form.path, name))

@@ -1,0 +1,180 @@
+"""A row of the form: its label, its editor, what is wrong with it, and the repairs of that."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from study_app.gui.designer.form.form_head import LABEL_PX
+from study_app.gui.designer.form.list_fields import field, structure
+from study_app.gui.designer.form.row_fields import LanguagesField, stacked
+from study_app.gui.designer.form.special import EDITORS
+from study_app.gui.designer.form.special_editor import SpecialEditor
+from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.gui.designer.segments import Segments
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import Themed, dress, take_away
+from study_app.gui.widgets.cards import Icon
+from study_app.gui.widgets.controls import ActionButton, IconButton
+from study_app.gui.widgets.labels import label
+from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.problem_rows import ProblemRow
+from study_app.viewmodels.designer.requests import RemoveKey, SwitchKey
+
+MOST_REPAIRS = 3
+
+
+class RowWidget(Themed, QWidget):
+    """A row: its label, its editor, a button that removes the key, and what is wrong with it.
+
+    ``repair_asked`` carries a problem and the words of one of its repairs.
+    """
+
+    repair_asked = Signal(object, str)
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__()
+        self.row = row
+        self.key = structure_of(row)
+        self.refusal = ""
+        special, wide = special_editor_of(row), is_wide(row)
+        self.field = field(row) if special is None else special.make(row)
+        self.keys = Segments("Which of the two is given") if row.instead else None
+        self.words = label(row.row.label, "label", wraps=True)
+        if not wide:
+            self.words.setFixedWidth(LABEL_PX)
+        self.words.setMinimumHeight(FIELD_PX)
+        self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
+        self.words.setBuddy(self.field)
+        self.remove = IconButton("cross", f"Remove {row.row.label} from the file", size=FIELD_PX, role="plain")
+        self.remove.clicked.connect(lambda: self.field.asked.emit(RemoveKey(self.row.row.path)))
+        across = QHBoxLayout()
+        across.setSpacing(8)
+        top = Qt.AlignmentFlag.AlignTop
+        across.addWidget(self.words, int(wide), top)
+        across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
+        across.addWidget(self.remove, 0, top)
+        policy = self.remove.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.remove.setSizePolicy(policy)
+        self.wrong = QWidget()
+        beside = QHBoxLayout(self.wrong)
+        beside.setContentsMargins(LABEL_PX + 8, 0, 0, 0)
+        beside.setSpacing(8)
+        beside.addWidget(Icon("warning", "bad", 16), 0, top)
+        self.sentence = label("", "label", "bad", wraps=True)
+        beside.addWidget(self.sentence, 1)
+        self.repairs: list[ActionButton] = []
+        self._offered: dict[ProblemRow, tuple[str, ...]] = {}
+        self._buttons = QHBoxLayout()
+        self._buttons.setContentsMargins(LABEL_PX + 32, 0, 0, 0)
+        self._buttons.setSpacing(6)
+        self._buttons.addStretch()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(across)
+        if self.keys is not None:
+            self.keys.show_values(row.instead, row.row.path[-1])
+            self.keys.chosen.connect(self._switch)
+            above = QHBoxLayout()
+            above.setContentsMargins(0 if wide else LABEL_PX + 8, 0, 0, 0)
+            above.addWidget(self.keys, 0, Qt.AlignmentFlag.AlignLeft)
+            column.insertLayout(0, above)
+        if wide and len(row.languages) > 1 and not stacked(row):
+            column.addLayout(language_heads(row.languages))
+        if wide:
+            column.addWidget(self.field)
+        column.addWidget(self.wrong)
+        column.addLayout(self._buttons)
+        self.remove.setVisible(row.removable)  # in its layout by now: it would be shown as a window before
+        self.show_row(row)
+
+    def _switch(self, key: object) -> None:
+        if key != self.row.row.path[-1]:
+            self.field.asked.emit(SwitchKey(self.row.row.path, str(key)))
+
+    def show_row(self, row: FormRow) -> None:
+        """Show the row's value and faults."""
+        if row != self.row:
+            self.refusal = ""
+            self.row = row
+            self.field.show_row(row)
+        self.say()
+
+    def say(self) -> None:
+        """Show what is wrong."""
+        found = [sentence for sentence in (self.refusal, self.field.refusal, *self.row.faults) if sentence]
+        self.sentence.setText("\n".join(found))
+        self.wrong.setVisible(bool(found))
+        row = self.row.row
+        self.field.setAccessibleDescription(". ".join(filter(None, (row.help, self.row.bounds, *found))))
+        some_missing = isinstance(self.field, LanguagesField) and self.field.some_missing
+        for part in self.field.findChildren(QWidget):
+            if isinstance(part, TypedLine | TypedText):
+                part.setAccessibleDescription(self.field.accessibleDescription())
+            if isinstance(part, TypedLine) and not self.field.refusal:
+                blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
+                part.show_refused(bool(self.row.faults) and blamed)
+
+    def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
+        """Offer the repairs of the problems of this row, of each the first."""
+        path = self.row.row.path
+        offered = {one: words for one, words in known.items() if one.fault.path[: len(path)] == path and words}
+        if offered == self._offered:
+            return
+        self._offered = offered
+        for button in self.repairs:
+            take_away(button)
+        self.repairs = []
+        several = len(offered) > 1
+        asked = [(one, word) for one, words in offered.items() for word in words[: 1 if several else 2]]
+        for problem, word in asked[:MOST_REPAIRS]:
+            made = ActionButton("", word, height=32)
+            made.setProperty("dense", "true")
+            made.setFont(font("label"))
+            made.setAccessibleName(f"{word}: {self.row.row.label}")
+            made.clicked.connect(lambda _on=False, one=problem, word=word: self.repair_asked.emit(one, word))
+            dress(made, self.theme)
+            self._buttons.addWidget(made)
+            self.repairs.append(made)
+
+    @property
+    def help(self) -> str:
+        """What the row edits: the description, or the sentence of what is chosen, and what is permitted."""
+        row = self.row.row
+        shown = row.default if row.value is None else row.value
+        sentence = next((choice.sentence for choice in row.choices if choice.value == shown), "")
+        reason = f" ({row.reason})" if row.reason else ""
+        permitted = f"Permitted: {self.row.bounds}{reason}." if self.row.bounds and not row.choices else ""
+        words = " ".join(filter(None, (sentence or row.help, permitted)))
+        return " ".join(words.replace("`", "").split())
+
+
+def special_editor_of(row: FormRow) -> SpecialEditor | None:
+    """Return the special editor of a row, None where its kind's editor is used."""
+    return EDITORS.get((row.row.model, str(row.row.path[-1])))
+
+
+def is_wide(row: FormRow) -> bool:
+    """Return whether the editor of a row takes the width of the form."""
+    special = special_editor_of(row)
+    return row.row.kind == "paragraphs" if special is None else special.wide
+
+
+def structure_of(row: FormRow) -> object:
+    """Return what makes another editor of a row necessary."""
+    special = special_editor_of(row)
+    return structure(row), None if special is None else special.structure(row)
+
+
+def language_heads(languages: tuple[tuple[str, str], ...], inset: tuple[int, int] = (0, 0)) -> QHBoxLayout:
+    """Return the names of languages above the columns of their texts; ``inset`` is the room left and right [px]."""
+    heads = QHBoxLayout()
+    heads.setContentsMargins(inset[0], 0, inset[1], 0)
+    heads.setSpacing(8)
+    for _code, language in languages:
+        heads.addWidget(label(language, "small", "text2"), 1)
+    return heads
