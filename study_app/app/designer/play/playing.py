@@ -27,7 +27,7 @@ from study_app.gui.widgets.background import Background
 from study_app.session.preview import PARTICIPANT
 from study_app.session.request import NewSession, resumed
 from study_app.session.simulated.skipping import begin_at
-from study_app.store.atomic import copy_folder
+from study_app.store.atomic import copy_folder, write_file
 from study_app.store.folders import kept_pilot_folder
 from study_app.store.sessions.begin import SessionStart
 from study_app.viewmodels.designer import play as shown
@@ -113,6 +113,9 @@ class Playing(QObject):
         elif self._preparing.busy:
             self.pilot = None  # `_begin` deletes its folder once nothing is written there
             self._show(None)
+        elif self.pilot is not None and self.pilot.choices is None:  # a bug ended its preparation
+            self._delete()
+            self._show(None)
 
     def _answer(self, action: str) -> None:
         if action == "play":
@@ -135,7 +138,12 @@ class Playing(QObject):
         found, self._asked = self._asked, None
         if found is None:
             return
-        pilot = self.pilot = _Pilot(found, self.device, Path(tempfile.mkdtemp(prefix=FOLDER)))
+        try:
+            folder = Path(tempfile.mkdtemp(prefix=FOLDER))
+        except OSError as error:
+            self.place.message.emit("The study cannot be played", f"No temporary folder can be made: {error.strerror}.")
+            return
+        pilot = self.pilot = _Pilot(found, self.device, folder)
         self._preparing.run(lambda: _prepared(pilot))
         self._show(shown.under_way(found.words, title_of(pilot.device)))
 
@@ -239,7 +247,7 @@ def _prepared(pilot: _Pilot) -> tuple[_Pilot, NewSession | StudyError]:
         pilot=True,
     )
     try:
-        file.write_bytes(found.source)
+        write_file(file, found.source, waits=False)
         session = begin_at(pilot.folder / "results" / study.name, found.protocol, found.source, start, found.step)
         options = descriptor_of(pilot.device).window_values(settings_here()[0].device_options)
         choices = resumed(session, protocol=str(file), device=pilot.device, windowed=True, device_options=options)
