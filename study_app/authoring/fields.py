@@ -40,7 +40,7 @@ _OF_LENGTHS: Final = {
     "maxItems": "at most {} entries",
     "maxLength": "at most {} characters",
 }
-_SENTENCES: Final = re.compile(r"((?:[a-z_0-9]+, )*[a-z_0-9]+): ([^;]+?)(?:; |\.?\Z)")
+_SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |\.?\Z)")
 
 
 @dataclass(frozen=True, slots=True)

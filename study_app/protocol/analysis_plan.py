@@ -25,7 +25,10 @@ class Published(Table):
     """A value of another study, which figures show next to the study's own."""
 
     block: Id = Field(description="The block whose results it is comparable with.")
-    measure: Literal["weber", "threshold", "exponent", "pse"] = Field(description="What was measured.")
+    measure: Literal["weber", "threshold", "exponent", "pse"] = Field(
+        description="weber: the Weber fraction; threshold: the threshold; exponent: the exponent of a power law; pse: "
+        "the point of subjective equality."
+    )
     value: float = Field(description="The value; a threshold in the unit of the varied number.")
     standard: float | None = Field(default=None, description="Its standard, in that unit; left out: of all.")
     low: float | None = Field(default=None, description="Lower end of its interval or range.")

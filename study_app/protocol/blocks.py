@@ -30,7 +30,7 @@ class Criterion(Table):
     right: int = Field(ge=1, le=100, description="How many of the last answers must be correct.")
     of: int = Field(ge=1, le=100, description="How many of the last answers count.")
     missed: Literal["go_on", "end"] = Field(
-        default="go_on", description="What happens if the block ends without: the session continues, or ends."
+        default="go_on", description="go_on: the session continues if the block ends without; end: it ends."
     )
 
     @model_validator(mode="after")
@@ -85,7 +85,10 @@ class Block(Table):
     )  # fmt: skip
 
     id: Id = Field(description="The name of the block's table.")
-    phase: Phase = Field(default="main", description="Only main trials are analysed.")
+    phase: Phase = Field(
+        default="main",
+        description="main: analysed; practice: kept, not analysed; baseline: kept for comparison, not analysed.",
+    )
     part: int | None = Field(default=None, ge=1, le=20, description="Part of the study that the block belongs to.")
     title: Localised = Field(description="Name of the block.")
     setting_label: Localised = Field(description="Neutral name of its trials; a number follows: Liquid setting 1.")
@@ -108,8 +111,8 @@ class Block(Table):
     catch: Catch | None = Field(default=None, description="Easy trials, and the rule that excludes; left out: none.")
     compares: Compared | None = Field(
         default=None,
-        description="What the conditions of a main block differ in; left out: delays if all have one liquid and their "
-        "delays differ, otherwise liquids.",
+        description="liquids: the conditions of a main block differ in their liquids; delays: in their delays, the "
+        "default where all have one liquid and their delays differ.",
     )
     replicates: bool = Field(
         default=False,

@@ -102,12 +102,13 @@ class StudyHead(Table):
         min_length=1, description="Languages every text exists in; the first is preset."
     )
     resume: Literal["trial", "block"] = Field(
-        default="trial", description="Where a session goes on that was interrupted: its trial again, or its block."
+        default="trial",
+        description="trial: an interrupted session presents its trial again; block: it presents its block again.",
     )
     blinding: Literal["double", "single"] = Field(
         default="double",
-        description="Who must not know what is felt: participant and operator, or the participant alone; in a "
-        "single-blind study the operator sees force and wake while it runs.",
+        description="double: neither participant nor operator knows what is felt; single: the operator sees force and "
+        "wake while the session runs, the participant does not know what is felt.",
     )
     credits: Credits | None = Field(default=None, description="What exports state of authors and licence.")
 
@@ -173,7 +174,8 @@ class Condition(Table):
         default=None, description="The item of analysis.names that is right for it; left out: none is."
     )
     ball: Literal["shown", "hidden"] = Field(
-        default="shown", description="A hidden ball is drawn during a task's lead, not while it is felt."
+        default="shown",
+        description="shown: the ball is always drawn; hidden: it is drawn during a task's lead, not while it is felt.",
     )
     force_delay_ms: Annotated[float, within(0, force_link.MOST_DELAY_MS, "a later force pushes the hand")] = Field(
         default=0, description="Delay of the force [ms]; what is drawn is not delayed by it."
@@ -212,7 +214,10 @@ def compared(conditions: Sequence[Condition]) -> Compared:
 class PageText(Table):
     """A page to read."""
 
-    kind: Literal["consent", "instructions", "break", "debrief"]
+    kind: Literal["consent", "instructions", "break", "debrief"] = Field(
+        description="consent: what the participant agrees to; instructions: what comes next; break: a rest; debrief: "
+        "what the study was about."
+    )
     title: Localised = Field(description="Heading of the page.")
     body: PageBody = Field(description="The text; a blank line begins a paragraph.")
     button: Localised | None = Field(default=None, description="Words on the button; left out: Continue.")

@@ -146,6 +146,17 @@ def test_choices_have_their_sentences() -> None:
     assert sentences["williams"] == sentences["latin"] != ""
 
 
+def test_every_value_that_can_be_chosen_has_its_sentence() -> None:
+    lacking = {
+        (row.model, row.path[-1])
+        for row in every_row({})
+        if row.kind in {"choice", "kind"}
+        and len(row.choices) > 1
+        and not all(choice.sentence for choice in row.choices)
+    }
+    assert lacking == {("Protocol", "format")}
+
+
 def test_a_kind_decides_the_other_rows() -> None:
     document = STUDIES["viscosityjnd"]
     kind, *others = rows(document, ("tasks", "stir"))

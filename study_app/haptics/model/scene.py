@@ -88,7 +88,11 @@ Velocity: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Lead | Raw | Given
 class Knee(Frozen):
     """How speeds above a threshold are lowered before anything is computed from them."""
 
-    law: Literal["sqrt", "square", "none"] = "sqrt"
+    law: Literal["sqrt", "square", "none"] = Field(
+        default="sqrt",
+        description="sqrt: above the threshold as √(1 + 2 excess) − 1; square: as the square of the excess; none: "
+        "speeds are not lowered.",
+    )
     threshold_mps: Annotated[float, within(0.01, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] = 5.0
 
 

@@ -24,7 +24,9 @@ class Questionnaire(Table):
     title: Localised | None = Field(default=None, description="Heading; left out: the name of the setting.")
     intro: Localised = Field(description="The question above the statements.")
     scale: Id | None = Field(default=None, description="The scale of all statements; left out where there are none.")
-    item_order: Literal["fixed", "shuffled"] = Field(default="fixed", description="As written, or anew in every trial.")
+    item_order: Literal["fixed", "shuffled"] = Field(
+        default="fixed", description="fixed: as written; shuffled: anew in every trial."
+    )
     items: tuple[AnyQuestion, ...] = Field(
         min_length=1, description="The questions; one without kind is a statement on the questionnaire's scale."
     )

@@ -22,7 +22,7 @@ class Score(Table):
 
     items: Annotated[tuple[Id, ...], Field(min_length=1)] = Field(description="The items that are combined.")
     reverse: tuple[Id, ...] = Field(default=(), description="Of these, the items whose answers are reversed.")
-    combine: Literal["mean", "sum"] = Field(default="mean", description="How the answers are combined.")
+    combine: Literal["mean", "sum"] = Field(default="mean", description="mean: their mean; sum: their sum.")
     factor: float = Field(default=1, description="What the result is multiplied by.")
     offset: float = Field(default=0, description="What is then added.")
     weights: dict[Id, float] = Field(default_factory=dict, description="Weight of an item; left out: 1.")

@@ -66,8 +66,8 @@ class Design(Table):
     )
     feedback: Feedback | None = Field(
         default=None,
-        description='When the participant sees whether an answer was correct; default: "practice", and "never" '
-        "where no answer is correct.",
+        description="never: the participant does not see whether an answer was correct; practice: in practice alone, "
+        'the default; always: after every answer. Where no answer is correct, "never" is the default.',
     )
     feedback_s: Annotated[float, within(0.2, 10, "a sign needs 0.2 s to be seen")] = Field(
         default=0.6, description="How long the feedback is shown [s]."

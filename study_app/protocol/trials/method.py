@@ -88,7 +88,7 @@ class Method(Table):
 
     order: TrackOrder = Field(
         default="interleaved",
-        description="Whether the tracks alternate in random order, or one follows another.",
+        description="interleaved: the tracks alternate in random order; blocked: one follows another.",
     )
 
     tracks: Annotated[int, Field(ge=1, le=4)] = Field(default=1, description="How many tracks each standard has.")

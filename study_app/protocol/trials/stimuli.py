@@ -42,16 +42,20 @@ class Stimulus(Table):
         max_length=60, description=f"The number that is varied, as in simulate --set, or {', '.join(OF_CONDITION)}."
     )
     level: LevelKind | None = Field(
-        default=None, description="What a level is; default: a difference for a time (…_ms), else a Weber fraction."
+        default=None,
+        description="weber: (comparison − standard)/standard, the default; difference: comparison − standard, the "
+        "default for a time (…_ms); value: the comparison itself.",
     )
     standards: tuple[float, ...] = Field(
         default=(), max_length=8, description="What comparisons are compared with; default: the present value."
     )
     levels: tuple[float, float] = Field(description="The smallest and the largest level.")
-    spacing: Literal["log", "linear"] = Field(default="log", description="How levels between them are spaced.")
+    spacing: Literal["log", "linear"] = Field(
+        default="log", description="log: levels between them in even ratios; linear: in even steps."
+    )
     steps: Annotated[int, Field(ge=2, le=LEVELS_MOST)] = Field(default=31, description="How many levels there are.")
     direction: Literal["up", "down"] = Field(
-        default="up", description="Whether the comparison is above or below the standard."
+        default="up", description="up: comparisons are above the standard; down: below it."
     )
 
     @property

@@ -259,6 +259,8 @@ class ChoiceField(Field):
         if [words for _, words in values] != [self.list.itemText(at) for at in range(self.list.count())]:
             self.list.clear()
             self.list.addItems([words for _, words in values])
+            for at, choice in enumerate(row.choices):
+                self.list.setItemData(at, choice.sentence, Qt.ItemDataRole.ToolTipRole)
         self._values = [value for value, _ in values]
         known = self._values[: len(values) - len(row.sections)]
         self.list.setCurrentIndex(known.index(shown) if shown in known else -1)

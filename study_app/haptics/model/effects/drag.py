@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Final, Self, TypeAlias
 
-from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from study_app.haptics.model.effect import FLOAT, INT, Effect, Fields, Parameter
 from study_app.haptics.model.laws.drag import LAWS, Law, drag_n
@@ -51,7 +51,11 @@ class Drag(Frozen):
     scale, the ball and the knee.
     """
 
-    law: Law = "constant"
+    law: Law = Field(
+        default="constant",
+        description="constant: a constant drag coefficient; schiller-naumann: Schiller & Naumann 1933; "
+        "haider-levenspiel: Haider & Levenspiel 1989; brown-lawler: Brown & Lawler 2003; linear: a damper.",
+    )
     damping_nspm: DampingNspm | None = None
 
     @model_validator(mode="after")

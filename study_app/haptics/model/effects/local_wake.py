@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from study_app.haptics.model.effect import FLOAT, INT, Effect, Fields, Parameter, Rows
 from study_app.haptics.model.effects.wake import fill_tail, start_tail, tail_bound_n, within_scaling
@@ -31,7 +31,9 @@ class LocalWake(Frozen):
     scaling: TailScaling
     exponent: Exponent = 1.0
     decay: Decay = 0.999975
-    axes: Literal["xz", "xyz"] = "xz"
+    axes: Literal["xz", "xyz"] = Field(
+        default="xz", description="xz: vertical motion does not enter the tail; xyz: it does."
+    )
     reach_m: Extent | None = None
     spreading_m2ps: Annotated[float, within(0, 10, "beyond, a wake is gone within a tick")] = 1e-3
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, TypeVar
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from study_app.haptics.model.effect import FLOAT, INT, TAIL_RATE_HZ, Effect, Fields, Parameter, Rows
 from study_app.haptics.model.ranges import Decay, Exponent, Frozen, TailLength, TailScaling, within
@@ -36,7 +36,9 @@ class Wake(Frozen):
     breaking_span_m: Annotated[float, within(0, 100, "a hand turns within its reach")] = 0.068
     decay: Decay = 0.999975
     resolution_m: Annotated[float, within(0, 10, "a tail of coarser elements would never move")] = 0.0
-    axes: Literal["xz", "xyz"] = "xz"
+    axes: Literal["xz", "xyz"] = Field(
+        default="xz", description="xz: vertical motion does not enter the tail; xyz: it does."
+    )
 
     @model_validator(mode="after")
     def _liquid_never_outruns_the_body(self) -> Wake:

@@ -38,10 +38,13 @@ class QuestPlus(Adaptive):
 
     kind: Literal["questplus"] = "questplus"
     learn: Literal["threshold", "all"] = Field(
-        default="threshold", description="Whose entropy is minimised: the threshold's, or that of all parameters."
+        default="threshold",
+        description="threshold: the entropy of the threshold is minimised; all: that of all parameters.",
     )
     family: Family | None = Field(
-        default=None, description='The psychometric function; default: "weibull" for distances, else "normal".'
+        default=None,
+        description="weibull: a Weibull function, the default for distances; normal: a cumulative normal, the default "
+        "otherwise; logistic: a logistic function.",
     )
     widths: tuple[Positive, Positive] | None = Field(
         default=None, description="Smallest and largest width, from 5 to 95 % [decades, or units of the level]."

@@ -32,7 +32,9 @@ class UpDown(Adaptive):
 
     kind: Literal["updown"] = "updown"
     rule: Literal["1down1up", "2down1up", "3down1up", "4down1up"] = Field(
-        default="2down1up", description="How many successes in a row a step down takes."
+        default="2down1up",
+        description="1down1up: a step down after each success; 2down1up: after 2 successes in a row; 3down1up: after "
+        "3; 4down1up: after 4.",
     )
     step_up: Annotated[float, Field(gt=0)] | None = Field(
         default=None,
