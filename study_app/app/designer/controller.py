@@ -86,6 +86,7 @@ class DesignerController(QObject):
         place.delete_asked.connect(self.ask_to_delete)
         place.repair_asked.connect(self.repair)
         place.find_changed.connect(self.find)
+        place.add_asked.connect(self._show_addable)
         place.id_typed.connect(self._judge_id)
         editing.changed.connect(self.show)
         editing.edited.connect(self._resting.start)
@@ -185,6 +186,10 @@ class DesignerController(QObject):
     def _refuse(self, path: Place, sentence: str, asked: Request) -> None:
         self.place.refuse(path, sentence, renaming=isinstance(asked, RenameElement))
 
+    def _show_addable(self) -> None:
+        if (opened := self.editing.writable) is not None:
+            self.place.show_addable(addable(opened.study, opened.history.selected))
+
     def _judge_id(self, path: Place, name: str) -> None:
         """Say at once why an id cannot be taken."""
         opened, why = self.editing.writable, ""
@@ -219,7 +224,6 @@ class DesignerController(QObject):
                 file_text(study, opened.file.name, selected),
                 problems,
                 self.saving.banner,
-                addable(study, selected),
             )
         )
         self._repairs.begin(study, () if opened.read_only else problems)

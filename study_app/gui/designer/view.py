@@ -21,6 +21,7 @@ from study_app.gui.designer.prompts import DeleteCard, Prompt
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.main_view import Place
+from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.new_study import TemplateChoice
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
@@ -34,8 +35,8 @@ class DesignerPlace(Place):
 
     Signals: ``entered``, ``left``; ``asked`` (a request); ``selected`` (path) and ``back_asked``; ``study_asked``
     (source), ``new_asked``, ``begin_asked`` (source, name, answers); ``undo_asked``, ``redo_asked``, ``save_asked``;
-    ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``; ``repair_asked`` (row, words);
-    ``find_changed``; ``banner_asked`` (action); ``id_typed`` (path, id).
+    ``add_asked``, ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``; ``repair_asked`` (row,
+    words); ``find_changed``; ``banner_asked`` (action); ``id_typed`` (path, id).
     """
 
     entered = Signal()
@@ -50,6 +51,7 @@ class DesignerPlace(Place):
     redo_asked = Signal()
     save_asked = Signal()
     delete_asked = Signal(object, object)
+    add_asked = Signal()
     copy_asked = Signal(object)
     paste_asked = Signal()
     repair_asked = Signal(object, str)
@@ -258,11 +260,15 @@ class DesignerPlace(Place):
         self.save_asked.emit()
 
     def ask_to_add(self) -> None:
-        """Show what can be added."""
+        """Ask what can be added."""
         if self.view.form is not None and not self.view.header.read_only:
             self.flush()
-            button = self.outline.add if self.outline.add.isVisible() else self.header
-            self.adding.open(self.view.addable, button.mapToGlobal(button.rect().topLeft()))
+            self.add_asked.emit()
+
+    def show_addable(self, every: tuple[Addable, ...]) -> None:
+        """Show what can be added."""
+        button = self.outline.add if self.outline.add.isVisible() else self.header
+        self.adding.open(every, button.mapToGlobal(button.rect().topLeft()))
 
     def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
         """Return the element of the form, and those that are selected with it."""

@@ -34,11 +34,14 @@ class Card(Themed, QWidget):
                 row.addWidget(aside)
             self.column.addLayout(row)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the surface, its edge and, in light, a shadow of at most 6 % black."""
         painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         body = QRectF(self.rect()).adjusted(SHADOW, SHADOW - 1, -SHADOW, -SHADOW - 1).adjusted(0.5, 0.5, -0.5, -0.5)
+        if body.adjusted(RADIUS_CARD, RADIUS_CARD, -RADIUS_CARD, -RADIUS_CARD).contains(QRectF(event.rect())):
+            painter.fillRect(event.rect(), QColor(self.theme.surface))
+            return
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if not self.theme.dark:
             painter.setPen(Qt.PenStyle.NoPen)
             for spread, alpha in enumerate(SHADOW_ALPHAS, start=1):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
-from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.file_text import FileText
 from study_app.viewmodels.designer.form_rows import Form
 from study_app.viewmodels.designer.problem_rows import ProblemRow
@@ -78,7 +77,6 @@ class DesignerView:
     file: FileText = NO_FILE
     problems: tuple[ProblemRow, ...] = ()
     banner: Banner | None = None
-    addable: tuple[Addable, ...] = ()
 
 
 def problems_chip(count: int, warnings: int) -> tuple[Tone, str, str]:
