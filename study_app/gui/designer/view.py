@@ -121,6 +121,8 @@ class DesignerPlace(Place):
         outline.delete_asked.connect(self._delete)
         outline.copy_asked.connect(lambda: self.copy_asked.emit(outline.selected))
         outline.paste_asked.connect(self.paste_asked)
+        outline.rename_asked.connect(self._rename)
+        outline.move_asked.connect(self._move_by)
         outline.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
         self.adding.chosen.connect(lambda one: self.asked.emit(one.asks))
         self.parts.path.open_asked.connect(self._select)

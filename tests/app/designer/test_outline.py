@@ -320,3 +320,51 @@ def test_a_drawer_holds_the_outline_in_a_small_window(qtbot: Any, designer: Any)
     QApplication.processEvents()
     assert outline.isVisible()
     assert not parts.path.isVisible()
+
+
+def test_a_standard_questionnaire_is_found_by_typing_and_lists_questions_that_need_texts(
+    qtbot: Any, designer: Any
+) -> None:
+    designer.controller.begin("template:questionnaire-only", "asked")
+    before = designer.text
+    adding = designer.place.adding
+    designer.place.ask_to_add()
+    qtbot.keyClicks(adding.words, "tlx, 6")
+    assert adding.list.count() == 1
+    assert "Hart" in adding.help.text()
+    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
+    assert designer.editing.selected == ("questionnaires", "nasa_tlx")
+    assert designer.editing.opened.study.document["questionnaires"]["nasa_tlx"] == {"instrument": "nasa-tlx"}
+    assert designer.editing.opened.study.faults == ()
+    designer.editing.undo()
+    designer.place.ask_to_add()
+    qtbot.keyClicks(adding.words, "ipq")
+    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
+    items = designer.editing.opened.study.document["questionnaires"]["ipq"]["items"]
+    assert len(items) == 14
+    assert all(item.keys() == {"id"} for item in items)
+    designer.editing.undo()
+    assert designer.text == before
+
+
+def test_what_keys_do_in_the_outline_its_menu_does_too(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    before = sequence(designer)
+    designer.editing.select(("pages", "welcome"))
+    outline = designer.place.outline
+
+    def choose(words: str) -> None:
+        outline._open_menu(QPoint(10, 10))
+        next(action for action in outline.menu.actions() if action.text().startswith(words)).trigger()
+        outline.menu.close()
+
+    choose("Move down")
+    assert sequence(designer) == (before[1], before[0], *before[2:])
+    designer.editing.select(("liquids", "thick"))
+    choose("Copy")
+    choose("Paste")
+    assert "thick_2" in designer.editing.opened.study.document["liquids"]
+    choose("Delete")
+    assert "thick_2" not in designer.editing.opened.study.document["liquids"]
+    choose("Rename")
+    assert designer.place.form.head.id.hasFocus()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, Signal
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, QPoint, Qt, Signal
 from PySide6.QtGui import QStandardItem, QStandardItemModel
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QMenu
 
 from study_app.gui.designer.outline.rows import ROW_ROLE, Index
 from study_app.gui.designer.outline.tree import Tree
@@ -19,8 +19,8 @@ class OutlineCard(Card):
     """Draws outline rows.
 
     Signals: ``chosen`` (path), ``settled`` (an element was clicked), ``find_changed`` (words), ``add_asked``,
-    ``duplicate_asked``, ``delete_asked``, ``copy_asked``, ``paste_asked``, ``dropped`` (entries of a list, and the
-    index of the one that they come before).
+    ``duplicate_asked``, ``delete_asked``, ``copy_asked``, ``paste_asked``, ``rename_asked``, ``move_asked`` (by how
+    many places), ``dropped`` (entries of a list, and the index of the one that they come before).
     """
 
     chosen = Signal(object)
@@ -31,6 +31,8 @@ class OutlineCard(Card):
     settled = Signal()
     copy_asked = Signal()
     paste_asked = Signal()
+    rename_asked = Signal()
+    move_asked = Signal(int)
     dropped = Signal(object, int)
 
     def __init__(self) -> None:
@@ -72,6 +74,9 @@ class OutlineCard(Card):
         self.tree.copy_asked.connect(self.copy_asked)
         self.tree.paste_asked.connect(self.paste_asked)
         self.tree.dropped.connect(self.dropped)
+        self.tree.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.tree.customContextMenuRequested.connect(self._open_menu)
+        self.menu: QMenu | None = None
         self.add.clicked.connect(self.add_asked)
         self.duplicate.clicked.connect(self.duplicate_asked)
 
@@ -146,6 +151,29 @@ class OutlineCard(Card):
             self.tree.selectionModel().setCurrentIndex(found, flags.ClearAndSelect)
             self.tree.scrollTo(found)
         self._filling = False
+
+    def _open_menu(self, at: QPoint) -> None:
+        """Show what can be done with the selected elements, each with its key."""
+        menu = self.menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.setFont(font("label"))
+        writable = self.add.isEnabled()
+        row = self.tree.currentIndex().data(ROW_ROLE) if self.tree.currentIndex().isValid() else None
+        ordered = writable and row is not None and bool(row.step)
+        for words, key, act, possible in (
+            ("Add …", "Ins", self.add_asked.emit, writable),
+            ("Duplicate", "Ctrl+D", self.duplicate_asked.emit, self.duplicate.isEnabled()),
+            ("Copy", "Ctrl+C", self.copy_asked.emit, row is not None and len(row.path) > 1),
+            ("Paste", "Ctrl+V", self.paste_asked.emit, writable),
+            ("Move up", "Alt+Up", lambda: self.move_asked.emit(-1), ordered),
+            ("Move down", "Alt+Down", lambda: self.move_asked.emit(1), ordered),
+            ("Rename", "F2", self.rename_asked.emit, writable and row is not None and len(row.path) > 1),
+            ("Delete", "Del", self.delete_asked.emit, self.duplicate.isEnabled()),
+        ):
+            action = menu.addAction(f"{words}\t{key}")
+            action.setEnabled(possible)
+            action.triggered.connect(lambda _checked=False, act=act: act())
+        menu.popup(self.tree.viewport().mapToGlobal(at))
 
     def _indexes(self) -> list[QModelIndex]:
         found: list[QModelIndex] = []
