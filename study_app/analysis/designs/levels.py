@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
@@ -66,7 +67,11 @@ def levels_found(study: Study, rows: pd.DataFrame | None = None) -> tuple[Levels
     opened = None if opened is None else opened[list(READ)]  # groups of few columns are made in less time
     bounds = {one.where.id: one.bounds for one in study.others.questions}
     return tuple(
-        _block(one, timed[timed["block"] == one.id], opened, study.intervals, bounds.get(one.id)) for one in main
+        replace(
+            _block(one, timed[timed["block"] == one.id], opened, study.intervals, bounds.get(one.id)),
+            device=study.own_dynamics,
+        )
+        for one in main
     )
 
 

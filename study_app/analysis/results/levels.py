@@ -208,6 +208,20 @@ class LevelConduct:
 
 
 @dataclass(frozen=True, slots=True)
+class OwnDynamics:
+    """The device's own damping [N·s/m], friction [N] and mass [kg], as ``devices bench`` measured them.
+
+    Means over axes, and over those ``sessions`` of all ``of`` whose receipts record them.
+    """
+
+    damping_nspm: float
+    friction_n: float
+    mass_kg: float
+    sessions: int
+    of: int
+
+
+@dataclass(frozen=True, slots=True)
 class CatchAnswers:
     """Catch trials of a session: how many of ``n`` were answered incorrectly; a larger share than ``most`` excludes."""
 
@@ -232,7 +246,8 @@ class LevelsFound:
     difference, value), all None where conditions are compared; ``family`` is the psychometric function of the
     thresholds; ``adaptive``: answers chose the levels; ``guess_rate`` is the share at chance, ``bounds`` are the ends
     of a scale; ``withheld`` is known where the force is delayed, with jitter or loss. Where participants set the levels
-    there are ``settings`` in place of answers at levels. Without the key only ``times`` are known.
+    there are ``settings`` in place of answers at levels. ``device`` are the device's own dynamics, None where they were
+    not measured. Without the key only ``times`` are known.
     """
 
     block: str
@@ -261,6 +276,13 @@ class LevelsFound:
     adaptive: bool = False
     published: tuple[PublishedValue, ...] = ()
     settings: tuple[SettingFound, ...] = ()
+    device: OwnDynamics | None = None
+
+    def with_device(self, one: ThresholdFound) -> float | None:
+        """Return a Weber fraction of damping with the device's own in the standard, ΔB/(B + b); None where unknown."""
+        if self.device is None or one.standard is None or (self.vary, self.level_kind) != ("damping_nspm", "weber"):
+            return None
+        return one.threshold * one.standard / (one.standard + self.device.damping_nspm)
 
     @property
     def of_group(self) -> tuple[LevelAnswers, ...]:

@@ -24,7 +24,11 @@ from study_app.store.tables.columns import tables_of
 
 @dataclass(frozen=True)
 class Session:
-    """What was asked, what was answered, and the facts of the visit (``facts``: one row of ``Study.participants``)."""
+    """What was asked, what was answered, and the facts of the visit (``facts``: one row of ``Study.participants``).
+
+    ``own_dynamics`` are the device's own damping [N·s/m], friction [N] and mass [kg], means over axes; None where they
+    were not measured. ``device_velocity`` is whether the device measured its velocity, in place of the estimator.
+    """
 
     folder: SessionFolder
     study: str
@@ -35,6 +39,8 @@ class Session:
     facts: Mapping[str, Any]
     others: AskedQuestions = NOTHING_ELSE
     levels: tuple[LevelBlock, ...] = ()
+    own_dynamics: tuple[float, float, float] | None = None
+    device_velocity: bool = False
 
     @property
     def asked(self) -> tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]:
@@ -80,6 +86,8 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             "key_hash": receipt["key_hash"],
             **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version")},
         }
+        own_dynamics = _own_dynamics(receipt["device"].get("bench"))
+        device_velocity = receipt["device"].get("estimator") == "device"
         alike = like is not None and protocol is like.protocol
         blocks = like.blocks if like is not None and alike else main_blocks(protocol, key)
         others = like.others if like is not None and alike else asked_questions(protocol, key)
@@ -89,7 +97,19 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             f"{folder.receipt} does not describe the session ({type(error).__name__}: {error}): it was changed, or "
             "written by another version of the program; restore it from a copy"
         ) from error
-    return Session(folder, study, title, version, protocol, blocks, facts, others, levels)
+    return Session(
+        folder, study, title, version, protocol, blocks, facts, others, levels, own_dynamics, device_velocity
+    )
+
+
+def _own_dynamics(bench: Mapping[str, Any] | None) -> tuple[float, float, float] | None:
+    """Return damping, friction and mass of a receipt's bench, each the mean over its axes."""
+    if bench is None:
+        return None
+    damping_nspm, friction_n, mass_kg = (
+        float(np.mean([float(value) for value in bench[name]])) for name in ("damping_nspm", "friction_n", "mass_kg")
+    )
+    return damping_nspm, friction_n, mass_kg
 
 
 def _masking(answer: Mapping[str, Any] | None) -> str | None:

@@ -14,8 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import pandas as pd
 
+from study_app.analysis.results.levels import OwnDynamics
 from study_app.analysis.tables import measures
 from study_app.analysis.tables import planned_analysis as decided
 from study_app.analysis.tables.asked_questions import NOTHING_ELSE, AskedQuestion, AskedQuestions
@@ -51,7 +53,9 @@ class Study:
     recorded, and are used as they are. ``decided`` is what the protocol decided about the analysis, ``protocol`` the
     first session's, as its receipt holds it. ``levels`` are the blocks with a design, ``intervals`` the
     intervals of their trials; ``others`` are the questions that no block of statements holds;
-    ``answered`` has the rows of all questions as they were recorded, of which ``responses`` are those of statements.
+    ``answered`` has the rows of all questions as they were recorded, of which ``responses`` are those of statements;
+    ``own_dynamics`` are the device's, where receipts record a measurement; ``estimator`` names that of the velocity,
+    "device" where the device measured it; None where receipts do not say it.
     """
 
     folder: Path
@@ -71,6 +75,8 @@ class Study:
     levels: tuple[LevelBlock, ...] = ()
     intervals: pd.DataFrame = field(default_factory=pd.DataFrame)
     protocol: Mapping[str, Any] = field(default_factory=dict)
+    own_dynamics: OwnDynamics | None = None
+    estimator: str | None = None
 
     @property
     def people(self) -> tuple[str, ...]:
@@ -217,7 +223,26 @@ def load_study(folder: Path) -> Study:
         others=records[0].others,
         decided=decided.read([session.protocol.get("analysis") for session in records]),
         protocol=records[0].protocol,
+        own_dynamics=_own_dynamics(records),
+        estimator=_estimator(records),
     )
+
+
+def _estimator(records: Sequence[Session]) -> str | None:
+    """Return the names of the velocity estimators of all sessions: "kalman", "device" or "kalman or device"."""
+    own = records[0].protocol.get("scene", {}).get("velocity", {}).get("kind")
+    measured = [one.device_velocity for one in records]
+    names = [*([] if all(measured) or own is None else [str(own)]), *(["device"] if any(measured) else [])]
+    return " or ".join(names) or None
+
+
+def _own_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
+    """Return the mean of what sessions know of the device's own dynamics; None where none knows them."""
+    known = [one.own_dynamics for one in records if one.own_dynamics is not None]
+    if not known:
+        return None
+    damping_nspm, friction_n, mass_kg = np.mean(known, axis=0).tolist()
+    return OwnDynamics(damping_nspm, friction_n, mass_kg, len(known), len(records))
 
 
 def _intervals(

@@ -149,16 +149,18 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
     """
     step_s = 1.0 / rate_hz
     prepared = [_prepared(samples, axis, step_s) for samples in stretches]
-    terms = np.concatenate([one.terms for one in prepared])
-    best: tuple[float, float, Floats, float] | None = None
-    for delay_s in np.arange(0.0, MOST_DELAY_S, _STEP_S):
-        force_n = np.concatenate([one.force_n(float(delay_s)) for one in prepared])
-        found, *_ = np.linalg.lstsq(terms, force_n, rcond=None)
-        left = float(((force_n - terms @ found) ** 2).mean())
-        if best is None or left < best[0]:
-            best = left, float(delay_s), found, float(force_n.var())
-    assert best is not None  # noqa: S101 - there is at least one delay
-    left, delay_s, (mass_kg, damping_nspm, friction_n, *_), variance = best
+    orthogonal, triangle = np.linalg.qr(np.concatenate([one.terms for one in prepared]))
+
+    def force_n(delay_s: float) -> Floats:
+        return np.concatenate([one.force_n(delay_s) for one in prepared])
+
+    def residual_n2(delay_s: float) -> float:
+        force = force_n(delay_s)
+        return float(force @ force - np.sum((force @ orthogonal) ** 2)) / len(force)
+
+    delay_s = float(min(np.arange(0.0, MOST_DELAY_S, _STEP_S), key=residual_n2))
+    mass_kg, damping_nspm, friction_n, *_ = np.linalg.solve(triangle, force_n(delay_s) @ orthogonal)
+    left, variance = residual_n2(delay_s), float(force_n(delay_s).var())
     return Motion(
         float(mass_kg),
         float(damping_nspm),

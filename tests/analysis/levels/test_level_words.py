@@ -11,7 +11,8 @@ from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.report.answers.level_methods import level_methods
-from study_app.analysis.results.levels import ExponentFound, LevelAnswers, LevelsFound, ThresholdFound
+from study_app.analysis.report.answers.threshold_section import section
+from study_app.analysis.results.levels import ExponentFound, LevelAnswers, LevelsFound, OwnDynamics, ThresholdFound
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study import load_study
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
@@ -49,6 +50,22 @@ def test_good_thresholds_have_the_limits_of_the_device_alone() -> None:
     good = found(*people())
     assert list(level_limits(good)) == [DEVICE, MOTORS]
     assert list(level_limits(replace(good, level_kind="difference"))) == [MOTORS]
+
+
+def test_measured_dynamics_of_the_device_are_stated_with_the_weber_fraction_of_the_sum() -> None:
+    own = OwnDynamics(2.0, 0.1, 0.25, 3, 4)
+    good = replace(found(*people()), device=own)
+    sentence, motors = level_limits(good)
+    assert motors == MOTORS
+    assert sentence == (
+        "Block: the device's own damping of 2 N·s/m, friction of 0.1 N and mass of 0.25 kg (measured for 3 of 4 "
+        "sessions) add to what the motors delivered; Weber fractions are of the latter. With the device's damping in "
+        "the standard, those of the group are 0.16 in place of 0.2 at 8 N·s/m."
+    )
+    assert "with device damping</th>" in "".join(section(good, {}))
+    assert "with device" not in "".join(section(replace(good, device=None), {}))
+    other = replace(good, vary="delay_ms", device=replace(own, sessions=4))
+    assert next(iter(level_limits(other))).endswith("Weber fractions are of the latter.")
 
 
 def test_findings_state_threshold_interval_n_and_exponent() -> None:

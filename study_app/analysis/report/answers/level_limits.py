@@ -41,11 +41,31 @@ def level_limits(found: LevelsFound) -> Iterator[str]:
             "differences between people are not known."
         )
     if found.level_kind == "weber":
-        yield (
+        yield _of_device(found)
+    yield f"{found.title}: motors are audible and were not masked: participants may have used their sound."
+
+
+def _of_device(found: LevelsFound) -> str:
+    """Return what the device's own dynamics leave open."""
+    own = found.device
+    if own is None:
+        return (
             f"{found.title}: the device's own damping, friction and mass are unknown, since they were not measured; "
             "Weber fractions are of what the motors delivered, and smaller ones of the sum with the device's own."
         )
-    yield f"{found.title}: motors are audible and were not masked: participants may have used their sound."
+    where = "" if own.sessions == own.of else f" (measured for {own.sessions} of {own.of} sessions)"
+    words = (
+        f"{found.title}: the device's own damping of {own.damping_nspm:.2g} N·s/m, friction of {own.friction_n:.2g} N "
+        f"and mass of {own.mass_kg:.2g} kg{where} add to what the motors delivered; Weber fractions are of the latter"
+    )
+    with_device = [
+        f"{share:.3g} in place of {one.threshold:.3g} at {one.standard:g} {found.unit}"
+        for one in found.thresholds
+        if one.participant is None and (share := found.with_device(one)) is not None
+    ]
+    if not with_device:
+        return f"{words}."
+    return f"{words}. With the device's damping in the standard, those of the group are {listed(with_device)}."
 
 
 def _of_settings(found: LevelsFound) -> Iterator[str]:

@@ -52,8 +52,7 @@ def section(where: str, study: Study, results: Results, drawn: Sequence[Picture]
                 yield picture(pictures[name].files["png"], pictures[name].caption)
     for levels in results.levels:
         if levels.block == where:
-            estimator = study.protocol.get("scene", {}).get("velocity", {}).get("kind")
-            yield from level_section.section(levels, drawn, estimator)
+            yield from level_section.section(levels, drawn, study.estimator)
 
 
 def _table(rows: Sequence[tuple[str, Mapping[str, str]]]) -> str:

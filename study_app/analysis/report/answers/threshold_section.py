@@ -55,6 +55,7 @@ def _thresholds(found: LevelsFound) -> str:
     """Return a row per standard and participant, the group first."""
     standards = len({one.standard for one in found.thresholds}) > 1
     percent = _target_percent(found)
+    with_device = any(found.with_device(one) is not None for one in found.thresholds)
     return table(
         (
             *((f"Standard{_unit(found)}",) if standards else ()),
@@ -62,6 +63,7 @@ def _thresholds(found: LevelsFound) -> str:
             "n",
             _threshold_name(found),
             "95 % interval",
+            *(("with device damping",) if with_device else ()),
             f"width [{WIDTHS[found.spacing]}]",
             "flat width prior",
             *((f"mean of reversals ({percent:.1f} %)",) if percent is not None else ()),
@@ -75,6 +77,7 @@ def _thresholds(found: LevelsFound) -> str:
                 "–" if one.participant is None else str(one.n),
                 f"{BEYOND[one.beyond]}{one.threshold:.3g}",
                 "–" if one.low is None or one.high is None else f"{one.low:.3g} – {one.high:.3g}",
+                *((_level(found.with_device(one), 3),) if with_device else ()),
                 "–" if one.width is None else f"{one.width:.2g}",
                 _level(one.flat_width, 3),
                 *((_level(one.reversal_mean, 3),) if percent is not None else ()),
