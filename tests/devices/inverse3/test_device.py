@@ -302,3 +302,15 @@ class TestDoctor:
     def test_only_the_emulated_one_can_have_faults(self) -> None:
         with pytest.raises(DeviceError, match="'inverse3' cannot be given faults: only inverse3-emulated can"):
             examine("inverse3", faults=["nan"], progress=str)
+
+
+def test_a_handle_that_the_hand_lets_go_follows_the_force() -> None:
+    service = Service(tremor_m=0.0)
+    with EmulatedInverse3(service=service) as device:
+        ticks = Ticks(device)
+        service.held = False
+        for _ in range(100):
+            ticks.take((0.5, 0.0, 0.0))
+        assert not service.held
+        assert ticks.reading[0].position_m[0] > 0.005
+        ticks.take()
