@@ -1,0 +1,58 @@
+"""The ball of a preview: it does what the task asks for, within the tank, again and again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from study_app.protocol.trials.task import AnyTask
+from study_app.protocol.trials.tasks.explore import Explore
+from study_app.protocol.trials.tasks.follow import Follow
+from study_app.protocol.trials.tasks.reach import Reach
+from study_app.session.simulated.programmed_ball import ProgrammedBall
+
+TANK_M = (0.12, 0.1, 0.08)
+REACH = Reach(
+    kind="reach",
+    targets_mm=((-30.0, 0.0, 0.0), (30.0, 10.0, 0.0)),
+    radius_mm=5.0,
+    dwell_s=0.3,
+    count=4,
+    instruction="-",
+)
+
+
+def test_the_ball_reaches_every_target_and_begins_anew() -> None:
+    ball = ProgrammedBall(REACH, TANK_M)
+    views = [ball.view(time_s) for time_s in np.arange(0.0, ball.duration_s, 0.02)]
+    assert [view.task.reached for view in views] == sorted(view.task.reached for view in views)
+    assert views[-1].task.reached == 4
+    assert {view.task.lit for view in views} == {0, 1, None}
+    assert max(view.task.dwell for view in views) > 0.9
+    again = ball.view(ball.duration_s + 0.5)
+    assert again.task == ball.view(0.5).task
+    assert again.position_m == pytest.approx(ball.view(0.5).position_m)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        Explore(kind="explore", min_s=5, max_s=20, instruction="-"),
+        Follow(kind="follow", amplitude_mm=30, frequency_hz=0.5, cycles=3),
+        REACH,
+    ],
+)
+def test_the_ball_stays_in_the_tank_and_ends_before_the_task_does(task: AnyTask) -> None:
+    ball = ProgrammedBall(task, TANK_M)
+    assert 1.0 < ball.duration_s < task.limit_s
+    places_m = np.array([ball.view(time_s).position_m for time_s in np.arange(0.0, ball.duration_s, 0.05)])
+    assert (np.abs(places_m) <= np.array(TANK_M) / 2).all()
+    assert np.ptp(places_m[:, 0]) > 0.02
+
+
+def test_a_hidden_ball_is_drawn_during_the_lead_alone() -> None:
+    task = Follow(kind="follow", lead_s=1.0)
+    ball = ProgrammedBall(task, TANK_M, hidden_after_lead=True)
+    assert not ball.view(0.5).ball_hidden
+    assert ball.view(1.5).ball_hidden
+    assert ball.view(0.5).position_m == pytest.approx(task.target_m(0.5), abs=1e-4)
