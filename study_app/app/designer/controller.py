@@ -16,6 +16,7 @@ from study_app.app.designer.element_steps import Step, delete_prompt
 from study_app.app.designer.feeling import Feeling
 from study_app.app.designer.measures.controller import MeasuresController
 from study_app.app.designer.open_study import OpenStudy, open_file, open_new, open_unsaved
+from study_app.app.designer.participant.preview import ParticipantPreview
 from study_app.app.designer.play.playing import Playing
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.app.designer.saving import Saving
@@ -89,6 +90,7 @@ class DesignerController(QObject):
         place.add_asked.connect(self._show_addable)
         place.id_typed.connect(self._judge_id)
         editing.changed.connect(self.show)
+        self.preview = ParticipantPreview(editing, place)
         editing.edited.connect(self._resting.start)
         editing.refused.connect(self._refuse)
         editing.made.connect(self._show_step)

@@ -69,13 +69,13 @@ class RightPane(QWidget):
         column.addWidget(self.facts)
         self.tabs.chosen.connect(lambda name: self.show_tab(str(name)))
 
-    def add_page(self, page: PanePage) -> None:
-        """Add a page as the last tab; the first one is shown."""
-        self.pages.append(page)
+    def add_page(self, page: PanePage, *, first: bool = False) -> None:
+        """Add a page as the last tab, or as the first one, which is then shown."""
+        self.pages.insert(0 if first else len(self.pages), page)
         self._stack.addWidget(page.body)
         if page.aside is not None:
             self._asides.addWidget(page.aside)
-        self.show_tab(self.tab or page.name)
+        self.show_tab(page.name if first else self.tab or page.name)
 
     def show_tab(self, name: str) -> None:
         """Show the page of a tab."""

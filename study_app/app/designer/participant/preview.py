@@ -1,0 +1,302 @@
+"""The participant's page of the study that is edited: which page, in which language, with which answers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any, Final
+
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtGui import QKeySequence, QShortcut
+
+from study_app.app.designer.editing import Editing
+from study_app.app.designer.participant.shown_step import (
+    STANDALONE,
+    Found,
+    StepPosition,
+    same_step,
+    showing,
+    side_of,
+    step_name,
+)
+from study_app.app.designer.participant.sound_part import sound_part
+from study_app.app.workstation import screen_number, settings_here, text_scale_on
+from study_app.authoring.outline import title_of
+from study_app.authoring.study import Study
+from study_app.gui.designer.pane.right_pane import PanePage
+from study_app.gui.designer.participant.participant_tab import ParticipantTab
+from study_app.gui.designer.view import DesignerPlace
+from study_app.gui.display.screens import choose_screens
+from study_app.protocol.forms.show_if import Value
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.source.document import Path
+from study_app.session.pages import DesignPage, TaskPage
+from study_app.session.preview import preview
+from study_app.session.simulated.programmed_ball import ProgrammedBall
+from study_app.session.transitions.events import Chosen, Continue, LanguageChosen, Retracted, Submitted
+from study_app.session.transitions.previewed_pages import Moment, moments, previewed_page, tested_condition
+from study_app.viewmodels.designer.form_rows import value_at
+from study_app.viewmodels.designer.participant_page import (
+    SIZES,
+    ParticipantView,
+    ScreenSize,
+    moment_words,
+    step_words,
+)
+
+NO_ANSWERS: Final[Mapping[str, Value]] = {}
+
+
+class ParticipantPreview(QObject):
+    """Shows the participant's page that the selected element is on, and goes from step to step.
+
+    It is drawn with the seed of `session.preview`; no sealed key is read. Answers are kept while the study is open, so
+    that an edit does not empty the page, and go nowhere else.
+    """
+
+    def __init__(self, editing: Editing, place: DesignerPlace) -> None:
+        super().__init__(editing)
+        self.editing, self.place = editing, place
+        self.tab = ParticipantTab()
+        place.pane.add_page(PanePage("participant", "Participant", self.tab, self.tab.aside), first=True)
+        self._language = ""
+        self._found: Found | None = None
+        self._moment: Moment | None = None
+        self._side = "questions"
+        self._selected: Path = ()
+        self._protocol: Protocol | None = None
+        self._study: Study | None = None
+        self._sound: Mapping[str, Any] = {}
+        self._answers: dict[tuple[str, int], dict[str, Value]] = {}
+        self._ball: ProgrammedBall | None = None
+        self._ball_of: object = None
+        self._since_s = 0.0
+        self._photodiode = True
+        editing.opened_other.connect(self._begin)
+        editing.changed.connect(self._follow)
+        place.entered.connect(self._look_at_screen)
+        tab = self.tab
+        tab.shown.connect(self._follow)
+        tab.language_asked.connect(self.show_language)
+        tab.step_asked.connect(self.go)
+        tab.moment_asked.connect(self.show_moment)
+        tab.happened.connect(self._hear)
+        tab.frame_due.connect(self._move_ball)
+        keys = QShortcut(QKeySequence("Ctrl+Return"), place)
+        keys.activated.connect(self.enter_page)
+        self._look_at_screen()
+
+    @property
+    def position(self) -> StepPosition | None:
+        """Where the preview is; None where it shows nothing, or a page that is not in the first session."""
+        self._update()
+        found = self._found
+        if found is None or found.session:
+            return None
+        step = found.shown.schedule.steps[found.index]
+        trial = step.index if isinstance(step, Trial) else 1
+        return StepPosition(step_name(step), trial, self._language, found.shown.schedule.seed)
+
+    # what is asked for
+
+    def enter_page(self) -> None:
+        """Give the keyboard to the page."""
+        self.place.sides.chosen.emit("pane")
+        self.place.pane.show_tab("participant")
+        self.tab.page.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def show_language(self, language: str) -> None:
+        """Show the pages in another language."""
+        self._language = language
+        self._show()
+
+    def go(self, by: int) -> None:
+        """Show the page of another step, so many steps on."""
+        if (found := self._found) is None:
+            return
+        index = found.index + by
+        if 0 <= index < len(found.shown.schedule.steps):
+            self._found = Found(found.shown, index, found.session)
+            self._moment = None
+            self._show()
+
+    def show_moment(self, moment: Moment) -> None:
+        """Show another page of the step: its tank, or its questions."""
+        self._moment = moment
+        self._side = "tank" if moment.kind == "tank" else "questions"
+        self._show()
+
+    def _hear(self, event: object) -> None:
+        """Keep an answer for this page; go on where the participant would."""
+        if isinstance(event, LanguageChosen):
+            self.show_language(event.language)
+        elif isinstance(event, Chosen):
+            self._answers.setdefault(self._page_key, {})[event.item] = event.value
+            if isinstance(self.tab.view.page, DesignPage):
+                self._go_on()
+        elif isinstance(event, Retracted):
+            self._answers.get(self._page_key, {}).pop(event.item, None)
+        elif isinstance(event, Submitted | Continue):
+            self._go_on()
+
+    def _go_on(self) -> None:
+        """Show the next page of the step, or the next step from its beginning."""
+        if (found := self._found) is None:
+            return
+        pages = moments(found.shown, found.index)
+        at = pages.index(self._moment) if self._moment in pages else 0
+        if at + 1 < len(pages):
+            self.show_moment(pages[at + 1])
+        elif found.index + 1 < len(found.shown.schedule.steps):
+            self._side = "tank"
+            self.go(1)
+
+    # following the study
+
+    def _begin(self) -> None:
+        self._found = self._moment = self._protocol = self._study = None
+        self._selected, self._sound, self._answers, self._language = (), {}, {}, ""
+        self._side = "questions"
+        self._follow()
+
+    def _look_at_screen(self) -> None:
+        """Offer this machine's participant screen; it may have been set elsewhere meanwhile."""
+        settings, _ = settings_here()
+        self._photodiode = settings.photodiode
+        screen = choose_screens(screen_number(settings))[0]
+        size = screen.size()
+        own = ScreenSize("own", f"This machine's, {size.width()} × {size.height()}", size.width(), size.height(),
+                         text_scale_on(settings, screen))  # fmt: skip
+        self.tab.offer_screens((*SIZES, own))
+
+    def _follow(self) -> None:
+        if self.editing.opened is not None and self.tab.isVisible():
+            self._show()
+
+    def _update(self) -> None:
+        """Find the shown step in the study as it is now; another step where another element was selected."""
+        opened = self.editing.opened
+        if opened is None:
+            return
+        study, selected = opened.study, opened.history.selected
+        if study is not self._study:
+            self._study, before = study, self._protocol
+            self._protocol = sound_part(study, self._sound)
+            if study.protocol is not None:
+                self._sound = study.document
+            if self._protocol is not None and before is not None and self._found is not None:
+                self._found = self._again(self._found)
+        if self._protocol is None:
+            self._found = None
+        elif selected != self._selected or self._found is None:
+            found = showing(self._protocol, selected)
+            if found is None and self._found is None:
+                found = _beginning(self._protocol)
+            if found is not None:
+                self._found = found if not self._is_shown(found) else self._found
+            if (side := side_of(selected)) is not None and selected != self._selected:
+                self._side, self._moment = side, None
+            self._selected = selected
+        if self._protocol is not None and self._language not in self._protocol.study.languages:
+            self._language = self._protocol.study.languages[0]
+
+    def _is_shown(self, found: Found) -> bool:
+        """Return whether the shown step is of the same block, so that another element of it keeps the trial."""
+        now = self._found
+        if now is None or now.session != found.session or found.session == STANDALONE:
+            return False
+        one, other = (here.shown.schedule.steps[here.index] for here in (now, found))
+        whole = self._selected[:1] in {("questionnaires",), ("blocks",), ("scales",)}
+        return step_name(one) == step_name(other) and (not isinstance(one, Trial) or whole)
+
+    def _again(self, found: Found) -> Found | None:
+        assert self._protocol is not None  # noqa: S101 - the caller has looked
+        step = found.shown.schedule.steps[found.index]
+        if found.session == STANDALONE:
+            return showing(self._protocol, self._selected)
+        return same_step(self._protocol, step_name(step), step.index if isinstance(step, Trial) else 1, found.session)
+
+    # what is shown
+
+    def _show(self) -> None:
+        self._update()
+        study, found = self._study, self._found
+        if study is None:
+            return
+        if found is None:
+            problem = str(study.problems[0]) if study.problems else "there is no step"
+            self.tab.show_view(ParticipantView(note=f"The page cannot be shown: {problem}"))
+            return
+        shown, index = found.shown, found.index
+        pages = moments(shown, index)
+        if self._moment not in pages:
+            of_side = [moment for moment in pages if (moment.kind == "tank") == (self._side == "tank")]
+            self._moment = (of_side or list(pages))[0]
+        page = previewed_page(shown, index, self._moment, self._language, self._answers.get(self._page_key, NO_ANSWERS))
+        if isinstance(page, TaskPage):
+            self._place_ball(page, tested_condition(shown, index))
+        step = step_words(shown, shown.schedule.steps[index], self._language)
+        if found.session and found.session != STANDALONE:
+            step = f"{step} ({found.session})"
+        self.tab.show_view(
+            ParticipantView(
+                page,
+                self._language,
+                shown.protocol.study.languages,
+                step,
+                index > 0,
+                index + 1 < len(shown.schedule.steps),
+                moment_words(pages),
+                self._moment,
+                self._question(study),
+                self._note(study, found),
+                self._photodiode,
+            )
+        )
+
+    @property
+    def _page_key(self) -> tuple[str, int]:
+        """What answers are kept by: a form, or a trial of a block."""
+        assert self._found is not None  # noqa: S101 - a page is shown
+        step = self._found.shown.schedule.steps[self._found.index]
+        return step_name(step), step.index if isinstance(step, Trial) else 0
+
+    def _question(self, study: Study) -> str | None:
+        """Return the id of the question that is selected."""
+        if "items" not in self._selected:
+            return None
+        item = value_at(study.document, self._selected[: self._selected.index("items") + 2])
+        name = item.get("id") if isinstance(item, Mapping) else None
+        return name if isinstance(name, str) else None
+
+    def _note(self, study: Study, found: Found) -> str:
+        """Return what is not shown as it is written."""
+        if not study.problems:
+            return "This page is in no session." if found.session == STANDALONE else ""
+        title = title_of(study.document, self._selected)
+        own = [fault for fault in study.faults if fault.path[: len(self._selected)] == self._selected]
+        if own and self._protocol is not None:
+            return f"{title} is shown without its faults: {own[0].message}"
+        count = len(study.problems)
+        return f"Shown without the faults elsewhere: {count} problem{'s' * (count > 1)}"
+
+    def _place_ball(self, page: TaskPage, condition: str | None) -> None:
+        """Put the ball at the beginning of its path, where the tank is another one."""
+        assert self._found is not None  # noqa: S101 - a page is shown
+        hides = condition is not None and self._found.shown.protocol.conditions[condition].ball == "hidden"
+        tank = (page.task, page.workspace_m, page.trial, self._moment, hides)
+        if tank != self._ball_of:
+            self._ball_of = tank
+            self._ball = ProgrammedBall(page.task, page.workspace_m, hidden_after_lead=hides)
+            self._since_s = time.monotonic()
+
+    def _move_ball(self) -> None:
+        if self._ball is not None:
+            self.tab.show_tank(self._ball.view(time.monotonic() - self._since_s))
+
+
+def _beginning(study: Protocol) -> Found | None:
+    """Return the first step of the first session."""
+    shown = preview(study)
+    return Found(shown, 0) if shown.schedule.steps else None

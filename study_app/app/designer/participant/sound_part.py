@@ -1,0 +1,109 @@
+"""The part of a faulty study that is sound, so that its pages are shown while something else is being mended."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+from study_app.authoring.study import Study
+from study_app.errors import ProtocolError
+from study_app.protocol.load import examined, read_document
+from study_app.protocol.model import Protocol
+from study_app.protocol.source.document import Path, entries, has
+from study_app.protocol.source.liquid_files import with_liquid_files
+from study_app.protocol.source.problems import Fault
+
+ROUNDS: Final = 12
+"""What is left out may be missing elsewhere: so often faults are looked for again."""
+MISSING: Final = re.compile(r'is missing in "([a-z]{2})"$')
+ONE_LANGUAGE: Final = "is in one language"
+_NOTHING: Final = object()
+
+
+def sound_part(study: Study, before: Mapping[str, Any]) -> Protocol | None:
+    """Return the protocol of a study, of a faulty one that of its sound part; None where too little is sound.
+
+    A text that a language lacks is that of another language. Any other faulty value is the one that ``before`` has, and
+    is left out where that has none, together with what cannot be without it.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    before : mapping
+        The document of the study when it was last sound; empty where it never was.
+    """
+    if study.protocol is not None:
+        return study.protocol
+    try:
+        document, _ = read_document(with_liquid_files(study.text.encode(), study.folder), "")
+    except ProtocolError:
+        document = dict(before)
+    for _ in range(ROUNDS):
+        protocol, faults = examined(document)
+        if protocol is not None:
+            return protocol
+        mended = _mended(document, faults, before)
+        if mended == document:
+            return None
+        document = mended
+    return None
+
+
+def _mended(document: dict[str, Any], faults: Iterable[Fault], before: Mapping[str, Any]) -> dict[str, Any]:
+    languages = [str(code) for _, code in entries(document, "study.languages.*")]
+    left_out: set[Path] = set()
+    found: Any = document
+    for fault in faults:
+        value, sound = _at(found, fault.path), _at(before, fault.path)
+        if fault.message.startswith(ONE_LANGUAGE) and isinstance(value, str):
+            found = _with(found, fault.path, dict.fromkeys(languages, value))
+        elif (lacking := MISSING.match(fault.message)) and isinstance(value, Mapping) and value:
+            found = _with(found, fault.path, {**value, lacking[1]: next(iter(value.values()))})
+        elif sound is not _NOTHING and sound != value:
+            found = _with(found, fault.path, sound)
+        elif value is not _NOTHING:
+            left_out.add(fault.path)
+        else:
+            parent = fault.path[:-1]
+            while len(parent) > 1 and _at(found, parent) is _NOTHING:
+                parent = parent[:-1]
+            left_out.add(parent)
+    for path in sorted((path for path in left_out if path), key=str, reverse=True):
+        found = _without(found, path)
+    return dict(found)
+
+
+def _at(node: Any, path: Path) -> Any:
+    for step in path:
+        if not has(node, step):
+            return _NOTHING
+        node = node[step]
+    return node
+
+
+def _with(node: Any, path: Path, value: Any) -> Any:
+    """Return a document with a value at a path; the same where there is nothing to hold it."""
+    if not path:
+        return value
+    step, rest = path[0], path[1:]
+    if isinstance(node, Mapping):
+        return {**node, step: _with(node.get(step, {}), rest, value)}
+    if isinstance(step, int) and isinstance(node, tuple) and step < len(node):
+        return (*node[:step], _with(node[step], rest, value), *node[step + 1 :])
+    return node
+
+
+def _without(node: Any, path: Path) -> Any:
+    """Return a document without what is at a path."""
+    step, rest = path[0], path[1:]
+    if not has(node, step):
+        return node
+    if isinstance(node, Mapping):
+        if not rest:
+            return {key: value for key, value in node.items() if key != step}
+        return {**node, step: _without(node[step], rest)}
+    assert isinstance(step, int)  # noqa: S101 - of an array
+    inner = () if not rest else (_without(node[step], rest),)
+    return (*node[:step], *inner, *node[step + 1 :])

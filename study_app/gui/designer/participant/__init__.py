@@ -1,0 +1,1 @@
+"""The participant's page in the designer."""

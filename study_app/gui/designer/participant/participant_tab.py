@@ -1,0 +1,134 @@
+"""The tab Participant: the live page, with language, screen, steps and pages."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from study_app.gui.designer.participant.live_page import LivePage
+from study_app.gui.designer.segments import Segments
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.controls import Choice, IconButton
+from study_app.gui.widgets.labels import label
+from study_app.session.trial import TankView
+from study_app.viewmodels.designer.participant_page import ParticipantView, ScreenSize
+
+
+class ParticipantTab(Card):
+    """Draws a `ParticipantView`.
+
+    ``aside`` holds language and screen, for the right of the tabs. Signals: ``language_asked`` (code), ``step_asked``
+    (−1 or 1), ``moment_asked`` (moment); ``happened``, ``frame_due`` and ``shown`` as of `LivePage`.
+    """
+
+    language_asked = Signal(str)
+    step_asked = Signal(int)
+    moment_asked = Signal(object)
+    happened = Signal(object)
+    frame_due = Signal()
+    shown = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=12, gap=10)
+        self.view = ParticipantView()
+        self._screens_shown: tuple[ScreenSize, ...] = ()
+        self.page = LivePage()
+        self.setFocusProxy(self.page)
+        self.note = label("", "small", "warn", wraps=True)
+        self.note.hide()
+        self.languages = Segments("Language of the page")
+        self.screens = Choice()
+        self.screens.setAccessibleName("Screen")
+        self.screens.setFont(font("label"))
+        self.screens.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.screens.setMinimumContentsLength(9)
+        self.aside = QWidget()
+        across = QHBoxLayout(self.aside)
+        across.setContentsMargins(0, 0, 0, 0)
+        across.setSpacing(10)
+        across.addWidget(self.languages)
+        across.addWidget(self.screens)
+        self.before = IconButton("chevron_left", "Previous step", "Previous step", size=36)
+        self.after = IconButton("chevron", "Next step", "Next step", size=36)
+        self.step = label("", "label", wraps=True)
+        self.step.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.moments = Segments("Page of the trial")
+        self.zoom = Segments("Size of the page")
+        self.zoom.show_values(((True, "Fit"), (False, "100 %")), chosen=True)
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        row.addWidget(self.before)
+        row.addWidget(self.step, 1)
+        row.addWidget(self.after)
+        row.addWidget(self.moments)
+        row.addStretch(0)
+        row.addWidget(self.zoom)
+        self.column.addWidget(self.note)
+        self.column.addWidget(self.page, 1)
+        self.column.addLayout(row)
+        self.column.addStretch(0)
+        self._connect()
+
+    def _connect(self) -> None:
+        page = self.page
+        page.happened.connect(self.happened)
+        page.frame_due.connect(self.frame_due)
+        page.shown.connect(self.shown)
+        page.left.connect(lambda: self.before.setFocus(Qt.FocusReason.OtherFocusReason))
+        self.languages.chosen.connect(lambda code: self.language_asked.emit(str(code)))
+        self.screens.activated.connect(self._choose_screen)
+        self.before.clicked.connect(lambda: self.step_asked.emit(-1))
+        self.after.clicked.connect(lambda: self.step_asked.emit(1))
+        self.moments.chosen.connect(self.moment_asked)
+        self.zoom.chosen.connect(self._show_fitted)
+
+    def show_view(self, view: ParticipantView) -> None:
+        """Show another page."""
+        self.view = view
+        self.setAccessibleName(view.name)
+        self.languages.setVisible(len(view.languages) > 1)
+        self.languages.show_values([(code, code.upper()) for code in view.languages], view.language)
+        self.note.setText(view.note)
+        self.note.setVisible(bool(view.note))
+        self.step.setText(view.step)
+        self.before.setEnabled(view.has_before)
+        self.after.setEnabled(view.has_after)
+        self.moments.setVisible(bool(view.moments))
+        self.moments.show_values(view.moments, view.moment)
+        self.page.show_view(view)
+
+    def show_tank(self, view: TankView) -> None:
+        """Draw the ball in the tank."""
+        self.page.show_tank(view)
+
+    def offer_screens(self, sizes: tuple[ScreenSize, ...]) -> None:
+        """Offer screens to show the page for."""
+        if sizes == self._screens_shown:
+            return
+        chosen = self.screens.currentData()
+        self._screens_shown = sizes
+        self.screens.clear()
+        for size in sizes:
+            self.screens.addItem(size.words, size.name)
+        self.screens.setCurrentIndex(max(self.screens.findData(chosen), 0))
+        self._choose_screen(self.screens.currentIndex())
+
+    def _choose_screen(self, at: int) -> None:
+        self.page.show_screen(self._screens_shown[at])
+        self._make_room()
+
+    def _show_fitted(self, fits: object) -> None:
+        self.zoom.show_values(((True, "Fit"), (False, "100 %")), fits)
+        self.page.show_fitted(fits=bool(fits))
+        self._make_room()
+
+    def _make_room(self) -> None:
+        margins = self.column.contentsMargins()
+        self.page.make_room(self.width() - margins.left() - margins.right())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Give the page the height that it needs."""
+        super().resizeEvent(event)
+        self._make_room()

@@ -1,0 +1,199 @@
+"""The tab Participant: which page it shows, and how keys, mouse and edits reach it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QImage
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.protocol.wording.languages import words
+from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
+from study_app.viewmodels.designer.requests import RetypeFile, SetText, SetValue
+
+ITEM = ("questionnaires", "liquid", "items", 1)
+
+
+@pytest.fixture
+def live(designer: Any) -> Any:
+    """The live page of the open study, with the question "Like honey" selected."""
+    designer.controller.open("kitchen")
+    designer.editing.select(ITEM)
+    QApplication.processEvents()
+    return designer.controller.preview.tab.page
+
+
+def answers(live: Any) -> dict[str, Any]:
+    """Return what is answered on the page."""
+    return {field.view.id: field.value for field in live.page_window.widget.fields if field.is_answered}
+
+
+def focused(live: Any) -> str:
+    """Return the question that has the page's focus."""
+    here = live.page_window.focusWidget()
+    return next(one.view.id for one in live.page_window.widget.fields if one is here or one.isAncestorOf(here))
+
+
+def place_of(live: Any, part: Any) -> QPoint:
+    """Return where the middle of a part of the page is in the view."""
+    middle = part.mapTo(live.page_window, part.rect().center())
+    return live.mapFromScene(QPointF(middle))
+
+
+def test_the_page_is_that_of_the_selected_element(designer: Any, live: Any) -> None:
+    preview, tab = designer.controller.preview, designer.controller.preview.tab
+    assert isinstance(tab.view.page, QuestionnairePage)
+    assert focused(live) == "like_honey"
+    assert tab.view.step == "Liquids, trial 1 of 2"
+    assert tab.accessibleName() == "Participant's page, English"
+    for path, kind, step in (
+        (("pages", "thanks"), TextPage, "That was it"),
+        (("blocks", "delays"), QuestionnairePage, "Delays, trial 1 of 2"),
+        (("tasks", "explore"), TaskPage, "Liquids, trial 1 of 2"),
+    ):
+        designer.editing.select(path)
+        assert isinstance(live.page_window.page, kind)
+        assert tab.view.step == step
+    for liquid in ("thin", "thick"):
+        designer.editing.select(("liquids", liquid))
+        assert isinstance(live.page_window.page, TaskPage)
+        found = preview._found
+        trial = found.shown.schedule.steps[found.index]
+        condition = found.shown.codes[trial.block][trial.code]
+        assert liquid in found.shown.protocol.conditions[condition].liquid_ids
+    tab.step_asked.emit(1)
+    assert preview.position[:2] != ("", 0)
+    tab.moment_asked.emit(tab.view.moments[1][0])
+    assert isinstance(live.page_window.page, QuestionnairePage)
+
+
+def test_keys_answer_the_page_and_go_on_and_esc_leaves_it(qtbot: Any, designer: Any, live: Any) -> None:
+    designer.place.outline.tree.setFocus()
+    QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert live.hasFocus()
+    before = designer.text
+    first = live.page_window.widget.fields[0].view.id
+    QTest.keyClick(live, Qt.Key.Key_Up)
+    QTest.keyClick(live, Qt.Key.Key_6)
+    assert answers(live) == {first: 6}
+    QTest.keyClick(live, Qt.Key.Key_Escape)
+    assert not live.hasFocus()
+    QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    QTest.keyClick(live, Qt.Key.Key_3)
+    QTest.keyClick(live, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: designer.controller.preview.tab.view.step == "Liquids, trial 2 of 2")
+    assert isinstance(live.page_window.page, TaskPage)
+    assert designer.text == before
+    assert not designer.results.exists()
+
+
+def test_the_mouse_answers_the_scaled_page(designer: Any, live: Any) -> None:
+    assert live.scale_now < 0.6
+    field = live.page_window.widget.fields[1]
+    cell = field.points[4] if hasattr(field, "points") else field.cells[4]
+    QTest.mouseClick(live.viewport(), Qt.MouseButton.LeftButton, pos=place_of(live, cell))
+    assert answers(live) == {field.view.id: 5}
+    button = live.page_window.widget.button
+    QTest.mouseClick(live.viewport(), Qt.MouseButton.LeftButton, pos=place_of(live, button))
+    assert live.page_window.widget.message
+
+
+def test_an_edit_repaints_the_page_and_keeps_answers_and_focus_where_they_were(designer: Any, live: Any) -> None:
+    live.setFocus()
+    QTest.keyClick(live, Qt.Key.Key_2)
+    line = designer.place.form
+    line.setFocus()
+    typing = QApplication.focusWidget()
+    designer.editing.ask(SetText((*ITEM, "text"), "en", "This is like honey."))
+    shown = next(one for one in live.page_window.widget.fields if one.view.id == "like_honey")
+    assert shown.statement.text() == "This is like honey."
+    assert answers(live) == {"like_honey": 2}
+    assert QApplication.focusWidget() is typing
+
+
+def test_faults_elsewhere_do_not_blank_the_page(designer: Any, live: Any) -> None:
+    tab = designer.controller.preview.tab
+    designer.editing.ask(SetValue(("device", "force_limit_n"), -1.0))
+    designer.editing.ask(SetText((*ITEM, "text"), "en", "Like honey?"))
+    assert "1 problem" in tab.view.note
+    assert any(item.text == "Like honey?" for item in live.page_window.page.items)
+    designer.editing.ask(RetypeFile(designer.text.replace('task = "explore"', 'task = "nothing"')))
+    assert isinstance(live.page_window.page, QuestionnairePage)
+    designer.editing.ask(RetypeFile(designer.text.replace("[study]", "[study")))
+    assert isinstance(live.page_window.page, QuestionnairePage)
+    assert tab.note.isVisible()
+
+
+def test_a_study_that_was_never_sound_shows_what_is_sound(designer: Any) -> None:
+    designer.file.write_text(
+        designer.file.read_text().replace('task = "reach"', 'task = "nothing"').replace("dwell_s", "dwel_s")
+    )
+    designer.controller.open("kitchen")
+    designer.editing.select(ITEM)
+    live = designer.controller.preview.tab.page
+    assert [item.id for item in live.page_window.page.items].count("like_honey") == 1
+
+
+def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live: Any) -> None:
+    frames: list[None] = []
+    live.frame_due.connect(lambda: frames.append(None))
+    designer.editing.select(("liquids", "thick"))
+    qtbot.waitUntil(lambda: len(frames) > 2)
+    places = {tuple(live.page_window.tank.view.position_m)}
+    qtbot.waitUntil(lambda: tuple(live.page_window.tank.view.position_m) not in places)
+    designer.place.pane.show_tab("file")
+    QApplication.processEvents()
+    frames.clear()
+    qtbot.wait(120)
+    assert not frames
+    assert not live.page_window.isVisible()
+    designer.editing.select(("pages", "thanks"))
+    designer.place.pane.show_tab("participant")
+    assert isinstance(live.page_window.page, TextPage)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("screen", [0, 1])
+@pytest.mark.parametrize("path", [ITEM, ("pages", "welcome"), ("questionnaires", "delay"), ("liquids", "thick")])
+def test_at_100_percent_the_page_is_that_of_a_session_pixel_by_pixel(
+    qtbot: Any, designer: Any, live: Any, path: Any, screen: int
+) -> None:
+    tab = designer.controller.preview.tab
+    designer.editing.select(("blocks", "liquids") if path == ITEM else path)
+    tab.screens.setCurrentIndex(screen)
+    tab.screens.activated.emit(screen)
+    tab.zoom.chosen.emit(False)
+    live._frames.stop()
+    size = live.page_size
+    live.setFixedSize(size)
+    QApplication.processEvents()
+    session = ParticipantWindow(words("en"), clock=lambda: 0.0, windowed=True)
+    session.resize(size)
+    session.show()
+    session.show_page(tab.view.page)
+    session.activateWindow()
+    qtbot.waitUntil(session.isActiveWindow)
+    if session.tank is not None:
+        view = designer.controller.preview._ball.view(1.0)
+        session.show_view(view)
+        live.show_tank(view)
+    QApplication.processEvents()
+    shown, held = (image(part) for part in (live.viewport(), session))
+    session.may_close = True
+    session.close()
+    session.deleteLater()
+    assert shown.shape == held.shape == (size.height(), size.width(), 3)
+    assert held.std() > 5
+    assert (shown != held).sum() == 0
+
+
+def image(part: Any) -> Any:
+    """Return the pixels of a widget."""
+    grabbed = part.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+    rows = np.frombuffer(grabbed.constBits(), np.uint8).reshape(grabbed.height(), grabbed.bytesPerLine() // 4, 4)
+    return rows[:, : grabbed.width(), :3].astype(int)
