@@ -236,7 +236,7 @@ class ParticipantPreview(QObject):
         page = previewed_page(shown, index, self._moment, self._language, self._answers.get(self._page_key, NO_ANSWERS))
         if isinstance(page, TaskPage):
             self._place_ball(page, tested_condition(shown, index))
-        step = step_words(shown, shown.schedule.steps[index], self._language)
+        step = step_words(shown, shown.schedule.steps[index], shown.protocol.study.languages[0])
         if found.session and found.session != STANDALONE:
             step = f"{step} ({found.session})"
         self.tab.show_view(
@@ -277,9 +277,9 @@ class ParticipantPreview(QObject):
         title = title_of(study.document, self._selected)
         own = [fault for fault in study.faults if fault.path[: len(self._selected)] == self._selected]
         if own and self._protocol is not None:
-            return f"{title} is shown without its faults: {own[0].message}"
+            return f"{title} has a problem ({own[0].message}): the last sound value is shown."
         count = len(study.problems)
-        return f"Shown without the faults elsewhere: {count} problem{'s' * (count > 1)}"
+        return f"{count} problem{'s' * (count > 1)} elsewhere: the last sound values are shown."
 
     def _place_ball(self, page: TaskPage, condition: str | None) -> None:
         """Put the ball at the beginning of its path, where the tank is another one."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
@@ -14,6 +16,8 @@ from study_app.gui.widgets.controls import Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.session.trial import TankView
 from study_app.viewmodels.designer.participant_page import ParticipantView, ScreenSize
+
+MOST_IN_ROW: Final = 2
 
 
 class ParticipantTab(Card):
@@ -57,17 +61,18 @@ class ParticipantTab(Card):
         self.moments = Segments("Page of the trial")
         self.zoom = Segments("Size of the page")
         self.zoom.show_values(((True, "Fit"), (False, "100 %")), chosen=True)
-        row = QHBoxLayout()
+        self._row, self._second = row, second = (QHBoxLayout(), QHBoxLayout())
         row.setSpacing(8)
+        second.addStretch()
         row.addWidget(self.before)
         row.addWidget(self.step, 1)
         row.addWidget(self.after)
         row.addWidget(self.moments)
-        row.addStretch(0)
         row.addWidget(self.zoom)
         self.column.addWidget(self.note)
         self.column.addWidget(self.page, 1)
         self.column.addLayout(row)
+        self.column.addLayout(second)
         self.column.addStretch(0)
         self._connect()
 
@@ -97,6 +102,10 @@ class ParticipantTab(Card):
         self.after.setEnabled(view.has_after)
         self.moments.setVisible(bool(view.moments))
         self.moments.show_values(view.moments, view.moment)
+        if len(view.moments) > MOST_IN_ROW:
+            self._second.insertWidget(0, self.moments)
+        else:
+            self._row.insertWidget(3, self.moments)
         self.page.show_view(view)
 
     def show_tank(self, view: TankView) -> None:
