@@ -84,6 +84,7 @@ class DesignerController(QObject):
         place.study_asked.connect(self.open)
         place.new_asked.connect(self.ask_for_new)
         place.begin_asked.connect(self.begin)
+        place.new_page.copy_asked.connect(self.ask_for_new)
         place.delete_asked.connect(self.ask_to_delete)
         place.repair_asked.connect(self.repair)
         place.find_changed.connect(self.find)

@@ -30,7 +30,7 @@ class _Segment(Themed, QAbstractButton):
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the room for the words."""
-        return QSize(round(QFontMetricsF(font("label", weight=600)).horizontalAdvance(self.text())) + 24, self._height)
+        return QSize(round(QFontMetricsF(font("label", weight=600)).horizontalAdvance(self.text())) + 18, self._height)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the same room."""

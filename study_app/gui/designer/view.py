@@ -238,8 +238,6 @@ class DesignerPlace(Place):
             closing, self.prompt = self.prompt, None
             take_away(closing)
 
-    # what is asked for
-
     def flush(self) -> None:
         """Hand on what is being typed."""
         self.form.flush()
@@ -329,8 +327,6 @@ class DesignerPlace(Place):
     def _rename(self) -> None:
         if self.form.head.id.isVisible() and not self.view.header.read_only:
             self.form.head.edit_id()
-
-    # parts of the place
 
     def _focus_form(self) -> None:
         self.parts.show_side("form")

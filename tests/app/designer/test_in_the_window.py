@@ -168,7 +168,9 @@ def test_esc_restores_what_was_accepted_last(qtbot: Any, designer: Any) -> None:
 
 
 @pytest.mark.usefixtures("editors")
-def test_every_form_fits_its_width(designer: Any) -> None:
+@pytest.mark.parametrize("width", [1600, 1366])
+def test_every_form_fits_its_width(designer: Any, width: int) -> None:
+    designer.window.resize(width, 768)
     designer.controller.open("kitchen")
     area = designer.place.form.area
     for row in designer.place.outline.rows:

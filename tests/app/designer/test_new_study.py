@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLineEdit
+from PySide6.QtWidgets import QFileDialog, QLineEdit
 
 from study_app.authoring.templates import templates
 from study_app.gui.theme.theme import DARK, LIGHT
@@ -86,3 +86,18 @@ def test_the_page_fits_its_window(qtbot: Any, designer: Any, size: tuple[int, in
         inner = page.card.area.widget()
         assert inner.minimumSizeHint().width() <= page.card.area.viewport().width(), one.choice.source
     assert (designer.window.width(), designer.window.height()) == size
+
+
+def test_a_study_begins_as_a_copy_of_a_file(designer: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_words: (str(designer.file), ""))
+    page.file.click()
+    chosen = next(one for one in page.buttons if one.isChecked())
+    assert chosen.choice.source == str(designer.file)
+    assert chosen.choice.note == "kitchen.toml"
+    page.name.setText("mine")
+    page.make.click()
+    document = designer.editing.opened.study.document
+    assert (document["study"]["name"], document["study"]["version"]) == ("mine", "0.1")
+    assert designer.text.count("#") == designer.file.read_text().count("#")

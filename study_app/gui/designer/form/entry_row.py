@@ -11,7 +11,7 @@ from study_app.gui.designer.outline.rows import paint_grip
 from study_app.gui.theme.theme import RADIUS_CONTROL
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.controls import IconButton
-from study_app.gui.widgets.labels import Elided, label
+from study_app.gui.widgets.labels import Elided
 from study_app.viewmodels.designer.form_rows import Entry
 
 
@@ -42,7 +42,10 @@ class EntryRow(Themed, QWidget):
         self.row.setSpacing(2)
         self.row.addWidget(self.title, 1)
         if entry.note and entry.note.replace("_", " ") != entry.title.lower():
-            self.row.addWidget(label(entry.note, "small", "text2"))
+            note = Elided("small", "text2")
+            note.show_text(entry.note)
+            note.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self.row.addWidget(note, 1)
         self.setMinimumHeight(FIELD_PX + 2)
         self.setAccessibleName(words)
 

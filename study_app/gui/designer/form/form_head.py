@@ -16,7 +16,7 @@ from study_app.viewmodels.designer.form_rows import Form
 from study_app.viewmodels.designer.requests import DuplicateElement, MoveElement, RenameElement, SetValue
 
 TILE = 40
-LABEL_PX = 124
+LABEL_PX = 116
 
 
 class Tile(Themed, QWidget):

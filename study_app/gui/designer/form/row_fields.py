@@ -76,7 +76,7 @@ class LineField(Field):
         super().__init__(row)
         self.line = TypedLine(row.row.label)
         if row.row.kind in {"number", "whole number"}:
-            self.line.setFixedWidth(NUMBER_PX + (60 if self.placeholder() else 0))
+            self.line.setFixedWidth(NUMBER_PX + (48 if self.placeholder() else 0))
             self.line.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.box.addWidget(self.line)
         if row.row.unit:

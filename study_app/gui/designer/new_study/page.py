@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
+    QFileDialog,
     QGridLayout,
     QHBoxLayout,
     QLabel,
@@ -142,9 +143,10 @@ def _step(icon: str, title: str, time: str) -> QHBoxLayout:
 
 
 class NewStudyPage(Themed, QWidget):
-    """Signals: ``begin_asked`` (source, name, answers), ``given_up``."""
+    """Signals: ``begin_asked`` (source, name, answers), ``copy_asked`` (a file to copy), ``given_up``."""
 
     begin_asked = Signal(str, str, object)
+    copy_asked = Signal(str)
     given_up = Signal()
 
     def __init__(self) -> None:
@@ -162,6 +164,9 @@ class NewStudyPage(Themed, QWidget):
         aside = Elided("label", "text2")
         aside.show_text("Choose what you want to find out. Everything can be changed afterwards.")
         head.addWidget(aside, 1)
+        self.file = ActionButton("file", "From a file …")
+        self.file.clicked.connect(self._open_file)
+        head.addWidget(self.file)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -234,6 +239,11 @@ class NewStudyPage(Themed, QWidget):
     def refuse(self, sentence: str) -> None:
         """Say why a study cannot begin so."""
         self.card.refuse(sentence)
+
+    def _open_file(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileName(self, "Copy a study", "", "Protocols (*.toml)")
+        if chosen:
+            self.copy_asked.emit(chosen)
 
     def _show_choice(self) -> None:
         chosen = self._chosen()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout
 
 from study_app.gui.designer.form.row_fields import ChoiceField
 from study_app.gui.designer.form.special_editor import SpecialEditor
@@ -12,7 +14,7 @@ from study_app.gui.widgets.cards import Chip
 from study_app.viewmodels.designer.form_rows import FormRow
 from study_app.viewmodels.designer.special.order import OrderBalance
 
-LETTERS = 8
+LETTERS, NARROWEST = 8, 124
 
 
 class OrderField(ChoiceField):
@@ -23,7 +25,7 @@ class OrderField(ChoiceField):
         super().__init__(row)
         if self.list is not None:
             self.list.setMinimumContentsLength(LETTERS)
-        self.box.addWidget(self.chip, 0, Qt.AlignmentFlag.AlignVCenter)
+        self.box.addWidget(self.chip, 0, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
         self.show_value()
 
     def show_value(self) -> None:
@@ -35,6 +37,17 @@ class OrderField(ChoiceField):
             self.chip.show_state(found.tone, found.icon, found.words)
             self.chip.setToolTip(found.sentence)
             self.chip.setAccessibleDescription(found.sentence)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for the wider of the two."""
+        return QSize(max(NARROWEST, self.chip.sizeHint().width()), super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Put the chip below the choice where there is no room beside it."""
+        super().resizeEvent(event)
+        beside = self.width() >= NARROWEST + self.chip.sizeHint().width() + 8
+        directions = QBoxLayout.Direction
+        self.box.setDirection(directions.LeftToRight if beside else directions.TopToBottom)
 
 
 EDITOR: Final = SpecialEditor((("Block", "order"),), OrderField)
