@@ -68,10 +68,17 @@ def test_a_fault_is_at_its_row(study: Study) -> None:
 
 
 def test_optional_keys_are_offered_not_shown(study: Study) -> None:
-    section = form(study, ("blocks", "liquids")).sections[0]
-    absent = {row.path[-1] for row in section.absent}
+    made = form(study, ("blocks", "liquids"))
+    absent = {row.path[-1] for section in made.sections for row in section.absent}
     assert {"max_repeats", "break_every", "until"} <= absent
-    assert not absent & {row.row.path[-1] for row in section.rows}
+    assert not absent & {row.row.path[-1] for row in made.rows}
+
+
+def test_the_sections_of_a_model_head_its_form(study: Study) -> None:
+    sections = {section.title: section for section in form(study, ("blocks", "liquids")).sections}
+    assert list(sections) == ["Words", "What is presented", "In each trial", "Part and blinding", "Breaks"]
+    assert [row.row.path[-1] for row in sections["Words"].rows] == ["title", "setting_label"]
+    assert [row.path[-1] for row in sections["Breaks"].absent] == ["break_every", "break_page"]
 
 
 def test_texts_have_every_language_and_references_their_target(study: Study) -> None:
