@@ -41,4 +41,4 @@ def test_the_receipt_keeps_which_it_was(blinding: str) -> None:
 def test_editors_are_told_both_and_the_default() -> None:
     node = schema()["$defs"]["StudyHead"]["properties"]["blinding"]
     assert (node["enum"], node["default"]) == (["double", "single"], "double")
-    assert "participant alone" in node["description"]
+    assert "the participant does not know" in node["description"]
