@@ -10,9 +10,9 @@ from typing import Any
 from study_app.app.designer.open_study import OpenStudy, unsaved_studies
 from study_app.authoring.names import Document
 from study_app.authoring.new_study import template
-from study_app.authoring.study import read
 from study_app.authoring.templates import templates
 from study_app.errors import StudyError
+from study_app.protocol.load import read_document
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import has
 from study_app.protocol.source.files import find, shipped, shipped_file
@@ -78,7 +78,8 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
     for name in copied:
         file = shipped_file(name) if name in shipped() else find(name)
         note = "ships with the program" if name in shipped() else str(file.name)
-        choices.append(copy_choice(name, read(file.read_bytes(), file.parent), note))
+        document, _places = read_document(file.read_bytes(), name)
+        choices.append(copy_choice(name, document, note))
     return tuple(choices)
 
 

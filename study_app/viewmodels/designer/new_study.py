@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
-from study_app.authoring.facts import facts
 from study_app.authoring.fields import row_at, unit_of
 from study_app.authoring.known_answers import KnownAnswer, known_answers
+from study_app.authoring.names import Document
 from study_app.authoring.new_study import Answers
-from study_app.authoring.outline import outline, title_of
+from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.authoring.templates import QUESTIONS
+from study_app.protocol.describe import expected_duration_s, step_duration_s
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.document import Path
+from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.outline_rows import icon_of
 from study_app.viewmodels.number_words import minutes
@@ -44,6 +46,10 @@ TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     "empty": ("Empty study", "One liquid, one block, a welcome and thanks: it runs as it is."),
 }
 """Title and question of each template, in the order in which they are shown."""
+
+
+STEPS: Final = ("pages", "blocks", "questionnaires")
+"""Sections whose tables are steps of a session."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,43 +136,49 @@ def languages_offered() -> tuple[tuple[str, str], ...]:
 
 def template_choice(name: str, study: Study) -> TemplateChoice:
     """Return what is shown of a template."""
-    made = _choice(f"template:{name}", study)
-    answer = known_answers().get(name)
-    return TemplateChoice(
-        made.source, *TEMPLATES.get(name, (name, made.description)), figures=made.figures, tags=made.tags,
-        session=made.session, recovery=None if answer is None else _recovery(answer), study_title=made.study_title,
-        languages=made.languages, questions=tuple(_questions(name, study)),
+    title, words = _described(study.document)
+    shown, question = TEMPLATES.get(name, (name, words))
+    answer, protocol = known_answers().get(name), study.protocol
+    found = TemplateChoice(
+        f"template:{name}", shown, question, recovery=None if answer is None else _recovery(answer),
+        study_title=title, languages=_languages(study.document), questions=tuple(_questions(name, study)),
     )  # fmt: skip
+    if protocol is None:
+        return found
+    language, document = protocol.study.languages[0], study.document
+    session = (
+        (
+            icon_of((section, step)),
+            title_of(document, (section, step)),
+            minutes(step_duration_s(protocol, step, language)),
+        )
+        for step in protocol.steps
+        for section in STEPS
+        if step in names(document, section)
+    )
+    return replace(found, figures=tuple(_figures(protocol)), tags=_tags(protocol), session=tuple(session))
 
 
-def copy_choice(source: str, study: Study, note: str) -> TemplateChoice:
+def copy_choice(source: str, document: Document, note: str) -> TemplateChoice:
     """Return what is shown of a study that can be copied."""
-    made = _choice(source, study)
-    return TemplateChoice(
-        source, made.study_title, made.description, copy=True, note=note, figures=made.figures, tags=made.tags,
-        session=made.session, study_title=made.study_title, languages=made.languages,
-    )  # fmt: skip
+    title, words = _described(document)
+    return TemplateChoice(source, title, words, copy=True, note=note, study_title=title, languages=_languages(document))
 
 
-def _choice(source: str, study: Study) -> TemplateChoice:
-    document, known, protocol = study.document, facts(study), study.protocol
+def _described(document: Document) -> tuple[str, str]:
+    """Return title and description of a study."""
     head = document.get("study", {})
     description = head.get("description", "") if isinstance(head, Mapping) else ""
-    title = title_of({**document, "one": {"it": head}}, ("one", "it"))
-    steps = (element for element in outline(study).session if element.depth == 0 and element.id in known.steps_s)
-    session = tuple((icon_of(step.path), step.title, minutes(known.steps_s[step.id])) for step in steps)
-    words = " ".join(str(description).split())
-    if protocol is None:
-        return TemplateChoice(source, title, words, study_title=title)
-    return TemplateChoice(
-        source, title, words, figures=tuple(_figures(protocol, known.expected_s or 0.0, known.trials or 0)),
-        tags=_tags(protocol), session=session, study_title=title,
-        languages=tuple(protocol.study.languages),
-    )  # fmt: skip
+    return title_of({**document, "one": {"it": head}}, ("one", "it")), " ".join(str(description).split())
 
 
-def _figures(protocol: Protocol, expected_s: float, trials: int) -> Iterator[tuple[str, str]]:
-    yield "clock", f"{max(1, round(expected_s / 60))} min"
+def _languages(document: Document) -> tuple[str, ...]:
+    return tuple(str(code) for _, code in entries(document, "study.languages.*")) or ("en",)
+
+
+def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:
+    trials = sum(block.trials for block in orders_of(protocol).blocks)
+    yield "clock", f"{max(1, round(expected_duration_s(protocol) / 60))} min"
     people = None if protocol.analysis is None else protocol.analysis.participants
     if people is not None:
         yield "people", str(people)

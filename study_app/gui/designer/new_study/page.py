@@ -89,10 +89,12 @@ class ChosenCard(Card):
         column.addLayout(tags)
         column.addWidget(Rule())
         column = _column(self.details)
-        column.addWidget(label("The session", "strong"))
+        if choice.session:
+            column.addWidget(label("The session", "strong"))
         for icon, title, time in choice.session:
             column.addLayout(_step(icon, title, time))
-        column.addWidget(Rule())
+        if choice.session:
+            column.addWidget(Rule())
         if choice.recovery is not None:
             head = QHBoxLayout()
             head.addWidget(label("Known answer", "strong"))
