@@ -31,7 +31,7 @@ class PathBar(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.setAccessibleName("Path of the element")
-        self.outline = ActionButton("layers", "Outline", height=40)
+        self.outline = ActionButton("layers", "Outline", cap="Ctrl 1", height=40)
         self.outline.setProperty("dense", "true")
         self.outline.setAccessibleName("Outline (Ctrl+1)")
         self.outline.setToolTip("Outline (Ctrl+1)")

@@ -35,11 +35,14 @@ class PressedByEnter(QPushButton):
 
 
 class ActionButton(Themed, PressedByEnter):
-    """A button with an icon before its words and, where a key does the same, the key's cap behind them."""
+    """A button with an icon before its words and, where a key does the same, the key's cap behind them.
 
-    def __init__(self, icon: str, text: str, *, key: str = "", role: str = "", height: int = 44) -> None:
+    ``key`` presses the button anywhere in its window; ``cap`` is drawn alone, for a key that others listen to.
+    """
+
+    def __init__(self, icon: str, text: str, *, key: str = "", cap: str = "", role: str = "", height: int = 44) -> None:
         super().__init__(text)
-        self._icon, self._key, self._role = icon, key, role
+        self._icon, self._key, self._cap, self._role = icon, key, cap or key, role
         self.setProperty("role", role)
         self.setFont(font("strong", scale=0.96))
         self._key_font: QFont = font("key")
@@ -69,7 +72,10 @@ class ActionButton(Themed, PressedByEnter):
 
     def _content_width(self) -> float:
         width = QFontMetricsF(self.font()).horizontalAdvance(self.text())
-        return width + (28 if self._icon else 0) + (32 if self._key else 0)
+        return width + (28 if self._icon else 0) + (12 + self._cap_width() if self._cap else 0)
+
+    def _cap_width(self) -> float:
+        return max(20.0, QFontMetricsF(self._key_font).horizontalAdvance(self._cap) + 10)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the style sheet's button, then its content in the middle."""
@@ -89,8 +95,8 @@ class ActionButton(Themed, PressedByEnter):
         painter.setFont(self.font())
         text_width = QFontMetricsF(self.font()).horizontalAdvance(self.text())
         painter.drawText(QRectF(x, 0, text_width + 2, self.height()), Qt.AlignmentFlag.AlignVCenter, self.text())
-        if self._key:
-            self._paint_key(painter, QRectF(x + text_width + 11, middle - 10, 20, 20), ink)
+        if self._cap:
+            self._paint_key(painter, QRectF(x + text_width + 11, middle - 10, self._cap_width(), 20), ink)
 
     def _ink(self) -> str:
         if not self.isEnabled():
@@ -105,7 +111,7 @@ class ActionButton(Themed, PressedByEnter):
         painter.drawRoundedRect(cap.adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
         painter.setPen(ink)
         painter.setFont(self._key_font)
-        painter.drawText(cap, Qt.AlignmentFlag.AlignCenter, self._key)
+        painter.drawText(cap, Qt.AlignmentFlag.AlignCenter, self._cap)
 
 
 class IconButton(Themed, PressedByEnter):
