@@ -136,20 +136,19 @@ def _beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -
 
 
 def move(study: Study, asked: MoveElement) -> Step:
-    """Return the step that moves elements up or down by one place."""
-    paths = (asked.path, *asked.also)
-    steps = [step_of(study.document, path) for path in paths]
-    entries = [step for step in steps if step is not None]
-    title = _titles(study, paths)
-    if len(entries) < len(paths) or not entries:
-        raise Refused(f"{title} has no place in an order: it is not moved")
-    place = entries[0][:-1]
-    indices = [_index(step) for step in entries]
-    count = len(value_at(study.document, place))
+    """Return the step that moves an element up or down by one place, with those of its list that move with it."""
+    first = step_of(study.document, asked.path)
+    if first is None:
+        raise Refused(f"{title_of(study.document, asked.path)} has no place in an order: it is not moved")
+    steps = {path: step_of(study.document, path) for path in (asked.path, *asked.also)}
+    together = {path: step for path, step in steps.items() if step is not None and step[:-1] == first[:-1]}
+    title, indices = _titles(study, tuple(together)), [_index(step) for step in together.values()]
+    count = len(value_at(study.document, first[:-1]))
     to = min(indices) + asked.by if asked.by < 0 else max(indices) + 1 + asked.by
     if not 0 <= to <= count:
         raise Refused(f"{title} is the {'first' if asked.by < 0 else 'last'} already")
-    return _moved(study, paths, entries, to, f"Move {title} {'up' if asked.by < 0 else 'down'}")
+    words = f"Move {title} {'up' if asked.by < 0 else 'down'}"
+    return _moved(study, tuple(together), tuple(together.values()), to, words)
 
 
 def move_to(study: Study, asked: MoveTo) -> Step:
@@ -175,6 +174,8 @@ def _named(study: Study, entry: Path) -> Path:
 
 def paste(study: Study, asked: Paste) -> Step:
     """Return the step that pastes elements after the selected one."""
+    if not study.is_toml:
+        raise Refused("the file cannot be read: correct its text first")
     found = pasted(study, asked.path, asked.text)
     after, _ = study.typed(found.text)
     edits: tuple[Edit, ...] = ()

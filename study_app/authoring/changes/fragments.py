@@ -83,9 +83,15 @@ def pasted(study: Study, selected: Path, text: str) -> Pasted:
         row = row_at(study.document, (section,))
         if row is None or row.kind != "tables" or not isinstance(document[section], Mapping):
             raise Refused(f"{label_of(section)} is not a section of tables: only elements of a study are pasted")
+        for name, table in document[section].items():
+            if not isinstance(table, Mapping):
+                raise Refused(f"{section}.{name} is not a table: only elements of a study are pasted")
+    if any(True for _ in spans_of(text).section(None)):  # keys before the first header would end up in another table
+        paths = [(section, name) for section in document for name in document[section]]
+        text = "\n".join(tables(path, _plain(document[path[0]][path[1]]), "\n") for path in paths)
     if list(document) == ["questionnaires"]:
         [*forms] = document["questionnaires"].values()
-        if len(forms) == 1 and isinstance(forms[0], Mapping) and list(forms[0]) == ["items"]:
+        if len(forms) == 1 and list(forms[0]) == ["items"] and isinstance(forms[0]["items"], tuple):
             return _items(study, selected, text, document)
     return _tables(study, selected, text, document)
 

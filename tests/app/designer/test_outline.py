@@ -9,7 +9,7 @@ from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
-from study_app.viewmodels.designer.requests import MoveTo, RemoveKey, SetValue
+from study_app.viewmodels.designer.requests import AddElement, MoveTo, RemoveKey, SetValue
 
 CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
 LEFT = Qt.MouseButton.LeftButton
@@ -104,6 +104,18 @@ def test_several_selected_elements_move_are_copied_and_deleted_together(qtbot: A
     assert "2 elements" in prompt.accessibleName()
     prompt.all.click()
     assert not {"honey", "syrup"} & set(designer.editing.opened.study.document["liquids"])
+    designer.editing.undo()
+    assert designer.text == text
+
+
+def test_a_new_page_comes_right_after_the_selected_step(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    before, text = sequence(designer), designer.text
+    designer.editing.select(("pages", "welcome"))
+    designer.editing.ask(AddElement(("pages",)))
+    assert sequence(designer) == (before[0], "page", *before[1:])
+    assert designer.editing.opened.study.faults == ()
+    assert designer.place.form.isAncestorOf(QApplication.focusWidget())
     designer.editing.undo()
     assert designer.text == text
 

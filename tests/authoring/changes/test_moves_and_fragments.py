@@ -77,3 +77,15 @@ def test_names_within_a_pasted_text_follow_the_one_that_was_taken() -> None:
     assert document["conditions"]["new"]["liquid"] == "thick_2"
     assert made.paths == (("conditions", "new"), ("liquids", "thick_2"))
     assert document["liquids"]["thick"] == study.document["liquids"]["thick"]
+
+
+def test_keys_before_a_header_do_not_end_up_in_another_table() -> None:
+    study = Study(TEXTS["demo"])
+    made = pasted(study, ("liquids", "thick"), "liquids.honey.density_kg_m3 = 1_420\n")
+    assert Study(made.text).document["liquids"]["honey"] == {"density_kg_m3": 1420}
+
+
+@pytest.mark.parametrize("text", ["study.name = 'x'", "liquids.x = 5", "# a comment", "liquids = 4", "other.x.y = 1"])
+def test_what_is_no_element_of_a_study_is_refused(text: str) -> None:
+    with pytest.raises(Refused):
+        pasted(Study(TEXTS["demo"]), ("liquids", "thick"), text)
