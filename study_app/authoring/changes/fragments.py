@@ -21,6 +21,8 @@ from study_app.authoring.writer.values import tables
 from study_app.protocol.source.document import Path, entries, frozen, has, names
 
 MOST_LINES: Final = 200
+SHORT: Final = 40
+"""So many letters of a line name its question in figures and tables."""
 _ID: Final = re.compile(r"[^a-z0-9]+")
 _BULLET: Final = re.compile(r"^\s*(?:[-*•]|\d{1,3}[.)])\s+")
 
@@ -165,11 +167,11 @@ def _inserted(study: Study, after: Sequence[Path], text: str, meant: Mapping[str
     return made
 
 
-def _questions_of(study: Study, selected: Path, text: str) -> Pasted:
+def _questions_of(study: Study, selected: Path, pasted_text: str) -> Pasted:
     """Return a study with a question for each line, of the kind of the selected one, in the first language."""
     if selected[:1] != ("questionnaires",) or len(selected) < 2:
         raise Refused("this is not TOML: select a questionnaire to paste its lines as questions")
-    lines = [_BULLET.sub("", line).strip() for line in text.split("\n") if line.strip()]
+    lines = [_BULLET.sub("", line).strip() for line in pasted_text.split("\n") if line.strip()]
     if len(lines) > MOST_LINES:
         raise Refused(f"these are {len(lines)} lines: paste at most {MOST_LINES} questions at once")
     form = str(selected[1])
@@ -183,8 +185,10 @@ def _questions_of(study: Study, selected: Path, text: str) -> Pasted:
     for line in lines:
         name = free_name(taken, _id_of(line))
         taken.add(name)
-        words = {languages[0]: line} if len(languages) > 1 else line
-        edits, path = added(now, ("questionnaires", form, "items"), {"id": name, **kind, "text": words}, behind=at)
+        short = line[:SHORT].rstrip(" ?.!:")
+        text, short_text = ({languages[0]: one} if len(languages) > 1 else one for one in (line, short))
+        value = {"id": name, **kind, "text": text, "short": short_text}
+        edits, path = added(now, ("questionnaires", form, "items"), value, behind=at)
         now, _ = now.edited(*edits)
         paths.append(path)
         at = int(path[-1])

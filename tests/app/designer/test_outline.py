@@ -174,6 +174,7 @@ def test_questions_are_pasted_as_toml_or_as_plain_lines(qtbot: Any, designer: An
     qtbot.keyClick(tree, Qt.Key.Key_V, CONTROL)
     found = designer.editing.opened.study.document["questionnaires"]["liquid"]["items"]
     assert [item["text"]["en"] for item in found[2:4]] == ["How cold was it?", "Did it smell?"]
+    assert [item["short"]["en"] for item in found[2:4]] == ["How cold was it", "Did it smell"]
     assert [item["id"] for item in found[2:4]] == ["how_cold_was_it", "did_it_smell"]
     assert designer.place.outline.selected == ((*items, 2), (*items, 3))
     designer.editing.undo()
