@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QRect, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.form import FormCard
 from study_app.gui.designer.outline.card import OutlineCard
@@ -14,12 +14,41 @@ from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import SHADOW, Icon
-from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.controls import ActionButton, PressedByEnter
 from study_app.viewmodels.designer.form_rows import Form
 
 OUTLINE_PX, DRAWER_PX = 284, 320
 DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
 GAP = 14 - 2 * SHADOW
+
+
+class Crumb(PressedByEnter):
+    """A step of the path; its words end in "…" where its room is too small."""
+
+    def __init__(self, words: str, least_px: int) -> None:
+        super().__init__(words)
+        self.whole, self._least_px = words, least_px
+        self.setAccessibleName(words)
+        self.setToolTip(words)
+        self.setProperty("role", "plain")
+        self.setProperty("dense", "true")
+        self.setFont(font("label"))
+        self.setFixedHeight(32)
+        self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for all words."""
+        return QSize(self.fontMetrics().horizontalAdvance(self.whole) + 24, 32)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for some letters."""
+        return QSize(min(self._least_px, self.sizeHint().width()), 32)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Show as many words as there is room for."""
+        super().resizeEvent(event)
+        room = self.width() - 22
+        self.setText(self.fontMetrics().elidedText(self.whole, Qt.TextElideMode.ElideRight, room))
 
 
 class PathBar(QWidget):
@@ -36,7 +65,7 @@ class PathBar(QWidget):
         self.outline.setAccessibleName("Outline (Ctrl+1)")
         self.outline.setToolTip("Outline (Ctrl+1)")
         self.outline.clicked.connect(self.outline_asked)
-        self.steps: list[ActionButton] = []
+        self.steps: list[Crumb] = []
         self._parts: list[QWidget] = []
         self._shown: object = None
         self.row = QHBoxLayout(self)
@@ -58,9 +87,7 @@ class PathBar(QWidget):
         self.steps, self._parts = [], []
         for path, title in form.around:
             sign = Icon("chevron", "text2", 14)
-            made = ActionButton("", title, role="plain", height=40)
-            made.setProperty("dense", "true")
-            made.setFont(font("label"))
+            made = Crumb(title, 56 if path == form.path else 104)
             made.clicked.connect(lambda _checked=False, path=path: self.open_asked.emit(path))
             for part in (sign, made):
                 self._steps.addWidget(part)

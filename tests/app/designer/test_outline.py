@@ -9,7 +9,7 @@ from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
-from study_app.viewmodels.designer.requests import AddElement, MoveTo, RemoveKey, SetValue
+from study_app.viewmodels.designer.requests import AddElement, MoveTo, RemoveKey, SetText, SetValue
 
 CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
 LEFT = Qt.MouseButton.LeftButton
@@ -326,7 +326,12 @@ def test_a_drawer_holds_the_outline_in_a_small_window(qtbot: Any, designer: Any)
     qtbot.keyClick(outline.tree, Qt.Key.Key_Return)
     assert not outline.isVisible()
     assert designer.place.form.isAncestorOf(QApplication.focusWidget())
-    assert [step.text() for step in parts.path.steps][-1] == designer.place.view.form.title
+    assert parts.path.steps[-1].whole == designer.place.view.form.title
+    long = SetText((*designer.place.view.form.path, "title"), "en", "A very long title of a page " * 6)
+    designer.editing.ask(long)
+    QApplication.processEvents()
+    assert designer.window.width() == 1024
+    assert parts.path.steps[-1].text().endswith("…")
     qtbot.mouseClick(parts.path.steps[0], LEFT)
     assert designer.editing.selected == selected[:1]
     designer.window.resize(1600, 1000)

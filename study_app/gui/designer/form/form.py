@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
+from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.form_foot import FormFoot
 from study_app.gui.designer.form.form_head import LABEL_PX, FormHead
 from study_app.gui.designer.form.question_rows import Panel, QuestionRow, QuestionRows
@@ -168,6 +169,8 @@ class FormCard(Card):
         made.field.came.connect(lambda: self._come(made))
         made.field.setEnabled(not self.read_only or row.row.kind in {"list", "tables", "references", "reference"})
         made.remove.setEnabled(not self.read_only)
+        for entry in made.field.findChildren(EntryRow):
+            entry.grip = entry.grip and not self.read_only
         self.rows.append(made)
         return made
 
