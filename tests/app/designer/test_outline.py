@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication
@@ -72,6 +73,7 @@ def _thing(designer: Any, at: int) -> tuple[str, str]:
     )
 
 
+@pytest.mark.slow
 def test_several_selected_elements_move_are_copied_and_deleted_together(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("rek2024", "mine")
     document, text = designer.editing.opened.study.document, designer.text
@@ -136,6 +138,7 @@ def test_parts_are_numbered_again_where_a_move_would_break_them(designer: Any) -
     assert not [fault for fault in after.faults if fault.path[-1] == "part"]
 
 
+@pytest.mark.slow
 def test_elements_are_copied_with_comments_and_pasted_into_another_study(qtbot: Any, designer: Any) -> None:
     designer.controller.open("rek2024")
     designer.editing.select(("conditions", "delay_0"))
@@ -160,6 +163,7 @@ def test_elements_are_copied_with_comments_and_pasted_into_another_study(qtbot: 
     assert designer.text == before
 
 
+@pytest.mark.slow
 def test_questions_are_pasted_as_toml_or_as_plain_lines(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("rek2024", "mine")
     before = designer.text
@@ -185,6 +189,7 @@ def test_questions_are_pasted_as_toml_or_as_plain_lines(qtbot: Any, designer: An
     assert "select a questionnaire" in designer.place.form.own.text()
 
 
+@pytest.mark.slow
 def test_a_language_is_added_everywhere_filled_in_and_taken_away(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     before = designer.text
@@ -213,6 +218,7 @@ def test_a_language_is_added_everywhere_filled_in_and_taken_away(qtbot: Any, des
     assert designer.text == before
 
 
+@pytest.mark.slow
 def test_a_picker_adds_what_it_names_in_one_step(designer: Any) -> None:
     designer.controller.open("kitchen")
     before = designer.text
@@ -225,6 +231,7 @@ def test_a_picker_adds_what_it_names_in_one_step(designer: Any) -> None:
     assert designer.text == before
 
 
+@pytest.mark.slow
 def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("rek2024", "mine")
     path = ("blocks", "liquids", "conditions")
@@ -278,6 +285,7 @@ def test_numbers_are_counted_by_keys_and_taken_ids_refused_while_typing(qtbot: A
     assert not head.refusal.text()
 
 
+@pytest.mark.slow
 def test_rows_say_what_and_where_they_are_and_contain_the_problems_below_them(designer: Any) -> None:
     designer.controller.open("rek2024")
     rows = designer.place.outline.rows
