@@ -102,6 +102,7 @@ class DesignerController(QObject):
         self.runs.changed.connect(self._show_header)
         self._repairs.found.connect(place.show_repairs)
         self.measures = MeasuresController(editing, place, self._repairs)
+        self.measures.warned.connect(self._show_header)
 
     # opening
 
@@ -248,7 +249,8 @@ class DesignerController(QObject):
             self._show_header()
 
     def _header(self) -> HeaderState:
-        return header_state(self.editing.opened, self._choices, len(self._warnings), self.runs.chip)
+        warnings = len({*self._warnings, *self.measures.warnings})
+        return header_state(self.editing.opened, self._choices, warnings, self.runs.chip)
 
     def _show_header(self) -> None:
         self.place.show_header(self._header())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Final
 
-from PySide6.QtCore import QObject, QTimer
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.measures.page_fit import PageFit
@@ -46,10 +46,15 @@ class MeasuresController(QObject):
         Where it is shown.
     repairs : RepairSearch
         Finds the repairs of problems.
+
+    ``warned`` is emitted when the warnings of ``check`` that take simulated observers are others.
     """
+
+    warned = Signal()
 
     def __init__(self, editing: Editing, place: DesignerPlace, repairs: RepairSearch) -> None:
         super().__init__(editing)
+        self.warnings: tuple[str, ...] = ()
         self._editing, self._place = editing, place
         self.slow = SlowNumbers(self)
         self.fit = PageFit(self)
@@ -70,6 +75,8 @@ class MeasuresController(QObject):
         self.fit.found.connect(self._idle.start)
         place.pane.tab_shown.connect(self._idle.start)
         place.entered.connect(self._idle.start)
+        place.left.connect(self.leave)
+        place.pane.facts.appeared.connect(self._idle.start)
         measures = place.measures
         measures.repair_asked.connect(place.repair_asked)
         measures.controls.participants_asked.connect(self._take_participants)
@@ -89,13 +96,22 @@ class MeasuresController(QObject):
         self._focus = focus = focus_of(protocol, path)
         controls = self._controls(focus)
         wanted = () if protocol is None else wanted_of(protocol, focus, controls)
-        self.slow.want(wanted if self._is_looked_at else ())
+        self.slow.want(wanted if self._is_looked_at else tuple(one for one in wanted if isinstance(one, Advising)))
         repairs = {row: self._repairs.get(row, ()) for row in problem_rows(study)}
         parts = self.fit.parts(protocol, focus, path) if self._is_looked_at else None
         results = replace(self._results(wanted, focus, controls), parts=parts)
         view = measures_view(study, facts(study), path, controls, results, repairs)
+        if results.warnings != self.warnings:
+            self.warnings = results.warnings
+            self.warned.emit()
         self._place.measures.show_measures(view)
         self._place.pane.facts.show_measures(view)
+
+    def leave(self) -> None:
+        """End the process: a session that begins now must not share the processor with it."""
+        self._idle.stop()
+        self.slow.want(())
+        self.slow.close()
 
     @property
     def _is_looked_at(self) -> bool:

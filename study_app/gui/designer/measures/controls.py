@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.number_field import NumberField
@@ -26,6 +26,7 @@ class Control(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
+        self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
         for part in (self.words, self.field, self.unit):
             row.addWidget(part)
         self.show_words(words, unit)
@@ -62,6 +63,7 @@ class MeasureControls(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(10)
+        row.addStretch()
         for part in (self.threshold, self.lapses, self.participants):
             row.addWidget(part)
         self.threshold.entered.connect(self.threshold_asked)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from study_app.gui.designer.measures.plots import ForcesView, FunctionView, TrackView
 
 NUMBERS, ONE_ROW_FROM = 4, 600
-PLOT_PX, FORCES_PX = 300, 216
+PLOT_PX, HIGHEST_PX, FORCES_PX = 300, 470, 216
 FUNCTION_LEGEND = "Line: planted. Bands: 50 and 90 % of those found. Bars: how often a level is asked."
 TRACK_LEGEND = "Bands: 50 and 90 % of the estimates. Marks: the trials of one observer, filled if right."
 
@@ -169,8 +169,10 @@ class MeasuresPage(Themed, QWidget):
         self.plots = QHBoxLayout(self.curves)
         self.plots.setContentsMargins(0, 0, 0, 0)
         self.plots.setSpacing(8)
+        self.curves.setMaximumHeight(HIGHEST_PX)
         self.column.addWidget(self.curves, 3)
         self.column.addWidget(self.grid, 1)
+        self.column.addStretch()
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -240,6 +242,7 @@ class MeasuresPage(Themed, QWidget):
             self.cards[name].setMinimumHeight(PLOT_PX)
             self.plots.addWidget(self.cards[name], 1)
         forces.setMinimumHeight(FORCES_PX)
+        forces.setMaximumHeight(HIGHEST_PX)
         self.column.insertWidget(2, forces, 2)
         for card in self.cards.values():
             card.hide()

@@ -333,7 +333,7 @@ class CardGrid(Themed, QWidget):
             for part in some:
                 row.addWidget(part, 1)
             self.grid.addLayout(row)
-        self.grid.addStretch()
+        self.grid.addStretch(1)
         self.cards = cards
 
     def _made(self, card: object) -> Made:

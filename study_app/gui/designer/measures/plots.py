@@ -184,7 +184,7 @@ class TrackView(MeasurePlot):
         self.show_ticks("left", list(shown.ticks_y))
         self.show_ticks("bottom", list(shown.ticks_x))
         beyond = 0.04 * (top - bottom)
-        self.box.setXRange(-0.03 * shown.last, 1.03 * shown.last, padding=0)
+        self.box.setXRange(-0.03 * shown.last, 1.07 * shown.last, padding=0)
         self.box.setYRange(bottom - beyond, top + beyond, padding=0)
 
 

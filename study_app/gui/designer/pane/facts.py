@@ -19,6 +19,7 @@ class FactsRow(QScrollArea):
     """Draws the cards of a `MeasuresView` that stay below other tabs; ``open_asked`` carries an element's path."""
 
     open_asked = Signal(object)
+    appeared = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -54,6 +55,7 @@ class FactsRow(QScrollArea):
         """Show what came while the cards were hidden."""
         super().showEvent(event)
         self._show()
+        self.appeared.emit()
 
     def _show(self) -> None:
         if self.shown is not None:

@@ -124,7 +124,11 @@ def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:
 
 
 def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
-    title, found, words = f"{of.words.name}s it can measure", simulated.measurable, of.words
+    title, found, words = (
+        f"{of.words.name[:1].upper()}{of.words.name[1:]}s it can measure",
+        simulated.measurable,
+        of.words,
+    )
     if found is None:
         return _unknown(title, words.unit, simulated)
     anew = "measurable" in simulated.anew

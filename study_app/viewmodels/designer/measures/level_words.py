@@ -44,8 +44,9 @@ class LevelWords:
 
     @property
     def name(self) -> str:
-        """What is estimated: the just noticeable difference, or a threshold."""
-        return "threshold" if self.stimulus.level_kind == "value" or self.design.has_noise else "JND"
+        """What is estimated: the just noticeable difference, or a threshold of a value, or of what is there at all."""
+        detected = self.design.has_noise or self.stimulus.standards == (0.0,)
+        return "threshold" if detected or self.stimulus.level_kind == "value" else "JND"
 
     @property
     def kind(self) -> str:
