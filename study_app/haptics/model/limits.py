@@ -7,7 +7,7 @@ tick; how its numbers follow from the measurement is said there.
 from __future__ import annotations
 
 import csv
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from typing import Final, NamedTuple
 
@@ -66,6 +66,7 @@ def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity | DeviceVe
     return damping_limits(period_s, delay_ticks, velocity).drag_nspm
 
 
+@lru_cache(maxsize=256)
 def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | DeviceVelocity = _THESIS) -> DampingLimits:
     """Return the limits of a loop with a tick period [s], a delay [ticks] and a velocity estimator.
 
