@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import math
 import time
 from dataclasses import replace
 from typing import Final
+from weakref import WeakSet
 
 from PySide6.QtCore import QEvent, QPoint, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
@@ -30,6 +32,7 @@ from PySide6.QtWidgets import (
     QGraphicsScene,
     QGraphicsView,
 )
+from shiboken6 import isValid
 
 from study_app.gui.participant.forms.questions_page import QuestionsPage
 from study_app.gui.participant.window import ParticipantWindow
@@ -75,6 +78,7 @@ class LivePage(Themed, QGraphicsView):
         self._screen = SIZES[0]
         self._fits = True
         self._since_s = 0.0
+        _OPEN.add(self)
         self._frames = QTimer(self)
         self._frames.setInterval(FRAME_MS)
         self._frames.timeout.connect(self.frame_due)
@@ -87,7 +91,7 @@ class LivePage(Themed, QGraphicsView):
         self.setAccessibleName(view.name)
         if view.page is None:
             self._frames.stop()
-            self._drop()
+            self.close_page()
             return
         another = (view.step, view.moment) != (before.step, before.moment)
         if another:
@@ -148,7 +152,7 @@ class LivePage(Themed, QGraphicsView):
 
     def _open(self, view: ParticipantView) -> ParticipantWindow:
         """Open another window in place of the present one."""
-        self._drop()
+        self.close_page()
         made = ParticipantWindow(
             view.words,
             clock=lambda: time.monotonic() - self._since_s,
@@ -164,8 +168,8 @@ class LivePage(Themed, QGraphicsView):
         self._scale()
         return made
 
-    def _drop(self) -> None:
-        """Close the window."""
+    def close_page(self) -> None:
+        """Close the participant's window."""
         if self.page_window is not None and self._proxy is not None:
             window, proxy = self.page_window, self._proxy
             self.page_window = self._proxy = None
@@ -287,6 +291,17 @@ class LivePage(Themed, QGraphicsView):
         self._frames.stop()
         if self._proxy is not None:
             self._proxy.hide()
+
+
+_OPEN: WeakSet[LivePage] = WeakSet()
+
+
+@atexit.register
+def _close_pages() -> None:
+    """Close what is still open when the program ends: Qt cannot free a visible window within a scene after Python."""
+    for page in tuple(_OPEN):
+        if isValid(page):
+            page.close_page()
 
 
 def _bare(page: Page | None) -> Page | None:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -197,3 +201,27 @@ def image(part: Any) -> Any:
     grabbed = part.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
     rows = np.frombuffer(grabbed.constBits(), np.uint8).reshape(grabbed.height(), grabbed.bytesPerLine() // 4, 4)
     return rows[:, : grabbed.width(), :3].astype(int)
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from PySide6.QtWidgets import QApplication
+from study_app.app.designer.controller import DesignerController
+from study_app.gui.application import application_here
+
+application = application_here()
+designer = DesignerController(Path(sys.argv[1]))
+designer.place.resize(1400, 900)
+designer.place.show()
+designer.open("demo")
+QApplication.processEvents()
+assert designer.preview.tab.page.page_window.isVisible()
+"""
+
+
+@pytest.mark.slow
+def test_a_program_that_ends_with_a_page_open_ends_without_a_crash(tmp_path: Path) -> None:
+    here = {**os.environ, "LIQUID_STUDY_WORKSPACE": str(tmp_path), "QT_QPA_PLATFORM": "offscreen"}
+    ended = subprocess.run([sys.executable, "-c", SCRIPT, str(tmp_path)], env=here, capture_output=True, check=False)
+    assert ended.returncode == 0, ended.stderr.decode()
