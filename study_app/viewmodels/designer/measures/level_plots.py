@@ -13,6 +13,7 @@ from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import GroupPrecision
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import BlockOrder
 from study_app.protocol.trials.tracks import design_of, stimulus_of
 from study_app.viewmodels.designer.measures.cards import (
     UNKNOWN,
@@ -104,16 +105,17 @@ def level_block(protocol: Protocol, block: Block) -> LevelBlock | None:
 
 
 def number_cards(
-    of: LevelBlock, simulated: Simulated, participants: int, duration_s: float, trials: int
+    of: LevelBlock, simulated: Simulated, participants: int, duration_s: float, order: BlockOrder
 ) -> tuple[NumberCard, ...]:
     """Return the four numbers of a block whose tracks are simulated."""
+    breaks = f", {order.breaks} break{'s' * (order.breaks > 1)}" if order.breaks else ""
     return (
         _range(of, simulated),
         _one_person(of, simulated),
         _people(simulated, participants, simulated.precision),
         NumberCard(
             "Lasts", f"{duration_s / 60:.0f}", "min",
-            ("neutral", "clock", f"{trials} trials of {duration_s / max(1, trials):.1f} s"),
+            ("neutral", "clock", f"{order.trials} trials{breaks}"),
         ),
     )  # fmt: skip
 
