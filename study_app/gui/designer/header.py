@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.designer.play.play_controls import PlayControls
 from study_app.gui.designer.play.play_strip import PlayStrip
@@ -31,14 +31,22 @@ class ChipButton(Themed, PressedByEnter):
         self.setProperty("dense", "true")
         self._state: tuple[Tone, str, str] = ("ok", "check", "")
         self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
     def show_state(self, tone: Tone, icon: str, words: str) -> None:
         """Show another state."""
         self._state = (tone, icon, words)
         self.setAccessibleName(f"{words}: {self._does}")
-        size = chip_size(words, small=False)
-        self.setFixedSize(size.width(), 32)
+        self.updateGeometry()
         self.update()
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for icon and words; a fixed size would not outlast a change of theme."""
+        return QSize(chip_size(self.words, small=False).width(), 32)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the same room."""
+        return self.sizeHint()
 
     @property
     def words(self) -> str:
@@ -49,7 +57,7 @@ class ChipButton(Themed, PressedByEnter):
         """Paint the chip, and a ring where it is focused."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        body = QRectF(self.rect()).adjusted(0, 2, 0, -2)
+        body = QRectF(0, self.height() / 2 - 14, self.width(), 28)
         paint_chip(painter, body, self.theme, *self._state, small=False)
         if self.hasFocus():
             painter.setPen(QPen(QColor(self.theme.accent), 2))

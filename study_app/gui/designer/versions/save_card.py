@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
 
 from study_app.gui.designer.prompts import Prompt
-from study_app.gui.designer.versions.change_list import ChangeList
+from study_app.gui.designer.versions.change_list import LEAST, ChangeList
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.versions.standing import SavePrompt
+
+MOST = 240
+REST_PX = 760
+"""So much of the window is for the rest of the card, and for form and pane."""
 
 
 class SaveCard(Prompt):
@@ -62,6 +67,12 @@ class SaveCard(Prompt):
         self.another.clicked.connect(lambda: self._show_name(naming=True))
         self.changes.clicked.connect(self.changes_asked)
 
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
+        """Give the differences as much room as the window has."""
+        super().showEvent(event)
+        room = min(MOST, max(LEAST, self.window().height() - REST_PX))
+        self.list.setMinimumHeight(min(self.list.sizeHint().height(), room))
+
     def refuse(self, sentence: str) -> None:
         """Say why it cannot be saved so."""
         self.refusal.setText(f"{sentence[:1].upper()}{sentence[1:]}")
@@ -80,7 +91,7 @@ class SaveCard(Prompt):
 
     def _say(self) -> None:
         self.refuse("")
-        words = "Save as this study" if self._naming else f"Save {self.version.text().strip()}"
+        words = "Save the new study" if self._naming else f"Save {self.version.text().strip()}"
         self.save.show_action("save", words)
 
     def _save(self) -> None:
