@@ -12,7 +12,7 @@ from study_app.authoring.schema_nodes import OWN, Node, alternatives, node_at, t
 from study_app.haptics.model.ranges import REASON
 from study_app.protocol.source.document import Path, has
 from study_app.protocol.source.problems import rule_of, shown
-from study_app.protocol.table import ALTERNATIVES, SECTIONS
+from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
 
 Kind: TypeAlias = Literal[
     "number", "whole number", "text", "paragraphs", "localised", "switch", "choice", "kind", "reference",
@@ -122,6 +122,16 @@ def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tup
     """Return the sections that the model of a table declares: each heading with its keys; keys in none come last."""
     node = table_of(node_at(document, path), _at(document, path)) or {}
     return tuple((heading, tuple(keys)) for heading, keys in node.get(SECTIONS, ()))
+
+
+def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
+    """Return the keys that do not belong to a table with what it gives."""
+    table = _at(document, path)
+    node = table_of(node_at(document, path), table) or {}
+    if not isinstance(table, Mapping):
+        return frozenset()
+    applies = (keys for given, keys in node.get(NOT_WITH, ()) if all(key in table for key in given))
+    return frozenset(next(applies, ()))
 
 
 def row_at(document: Mapping[str, Any], path: Path) -> Row | None:

@@ -21,6 +21,8 @@ Kind: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_]*
 
 LATER: Final = frozenset({"standard", "stimulus", "standards", "design", "method", "until", "catch"})
 """Keys of a block that format 1 does not have."""
+WAYS: Final = ("a stimulus", "conditions", "conditions and no design")
+"""What a block presents, in words, for each entry of `Block.NOT_WITH`."""
 ROUNDING: Final = 1e-9
 
 
@@ -72,6 +74,11 @@ class Block(Table):
     """
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("conditions", "stimulus"),)
+    NOT_WITH: ClassVar[tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]] = (
+        (("stimulus",), ("standard", "repetitions", "order", "compares")),
+        (("design",), ("standards", "method", "catch", "order", "compares")),
+        ((), ("standard", "standards", "method", "until", "catch")),
+    )
     SECTIONS: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = (
         ("Words", ("title", "setting_label")),
         (
@@ -149,18 +156,15 @@ class Block(Table):
 
     @model_validator(mode="after")
     def _presents_in_one_way(self) -> Self:
-        if self.stimulus is not None:
-            self._refuse("a stimulus", "standard", "repetitions", "order", "compares")
-        elif self.design is not None:
-            self._refuse("conditions", "standards", "method", "catch", "order", "compares")
-            if self.standard not in self.conditions or len(self.conditions) < 2:
-                raise PydanticCustomError(
-                    "standard",
-                    "must be one of at least two conditions, which the others are compared with",
-                    _at("standard"),
-                )
-        else:
-            self._refuse("conditions and no design", "standard", "standards", "method", "until", "catch")
+        ways = zip(WAYS, self.NOT_WITH, strict=True)
+        what, refused = next((what, keys) for what, (given, keys) in ways if all(getattr(self, key) for key in given))
+        self._refuse(what, *refused)
+        if what == "conditions" and (self.standard not in self.conditions or len(self.conditions) < 2):
+            raise PydanticCustomError(
+                "standard",
+                "must be one of at least two conditions, which the others are compared with",
+                _at("standard"),
+            )
         return self
 
     def _refuse(self, what: str, *names: str) -> None:

@@ -13,6 +13,8 @@ ALTERNATIVES: Final = "alternatives"
 
 SECTIONS: Final = "sections"
 """Where it keeps `Table.SECTIONS`, for forms."""
+NOT_WITH: Final = "not with"
+"""Where it keeps `Table.NOT_WITH`, for forms."""
 
 
 class Table(BaseModel):
@@ -24,6 +26,8 @@ class Table(BaseModel):
     """Pairs of keys of which exactly one is given."""
     SECTIONS: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = ()
     """Headings of a form, each with its keys; keys in none come last."""
+    NOT_WITH: ClassVar[tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]] = ()
+    """Keys that are given, and the keys that do not belong to the table then; the first pair that applies counts."""
 
     @model_validator(mode="after")
     def _gives_one_of_two(self) -> Self:
@@ -42,4 +46,6 @@ class Table(BaseModel):
             handler.resolve_ref_schema(node)[ALTERNATIVES] = [list(pair) for pair in cls.ONE_OF]
         if cls.SECTIONS:
             handler.resolve_ref_schema(node)[SECTIONS] = [[words, list(keys)] for words, keys in cls.SECTIONS]
+        if cls.NOT_WITH:
+            handler.resolve_ref_schema(node)[NOT_WITH] = [[list(given), list(keys)] for given, keys in cls.NOT_WITH]
         return node

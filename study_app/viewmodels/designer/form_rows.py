@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from study_app.authoring.additions import singular
-from study_app.authoring.fields import Choice, Row, label_of, row_at, rows, sections_of
+from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
@@ -233,7 +233,7 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
     shown: list[FormRow] = []
     absent: list[Row] = []
     below: list[Path] = []
-    of_table = rows(study.document, path)
+    of_table, refused = rows(study.document, path), refused_at(study.document, path)
     other = {row.path[-1]: row for row in of_table}
     for row in of_table:
         faulty = any(fault.path[: len(row.path)] == row.path for fault in study.faults)
@@ -255,7 +255,9 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
         elif row.instead and not _given(other[row.instead]) and (_given(row) or faulty):
             both = tuple((str(key), one.label) for key, one in other.items() if key in {row.path[-1], row.instead})
             shown.append(replace(_form_row(study, row, places), instead=both))
-        elif row.instead and _given(other[row.instead]) and not _given(row):
+        elif (row.value is None and not faulty and row.path[-1] in refused) or (
+            row.instead and _given(other[row.instead]) and not _given(row)
+        ):
             continue
         elif row.value is None and _optional(row) and not (row.required or faulty):
             absent.append(row)

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from study_app.authoring.new_study import template
 from study_app.authoring.outline import outline
 from study_app.authoring.study import Study, read
 from study_app.authoring.templates import FOLDER, templates
@@ -70,8 +71,27 @@ def test_a_fault_is_at_its_row(study: Study) -> None:
 def test_optional_keys_are_offered_not_shown(study: Study) -> None:
     made = form(study, ("blocks", "liquids"))
     absent = {row.path[-1] for section in made.sections for row in section.absent}
-    assert {"max_repeats", "break_every", "until"} <= absent
+    assert {"max_repeats", "break_every", "design"} <= absent
+    assert not {"standard", "until", "catch"} & absent
     assert not absent & {row.row.path[-1] for row in made.rows}
+
+
+@pytest.mark.parametrize(
+    ("name", "block", "hidden", "there"),
+    [
+        ("viscosity-jnd", "viscosity", {"order", "repetitions", "standard", "compares"}, {"standards", "catch"}),
+        ("compare-liquids", "liquids", {"method", "catch", "until"}, {"order", "repetitions", "design"}),
+    ],
+)
+def test_keys_that_do_not_belong_are_neither_offered_nor_shown(
+    name: str, block: str, hidden: set[str], there: set[str]
+) -> None:
+    made = form(template(name), ("blocks", block))
+    keys = {row.row.path[2] for row in made.rows} | {row.path[2] for one in made.sections for row in one.absent}
+    assert not hidden & keys
+    assert there <= keys
+    document = template(name).document["blocks"][block]
+    assert set(document) <= keys
 
 
 def test_the_sections_of_a_model_head_its_form(study: Study) -> None:
