@@ -128,6 +128,10 @@ class IconButton(Themed, PressedByEnter):
         self.setToolTip(tip or name)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the square; there are no words to make room for."""
+        return self.minimumSize()
+
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the button and its icon."""
         super().paintEvent(event)
