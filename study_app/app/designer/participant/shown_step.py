@@ -95,13 +95,8 @@ def side_of(path: Path) -> Side | None:
 
 
 def _index(shown: Preview, path: Path) -> int | None:
-    steps = shown.schedule.steps
     if path[0] in {"sequence", "sequences"} or len(path) < 2:
         return None
-    if path[0] == "pages":
-        return next(
-            (at for at, step in enumerate(steps) if isinstance(step, PageStep) and step.page_id == path[1]), None
-        )
     index = first_step(shown, path)
     return index if index or _is_first(shown, path) else None
 
