@@ -277,9 +277,22 @@ class ParticipantPreview(QObject):
         title = title_of(study.document, self._selected)
         own = [fault for fault in study.faults if fault.path[: len(self._selected)] == self._selected]
         if own and self._protocol is not None:
+            if not self._holds(self._protocol, study):
+                return f"{title} cannot be shown: {own[0].message}"
             return f"{title} has a problem ({own[0].message}): the last sound value is shown."
         count = len(study.problems)
         return f"{count} problem{'s' * (count > 1)} elsewhere: the last sound values are shown."
+
+    def _holds(self, protocol: Protocol, study: Study) -> bool:
+        """Return whether the selected table, or question, is in the protocol that is shown."""
+        section, *rest = self._selected
+        table = getattr(protocol, str(section), None)
+        if not isinstance(table, Mapping) or not rest:
+            return True
+        question = self._question(study)
+        if rest[0] not in table or question is None:
+            return rest[0] in table
+        return any(item.id == question for item in protocol.questionnaires[str(rest[0])].items)
 
     def _place_ball(self, page: TaskPage, condition: str | None) -> None:
         """Put the ball at the beginning of its path, where the tank is another one."""

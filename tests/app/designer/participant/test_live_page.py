@@ -141,6 +141,8 @@ def test_a_study_that_was_never_sound_shows_what_is_sound(designer: Any) -> None
     designer.editing.select(ITEM)
     live = designer.controller.preview.tab.page
     assert [item.id for item in live.page_window.page.items].count("like_honey") == 1
+    designer.editing.select(("tasks", "reach"))
+    assert "cannot be shown" in designer.controller.preview.tab.view.note
 
 
 def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live: Any) -> None:
