@@ -7,7 +7,7 @@ import pytest
 from study_app.authoring.facts import facts
 from study_app.authoring.levels import levels, standard_of
 from study_app.authoring.measures.balance import balance_of
-from study_app.authoring.measures.felt import level_limits
+from study_app.authoring.measures.forces import level_limits
 from study_app.authoring.measures.texts import revealing, text_keys, texts_by_language
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study import Study, read
@@ -79,9 +79,9 @@ def test_a_text_that_names_what_is_compared_is_found(text: str, word: str) -> No
     study = study_of("rek2024")
     assert study.protocol is not None
     assert revealing(study, study.protocol) == ()
-    told, _ = study.edited(Set(("blocks", "liquids", "setting_label", "en"), text))
-    assert told.protocol is not None
-    (found,) = revealing(told, told.protocol)
+    changed, _ = study.edited(Set(("blocks", "liquids", "setting_label", "en"), text))
+    assert changed.protocol is not None
+    (found,) = revealing(changed, changed.protocol)
     assert (found.path, found.word) == (("blocks", "liquids", "setting_label"), word)
 
 

@@ -158,7 +158,7 @@ def _detectable(wanted: Detecting, stop: Stop) -> Detectable | None:
     protocol = wanted.protocol
     if not compares_statements(protocol):
         return None
-    planned = plan(protocol, _felt(wanted, stop))
+    planned = plan(protocol, _features(wanted, stop))
     sizes, counts = (wanted.participants,), Counts()
     for number in range(STUDIES // BATCH):
         if stop():
@@ -179,8 +179,8 @@ def _detectable(wanted: Detecting, stop: Stop) -> Detectable | None:
 _feelings: dict[str, Feelings] = {}
 
 
-def _felt(wanted: Detecting, stop: Stop) -> Feelings:
-    """Return what is felt in each condition, of the last study; rehearsing it takes most of the time."""
+def _features(wanted: Detecting, stop: Stop) -> Feelings:
+    """Return the features of each condition, kept for the last study: rehearsing them takes most of the time."""
     from study_app.session.simulated.trial_features import feelings  # noqa: PLC0415 - the compiler: only here
 
     if wanted.depends not in _feelings:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from study_app.authoring.levels import Level, levels, standard_of
-from study_app.authoring.measures.felt import LevelLimits, level_limits
+from study_app.authoring.measures.forces import LevelLimits, level_limits
 from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import GroupPrecision
 from study_app.protocol.blocks import Block

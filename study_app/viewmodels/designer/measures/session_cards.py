@@ -8,7 +8,7 @@ from typing import Final
 from study_app.authoring.facts import Facts
 from study_app.authoring.fields import label_of
 from study_app.authoring.measures.balance import balance_of
-from study_app.authoring.measures.felt import forces
+from study_app.authoring.measures.forces import forces
 from study_app.authoring.measures.planned import Detectable
 from study_app.authoring.measures.texts import revealing, texts_by_language
 from study_app.authoring.measures.valid_part import valid_part

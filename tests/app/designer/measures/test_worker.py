@@ -67,7 +67,7 @@ def test_an_order_is_given_up_before_its_first_number() -> None:
         carry_out(MeasureOrder((Grouping(planned["viscosity"][20], 6, 0.5),)), print, lambda: True)
 
 
-def test_what_is_wanted_depends_on_what_is_felt_and_asked_and_on_no_text() -> None:
+def test_what_is_wanted_depends_on_forces_and_tasks_and_on_no_text() -> None:
     study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
     path = ("blocks", "liquids")
 

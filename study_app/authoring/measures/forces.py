@@ -1,4 +1,4 @@
-"""What a hand feels of a study's elements: force of each liquid, and where the limits of a block's levels are."""
+"""Forces: of each liquid against a hand, and from which level of a block on a limit clips them."""
 
 from __future__ import annotations
 
