@@ -139,7 +139,7 @@ def bench(name: str, to: Path | None, **device_options: str | Path | None) -> No
 
     Stay within reach of its power switch: the handle moves by itself, with at most 4 N. Enter, Ctrl-C and the handle's
     button 4 end the force. The report (bench.md, bench.json) can be sent to others; receipts of later sessions on this
-    machine record what was measured.
+    machine record what was measured. Exit code 3 where the handle was touched: then nothing is kept.
     """
     from study_app.devices.registry import check_options, descriptor_of
 
@@ -187,6 +187,9 @@ def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
     if simulated:
         click.echo("The device is simulated: its measurements are not kept for receipts.")
         return
+    if not found.fits:
+        click.echo("Nothing was kept for receipts: mass, damping and friction do not explain how the handle moved.")
+        click.get_current_context().exit(EXIT_FOUND)
     bench = workstation.DeviceBench.model_validate(kept(found, day))
     workstation.save(workstation.load_or_default()[0].with_bench(bench))
     click.echo("Kept in this machine's settings: receipts of its sessions record it.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -218,6 +219,28 @@ def test_force_of_an_excitation_never_exceeds_its_limit():
         assert sizes.max() == pytest.approx(2.0, abs=1e-3)
         servo.stop()
         assert device.force_n == (0.0, 0.0, 0.0)
+
+
+def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
+    from study_app.cli.devices import bench as command
+    from study_app.devices.bench import simulated_operator
+    from study_app.devices.registry import descriptor_of
+
+    def never_lets_go(device, _tell):
+        device.hold(0.0, 0.0, 0.0)
+        device.follow(np.arange(0, 600, 0.1), 0.006 * np.random.default_rng(1).standard_normal((6000, 3)))
+        return lambda kind, _words: lambda: {"damping": None, "scale": "no"}.get(kind, "")
+
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
+    monkeypatch.setattr(protocol, "Durations", lambda: QUICK)
+    monkeypatch.setattr(simulated_operator, "asks_hand", never_lets_go)
+    real = replace(descriptor_of("scripted"), kind="felt")
+    monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)
+    done = CliRunner().invoke(command, ["scripted", "--to", str(tmp_path / "report")])
+    assert done.exit_code == 3, done.output
+    assert "the handle was touched" in (tmp_path / "report" / "bench.md").read_text()
+    assert "Nothing was kept" in done.output
+    assert workstation.load().benches == ()
 
 
 def test_gain_is_the_slope_of_readings_over_forces():

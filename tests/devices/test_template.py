@@ -26,6 +26,7 @@ TEMPLATE = Path(__file__).parents[2] / "docs" / "examples" / "liquid_study_devic
 SOURCES = Path("src", "liquid_study_example")
 COMPILER = shutil.which("cc")
 PATIENCE_S = 10.0
+ATTEMPTS = 3
 
 pytestmark = [
     pytest.mark.slow,
@@ -128,6 +129,26 @@ def until(reached, what: str) -> None:
         time.sleep(0.005)
 
 
+def run_in_servo(name: str):
+    """Return the samples of honey on a device, the servo's fault and the last force of the motors."""
+    from study_app.haptics.runtime.servo import Servo
+    from tests.haptics.scenes import HONEY
+
+    with open_device(name) as device:
+        from liquid_study_example.driver import library
+
+        servo = Servo(device)
+        servo.start()
+        servo.load(HONEY)
+        reader = servo.telemetry.reader()
+        until(lambda: servo.telemetry.written[0] >= 1500 or servo.fault, "the servo does not tick")
+        samples = reader.read()
+        fault, force_n = servo.fault, maker_force_n(library())
+        servo.stop()
+        assert maker_force_n(library()) == [0.0, 0.0, 0.0]
+        return samples, fault, force_n
+
+
 @pytest.mark.usefixtures("installed")
 class TestTemplate:
     def test_is_found_by_its_entry_points(self):
@@ -138,22 +159,13 @@ class TestTemplate:
     @needs_servo
     @pytest.mark.parametrize(("name", "delays"), [("example-direct", {0}), ("example-mailbox", {1, 2, 3, 4})])
     def test_runs_in_the_servo_and_ends_in_zero_force(self, name: str, delays: set[int]):
-        from study_app.haptics.runtime.servo import Servo
-        from tests.haptics.scenes import HONEY
-
-        with open_device(name) as device:
-            from liquid_study_example.driver import library
-
-            servo = Servo(device)
-            servo.start()
-            servo.load(HONEY)
-            reader = servo.telemetry.reader()
-            until(lambda: servo.telemetry.written[0] >= 1500, "the servo does not tick")
-            samples = reader.read()
-            assert np.abs(maker_force_n(library())).max() > 0.0
-            servo.stop()
-            assert maker_force_n(library()) == [0.0, 0.0, 0.0]
-        own = samples[(samples.fresh == 1) & (samples.scene == servo.serial)][100:]
+        for _ in range(ATTEMPTS):  # on a busy machine the library's thread may stand still for longer than 50 ms
+            samples, fault, force_n = run_in_servo(name)
+            if fault is None:
+                break
+        assert fault is None
+        assert np.abs(force_n).max() > 0.0
+        own = samples[(samples.fresh == 1) & (samples.scene == samples.scene[-1])][100:]
         assert len(own) > 500
         assert set(own.delay_ticks.tolist()) <= delays
         position_m, velocity_mps = own.position_m, own.device_velocity_mps

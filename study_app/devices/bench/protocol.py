@@ -42,6 +42,8 @@ SHAKE_N: Final = 0.35
 """Effective force of the damper above 20 Hz that counts as oscillation. [choice]"""
 DRAW_N: Final = 0.6
 DRAW_HZ: Final = 0.7
+LEAST_EXPLAINED: Final = 0.95
+"""Of the variance of the force; simulated handles give 0.998 to 0.9996."""
 LEVELS_N: Final = (0.0, 1.0, 2.0, 3.0, 1.0)
 _PATIENCE_S: Final = 600.0
 
@@ -95,6 +97,11 @@ class Found:
     gain: Gain | None
     damping: tuple[StableDamping, ...]
     overruns: int
+
+    @property
+    def fits(self) -> bool:
+        """Whether mass, damping and friction explain how the handle moved: nobody touched it, and it met no stop."""
+        return all(one.explained >= LEAST_EXPLAINED and one.mass_kg > 0.0 for one in self.motions)
 
 
 def run_bench(

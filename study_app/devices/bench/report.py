@@ -9,9 +9,13 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from study_app import __version__
-from study_app.devices.bench.protocol import AXES, SHAKE_N, Found
+from study_app.devices.bench.protocol import AXES, LEAST_EXPLAINED, SHAKE_N, Found
 
 FORMAT: Final = 1
+NOT_FREE: Final = (
+    f"Mass, damping and friction explain less than {100 * LEAST_EXPLAINED:g} % of the force: the handle was touched, "
+    "or met a stop. Measure again."
+)
 _ENDED: Final = {
     "oscillation": "it oscillated",
     "operator": "the operator ended it",
@@ -78,6 +82,8 @@ def _lines(found: Found, day: str) -> Iterator[str]:
         ("explained variance of the force", "explained", 4),
     ):
         yield f"| {label} | {_row(tuple(getattr(one, name) for one in found.motions), digits)} |"
+    if not found.fits:
+        yield from ("", NOT_FREE)
     yield from ("", "## Greatest stable damping", "", "| axis | N·s/m | ended |", "| --- | ---: | --- |")
     for axis, one in zip(AXES, found.damping, strict=True):
         yield f"| {axis} | {one.damping_nspm:.0f} | {_ENDED[one.ended]} |"
