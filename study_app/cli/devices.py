@@ -23,8 +23,8 @@ from study_app.cli.options import EXIT_FOUND
 from study_app.errors import DeviceError
 
 if TYPE_CHECKING:
-    from study_app.devices.bench.protocol import Ask as AskOperator
-    from study_app.devices.bench.protocol import Found
+    from study_app.devices.bench.procedure import Ask as AskOperator
+    from study_app.devices.bench.procedure import Found
     from study_app.devices.falcon.device import FalconDevice
     from study_app.devices.falcon.doctor.weighing import Ask, Notes
     from study_app.devices.falcon.emulator.emulator import Emulator
@@ -150,7 +150,7 @@ def bench(name: str, to: Path | None, **device_options: str | Path | None) -> No
             f"device '{name}' has no force to measure: see 'liquid-study devices list' for those that have"
         )
     click.echo(_PREPARING)
-    from study_app.devices.bench.protocol import run_bench
+    from study_app.devices.bench.procedure import run_bench
     from study_app.devices.bench.simulated_operator import asks_hand
     from study_app.devices.registry import open_device
     from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock

@@ -11,14 +11,14 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.devices.bench import measurements, protocol
+from study_app.devices.bench import measurements, procedure
 from study_app.devices.bench.measurements import gain_of
 from study_app.devices.bench.report import as_json, as_markdown, kept
 from study_app.errors import DeviceError, DeviceLost
 from study_app.store import workstation
 from tests.compiled import needs_servo
 
-QUICK = protocol.Durations(rest_s=1.0, come_s=3.0, wave_s=12.0, push_s=3.0, damping_s=8.0)
+QUICK = procedure.Durations(rest_s=1.0, come_s=3.0, wave_s=12.0, push_s=3.0, damping_s=8.0)
 
 pytestmark = [needs_servo, pytest.mark.slow]
 
@@ -30,7 +30,7 @@ def opened(name):
 
 
 def bench(device, ask=None, durations=QUICK):
-    from study_app.devices.bench.protocol import run_bench
+    from study_app.devices.bench.procedure import run_bench
     from study_app.devices.bench.simulated_operator import asks_hand
     from study_app.haptics.runtime.clocks.clock import VirtualClock
 
@@ -232,7 +232,7 @@ def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
         return lambda kind, _words: lambda: {"damping": None, "scale": "no"}.get(kind, "")
 
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
-    monkeypatch.setattr(protocol, "Durations", lambda: QUICK)
+    monkeypatch.setattr(procedure, "Durations", lambda: QUICK)
     monkeypatch.setattr(simulated_operator, "asks_hand", never_lets_go)
     real = replace(descriptor_of("scripted"), kind="felt")
     monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)
@@ -257,7 +257,7 @@ def liquid_study(*words):
 
 def test_command_writes_its_report_and_keeps_nothing_of_a_simulated_device(tmp_path, monkeypatch):
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
-    monkeypatch.setattr(protocol, "Durations", lambda: QUICK)
+    monkeypatch.setattr(procedure, "Durations", lambda: QUICK)
     done = liquid_study("devices", "bench", "scripted", "--to", str(tmp_path / "report"))
     assert done.exit_code == 0, done.output
     assert {path.name for path in (tmp_path / "report").iterdir()} == {"bench.md", "bench.json"}

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from study_app import __version__
-from study_app.devices.bench.protocol import AXES, LEAST_EXPLAINED, SHAKE_N, Found
+from study_app.devices.bench.procedure import AXES, LEAST_EXPLAINED, SHAKE_N, Found
 
 FORMAT: Final = 1
 NOT_FREE: Final = (

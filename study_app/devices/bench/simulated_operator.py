@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from study_app.devices.bench.measurements import GRAVITY_MPS2
-from study_app.devices.bench.protocol import Ask
+from study_app.devices.bench.procedure import Ask
 
 
 def asks_hand(device: Any, tell: Callable[[str], object]) -> Ask:
