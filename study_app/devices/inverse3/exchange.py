@@ -213,6 +213,8 @@ def _take_replies(device: Any, context: int, now_ns: int, reading: int) -> int:
         ended = _take_frames(device, context)
         if ended != RUNS:
             return _end(device, context, ended)
+        if device.filled == 0 and device.answered >= device.sent:
+            break  # nothing more is owed
     if device.answered == answered:
         device.missing += 1
         return READ_NOTHING_NEW

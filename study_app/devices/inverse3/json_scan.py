@@ -78,6 +78,7 @@ _ELEMENT = np.uint64(text_hash(b"*"))
 _CODES = np.array([_path_hash(path) for path in _PLACES], np.uint64)
 _DEVICE, _ID = np.uint64(_path_hash("inverse3.*")), np.uint64(_path_hash("inverse3.*.device_id"))
 _NOTHING = np.uint64(0)
+_TENS = np.array([float(f"1e{power}") for power in range(309)] + [np.inf])
 
 
 @kernel
@@ -100,8 +101,7 @@ def scan(data: Any, begin: int, end: int, found: Any) -> int:
             return NOT_JSON
         byte = data[at]
         if value_due:
-            opens = byte in (123, 91)  # { [
-            if opens:
+            if byte == 123 or byte == 91:  # noqa: PLR1714 - { or [; compiled as it stands
                 if depth + 1 >= DEEPEST:
                     return NOT_JSON
                 depth += 1
@@ -173,7 +173,10 @@ def _keep(found: Any) -> None:
 @kernel
 def _skip(data: Any, at: int, end: int) -> int:
     """Return where the white space from ``at`` on ends; a negative ``at`` as it is."""
-    while 0 <= at < end and data[at] in (32, 9, 10, 13):
+    while 0 <= at < end and data[at] <= 32:
+        byte = data[at]
+        if byte != 32 and byte != 10 and byte != 13 and byte != 9:  # noqa: PLR1714 - compiled
+            return at
         at += 1
     return at
 
@@ -272,10 +275,10 @@ def _number(data: Any, at: int, end: int, path: Any, found: Any) -> int:
             at += 1
         if at == first:
             return -1
-    if at < end and data[at] in (69, 101):
+    if at < end and (data[at] == 69 or data[at] == 101):
         at += 1
         down = at < end and data[at] == 45
-        if at < end and data[at] in (43, 45):
+        if at < end and (data[at] == 43 or data[at] == 45):
             at += 1
         first = at
         exponent: Any = 0
@@ -285,7 +288,10 @@ def _number(data: Any, at: int, end: int, path: Any, found: Any) -> int:
         if at == first:
             return -1
         power += -exponent if down else exponent
-    value = 0.0 if mantissa == 0.0 else mantissa / 10.0**-power if power < 0 else mantissa * 10.0**power
+    value = mantissa
+    if power != 0 and mantissa != 0.0:
+        tens = _TENS[min(abs(power), _TENS.size - 1)]
+        value = mantissa / tens if power < 0 else mantissa * tens
     _note(found, path, -value if negative else value)
     return at
 
