@@ -24,6 +24,7 @@ from study_app.devices.inverse3.emulator.server import ServiceServer
 from study_app.devices.inverse3.emulator.service import Service
 from study_app.devices.inverse3.exchange import INVERSE3
 from study_app.devices.scripted import ScriptedDevice
+from study_app.errors import StudyError
 from study_app.haptics.kernels.c_functions import (
     NOW,
     READ,
@@ -134,7 +135,8 @@ def _exchange(device: Any, reading: Any, command: Any, polled: Any, clock: Any) 
     for _ in range(100):
         _poll(np.intp(polled.ctypes.data), np.uint64(1), np.int32(100))
         now_ns = _now(clock[0], clock[1])
-        if _call_read(read, context, now_ns, np.intp(reading.ctypes.data)) == READ_NEW:
+        _call_read(read, context, now_ns, np.intp(reading.ctypes.data))
+        if _device_at(context).answered >= _device_at(context).sent:
             break
     return int(now_ns - began_ns)
 
@@ -295,7 +297,10 @@ def main(seconds: float) -> None:
         with Inverse3Device(f"127.0.0.1:{server.port}") as device:
             found["TCP, exchanges in the tick"] = _measure(Logged(device), service, seconds)
         for pace_ns, name in ((0, "TCP, thread and slot, free"), (1_000_000, "TCP, thread and slot, 1 kHz")):
-            found[name] = _by_thread(server.port, service, pace_ns, seconds)
+            try:
+                found[name] = _by_thread(server.port, service, pace_ns, seconds)
+            except StudyError as error:
+                print(f"{name}: {error}")
         with Inverse3Device(f"127.0.0.1:{server.port}") as device:
             exchanges, echoes = _round_trips(device)
     print(f"{'us':30} {'lateness':>15} {'age of position':>17} {'tick took':>15} {'no position':>12}")
