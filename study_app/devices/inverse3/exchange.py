@@ -3,7 +3,7 @@
 The service answers each message with one state and pushes nothing (docs.haply.co 3.5.x, "WebSocket Protocol", core
 rule), so `_write` sends the force and asks for the state that `_read` finds at the next tick. Neither waits: the socket
 does not block. A reply that is older than `LONGEST_GAP_NS` counts as none, and where replies stay out the servo ends
-the force after 50 ms. Whatever else goes wrong ends the stream at once: zero force is sent, then a close frame, then
+the force after 50 ms. Any other fault ends the stream at once: zero force is sent, then a close frame, then
 nothing. Commands are applied once and forgotten, and a device without commands returns to idle ("Control Commands"), so
 silence is what ends the force where this program ends or hangs.
 """

@@ -1,6 +1,6 @@
 """What a state message of the Inverse Service says of one device, read by a compiled JSON scanner (RFC 8259).
 
-The scanner checks the grammar of the whole message, whatever the order of its keys, and keeps the numbers at the places
+The scanner checks the grammar of the whole message, in any order of its keys, and keeps the numbers at the places
 that it knows (``_PLACES``). Unknown keys are skipped, so that a later service may add some. A place is known by a hash
 of the keys that lead to it; an element of an array counts as the key ``*``.
 

@@ -1,4 +1,4 @@
-"""The service's own settings that change what is felt: which values a session uses, and which it refuses. As data.
+"""The service's own settings that change the force: which values a session uses, and which it refuses. As data.
 
 Documents: docs.haply.co 3.5.x, "Device Configuration" (availability matrix, preset, basis, damping), "Filters" (force
 pipeline), "Mount & Workspace Transforms" (presets), "WebSocket Protocol" step 1 (shape of ``config``).
@@ -67,7 +67,7 @@ def _command(device_id: str, **further: Any) -> dict[str, Any]:
 
 
 def recorded(config: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what of a configuration changes what is felt, for the receipt."""
+    """Return what of a configuration changes the force, for the receipt."""
     return {key: config[key] for key in RECORDED if key in config}
 
 

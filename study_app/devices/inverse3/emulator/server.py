@@ -22,7 +22,7 @@ from study_app.devices.inverse3.emulator.service import Service
 from study_app.devices.inverse3.emulator.stream import INBOX, OUTBOX, SERVICE, let_pass, take_frames
 from study_app.haptics.kernels.c_functions import NOW, call_at
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.runtime.clocks.clock import SystemClock
+from study_app.haptics.runtime.clocks.clock import SystemClock, raise_priority
 
 _CALL = call_at(types.intp(types.intp, types.intp, types.uintp, types.int32))
 _NOW = call_at(NOW)
@@ -115,6 +115,7 @@ class ServiceServer:
         library = ctypes.CDLL("ws2_32" if sys.platform == "win32" else None)
         send, receive = (ctypes.cast(one, ctypes.c_void_p).value or 0 for one in (library.send, library.recv))
         clock = (self._clock.now.address, self._clock.context)
+        raise_priority()  # on a busy computer the servo's thread runs before others: so must what answers it
         while serve(memory, connection.fileno(), send, receive, clock, self._time):
             service.work()
             connection.sendall(service.give_bytes())
