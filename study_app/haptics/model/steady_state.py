@@ -8,7 +8,7 @@ from typing import Final, Literal, NamedTuple
 from study_app.haptics.model.bounds import met_mps
 from study_app.haptics.model.effects.drag import resistance_n
 from study_app.haptics.model.effects.non_newtonian import VISCOUS_SHARE, steady_n
-from study_app.haptics.model.effects.unsteady_drag import even_n
+from study_app.haptics.model.effects.unsteady_drag import LATE_SHARE, even_n
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.scene import Scene
@@ -45,7 +45,7 @@ def steady(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
         stable_n = held_n + min(viscous_n, slope_n * (VISCOUS_SHARE if held_n > 0 else 1.0))
     else:
         drag_n, stokes_n = even_n(scene, liquid, speed_mps)
-        most_late_n = math.sqrt(2) * max(slope_n - stokes_n, 0.0)  # the ball moves as fast as its wake
+        most_late_n = LATE_SHARE * math.sqrt(2) * max(slope_n - stokes_n, 0.0)  # the ball moves as fast as its wake
         stable_n = drag_n if drag_n - stokes_n <= most_late_n else min(stokes_n, slope_n) + most_late_n
     force_n = min(stable_n, scene.force_limit_n)
     if force_n == drag_n:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 BIT = 1 << 8
 
 EXPONENTIALS = 7
+LATE_SHARE: Final = 0.6
+"""Share of what the slope limit leaves that drag which builds up late may have."""
 HIGHEST_REYNOLDS: Final = 1000.0
 """There are no solutions of the flow to compare it with above Re 200; up to here it is nearer to experiments."""
 
