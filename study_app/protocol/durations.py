@@ -53,11 +53,12 @@ def step_duration_s(protocol: Protocol, step: str, language: str) -> float:
     if step in protocol.pages:
         return _reading_s(protocol, step, language)
     if step in protocol.forms:
-        return _answering_s(protocol.forms[step])
+        return answering_s(protocol.forms[step])
     return block_duration_s(protocol, protocol.blocks[step], language)
 
 
-def _answering_s(questionnaire: Questionnaire) -> float:
+def answering_s(questionnaire: Questionnaire) -> float:
+    """Return how long a questionnaire takes each time it is asked [s]."""
     return PAGE_S + ANSWER_S * len(questionnaire.items)
 
 
@@ -71,7 +72,7 @@ def block_duration_s(
 ) -> float:
     """Return how long a block will take [s]; ``of_task`` says how long one of its tasks takes."""
     questionnaire = protocol.questionnaire_of(block.id)
-    answering = 0.0 if questionnaire is None else _answering_s(questionnaire)
+    answering = 0.0 if questionnaire is None else answering_s(questionnaire)
     order = order_of(protocol, block)
     resting = 0.0 if block.break_page is None else order.breaks * _reading_s(protocol, block.break_page, language)
     task_s = of_task(protocol.tasks[block.task])

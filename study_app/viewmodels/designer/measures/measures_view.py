@@ -171,9 +171,12 @@ def _others(study: Study, facts: Facts, path: Path, slow: SlowResults) -> list[C
 def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, slow: SlowResults) -> list[Card]:
     """Return the cards of an element without simulated tracks, those that concern it first."""
     protocol, block = valid_part(study).protocol, focus.block
-    found: list[Card] = [cards.session_card(study, facts, path, slow.parts)]
+    asked = path[0] == "questionnaires" and protocol is not None and path[1:2] and path[1] in protocol.questionnaires
+    found: list[Card] = [cards.session_card(study, facts, path, None if asked else slow.parts)]
     if protocol is None:
         return [*found, cards.texts_card(study)]
+    if asked:
+        found = [cards.questions_card(protocol, str(path[1]), slow.parts), cards.texts_card(study), *found]
     if block is not None and (balance := cards.balance_card(study, protocol, block, controls.participants)):
         found.append(balance)
     if block is not None and focus.compares:
@@ -186,7 +189,8 @@ def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Contr
         found.insert(0, cards.effects_card(study, protocol, str(path[1])))
     if block is not None and path[0] == "blocks":
         found.append(cards.block_card(study, facts, protocol, block))
-    found.append(cards.texts_card(study))
+    if not asked:
+        found.append(cards.texts_card(study))
     warned: LinesCard | None = cards.warnings_card(facts, slow.warnings)
     return found if warned is None else [*found, warned]
 

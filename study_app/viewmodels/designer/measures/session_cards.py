@@ -16,6 +16,7 @@ from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.haptics.model.gate import calls_for
 from study_app.protocol.blocks import Block
+from study_app.protocol.durations import answering_s
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.source.document import Path
@@ -52,10 +53,7 @@ def session_card(study: Study, facts: Facts, path: Path, parts: int | None = Non
     parts : int, optional
         On how many parts its questions stand on a small screen.
     """
-    verdicts = tuple(text_verdicts(study, facts))
-    if parts is not None:
-        fits: Verdict = ("ok", "check", "One page, no scrolling at 1366 × 768")
-        verdicts = (fits if parts == 1 else ("neutral", "info", f"{parts} pages at 1366 × 768"), *verdicts)
+    verdicts = (*_fit(parts), *text_verdicts(study, facts))
     if facts.expected_s is None or facts.range_s is None:
         unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials"))
         return SessionCard("Session", unknown, verdicts=verdicts)
@@ -77,6 +75,28 @@ def session_card(study: Study, facts: Facts, path: Path, parts: int | None = Non
     breaks = f"{facts.breaks} break{'s' * (facts.breaks != 1)}" if facts.breaks else ""
     aside = ", ".join(filter(None, (f"{least} to {most} min" if least != most else "", breaks)))
     return SessionCard("Session", figures, aside, segments, notes, verdicts)
+
+
+def questions_card(protocol: Protocol, name: str, parts: int | None) -> SessionCard:
+    """Return a questionnaire in numbers: each time it is asked, and in a session."""
+    questionnaire = protocol.questionnaires[name]
+    count = len(questionnaire.items)
+    blocks = [block for block in protocol.blocks_in_order if block.questionnaire == name]
+    times = sum(order_of(protocol, block).trials for block in blocks) + (name in protocol.forms)
+    figures = ((minutes(answering_s(questionnaire)), "min"), (str(count), "answers"))
+    asked: Verdict = ("neutral", "info", f"{count * times} answers a session, asked {times} times")
+    if not times:
+        asked = ("warn", "warning", "It is never asked")
+    return SessionCard("Each time it is asked", figures, verdicts=(*_fit(parts), asked))
+
+
+def _fit(parts: int | None) -> tuple[Verdict, ...]:
+    """Return whether questions fit on one page; nothing where that is not known."""
+    if parts is None:
+        return ()
+    if parts == 1:
+        return (("ok", "check", "One page, no scrolling at 1366 × 768"),)
+    return (("neutral", "info", f"{parts} pages at 1366 × 768"),)
 
 
 def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> SessionCard:
@@ -123,7 +143,7 @@ def balance_card(study: Study, protocol: Protocol, block: Block, participants: i
     elif rows is not None:
         verdict = ("warn", "warning", "even in position, not in carry-over")
     elif judged.order == "fixed":
-        verdict = ("warn", "warning", "everyone gets the same order")
+        verdict = ("warn", "warning", "everyone gets the same order, which reveals the codes")
     else:
         verdict = ("neutral", "info", "even on average only: drawn for each session")
     title = _title(study, block.id)

@@ -1,0 +1,115 @@
+"""What is shown of each element: cards that concern it, from the program's own functions."""
+
+from __future__ import annotations
+
+import pytest
+
+from study_app.authoring.facts import facts
+from study_app.authoring.measures.planned import Detectable, Finding
+from study_app.authoring.study import Study, read
+from study_app.authoring.writer.edits import Set
+from study_app.haptics.model.steady_state import HAND_MPS, steady
+from study_app.protocol.load import shipped
+from study_app.protocol.source.document import Path
+from study_app.protocol.source.files import shipped_file
+from study_app.viewmodels.designer.measures.cards import (
+    UNKNOWN,
+    BalanceCard,
+    LinesCard,
+    MeasuresView,
+    SessionCard,
+    TextsCard,
+)
+from study_app.viewmodels.designer.measures.level_words import even_ticks, log_ticks, rounded
+from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
+
+
+SECTIONS = ("study", "device", "blocks", "liquids", "conditions", "tasks", "questionnaires", "pages", "stimuli")
+
+
+def study_of(name: str) -> Study:
+    return read(shipped_file(name).read_bytes(), shipped_file(name).parent)
+
+
+def view(study: Study, path: Path, slow: SlowResults | None = None, people: int = 12) -> MeasuresView:
+    return measures_view(study, facts(study), path, Controls(people), slow or SlowResults(), {})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped())
+def test_every_element_of_every_study_has_measures(name: str) -> None:
+    study = study_of(name)
+    for section in (
+        "study",
+        "device",
+        "blocks",
+        "liquids",
+        "conditions",
+        "tasks",
+        "questionnaires",
+        "pages",
+        "stimuli",
+    ):
+        table = study.document.get(section, {})
+        paths: list[Path] = [(section,)]
+        paths += [(section, key) for key in table if section not in {"study", "device"}]
+        for path in paths:
+            shown = view(study, path)
+            assert shown.cards or shown.numbers
+            assert shown.below
+
+
+def test_a_block_of_statements_shows_session_balance_power_and_force() -> None:
+    study = study_of("physical2")
+    found = Detectable(12, 200, 7, (Finding("like_honey", 1.04), Finding("thick", None)))
+    session, balance, power, force, *_ = view(
+        study, ("blocks", "liquids"), SlowResults(detectable=found, parts=1)
+    ).cards
+    assert isinstance(session, SessionCard)
+    assert ("ok", "check", "One page, no scrolling at 1366 × 768") in session.verdicts
+    assert sum(share for _, share, _ in session.segments) == pytest.approx(1.0)
+    assert isinstance(balance, BalanceCard)
+    assert balance.verdict == ("ok", "check", "even, 2 rounds of 6")
+    assert {count for line in balance.positions for count in line} == {4}
+    assert isinstance(power, LinesCard)
+    assert [line.number for line in power.lines] == ["1.0", UNKNOWN]
+    assert power.aside == "points of 7"
+    assert isinstance(force, LinesCard)
+    assert study.protocol is not None
+    names = list(study.protocol.conditions_in("liquids"))
+    liquids = [study.protocol.conditions[name].liquid_ids[0] for name in names]
+    forces = [steady(study.protocol.scene_of(name), HAND_MPS).force_n for name in liquids]
+    assert [line.number for line in force.lines] == [f"{force_n:.2f} N" for force_n in forces]
+    uneven = view(study, ("blocks", "liquids"), people=13).cards[1]
+    assert isinstance(uneven, BalanceCard)
+    assert uneven.verdict == ("warn", "warning", "even at 18")
+
+
+def test_a_questionnaire_shows_each_time_it_is_asked_and_its_languages() -> None:
+    asked, texts, *_ = view(study_of("rek2024"), ("questionnaires", "liquid"), SlowResults(parts=2)).cards
+    assert isinstance(asked, SessionCard)
+    assert asked.figures == (("0:59", "min"), ("9", "answers"))
+    assert [words for _, _, words in asked.verdicts] == ["2 pages at 1366 × 768", "27 answers a session, asked 3 times"]
+    assert isinstance(texts, TextsCard)
+    assert [line.number for line in texts.languages] == ["59 of 59", "59 of 59"]
+
+
+def test_a_force_that_a_limit_clips_is_said_and_sums_of_a_broken_study_are_not_known() -> None:
+    study = study_of("rek2024")
+    weak, _ = study.edited(Set(("device", "force_limit_n"), 0.5))
+    (force,) = [card for card in view(weak, ("study",)).cards if isinstance(card, LinesCard) and card.lines]
+    assert {line.verdict[2] for line in force.lines} == {"clipped by the force limit"}
+    assert {line.share for line in force.lines} == {1.0}
+    broken, _ = study.edited(Set(("blocks", "liquids", "repetitions"), -1))
+    session = view(broken, ("study",)).cards[0]
+    assert isinstance(session, SessionCard)
+    assert {number for number, _ in session.figures} == {UNKNOWN}
+    assert any(isinstance(card, LinesCard) and len(card.lines) == 4 for card in view(broken, ("study",)).cards)
+
+
+def test_ticks_are_round_and_few() -> None:
+    assert log_ticks(2, 60) == (2, 5, 10, 20, 50)
+    assert log_ticks(5, 250) == (5, 10, 20, 50, 100, 200)
+    assert even_ticks(0, 8.16, 5) == (0, 2, 4, 6, 8)
+    assert even_ticks(50, 100, 7) == (50, 60, 70, 80, 90, 100)
+    assert [rounded(value) for value in (0.0201, 53.0, 1234.5, 0, 8.0)] == ["0.0201", "53", "1234", "0", "8"]
