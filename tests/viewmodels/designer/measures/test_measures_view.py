@@ -23,7 +23,6 @@ from study_app.viewmodels.designer.measures.cards import (
 from study_app.viewmodels.designer.measures.level_words import even_ticks, log_ticks, rounded
 from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
 
-
 SECTIONS = ("study", "device", "blocks", "liquids", "conditions", "tasks", "questionnaires", "pages", "stimuli")
 
 
