@@ -9,6 +9,8 @@
 
 #define SILENT_TICKS 20 /* without a force for so many ticks, the servo hangs or is gone: zero force */
 
+#define ACTS_NS 500000  /* a force counts as having acted after so long: ticks of a late thread follow at once */
+
 typedef struct {
     double position_mm[3], velocity_mmps[3];
     int64_t time_ns;
@@ -43,21 +45,28 @@ static struct {
     MAILBOX(force) forces;
     int64_t written;   /* WRITEs so far; of the servo's thread */
     force acting;      /* of the library's thread, as the following */
+    int64_t acting_ns; /* since when, on the device's clock */
+    int64_t acted;     /* number of the last force that acted */
     int64_t silent;
     atomic_int lost;
 } device;
 
 static void tick(void *unused) {
-    sample now = {.acted = device.acting.number};
+    sample now;
     double force_n[3];
     (void)unused;
     if (maker_get(now.position_mm, now.velocity_mmps, &now.time_ns) != 0) {
         device.lost = 1;
         return;
     }
+    if (now.time_ns - device.acting_ns >= ACTS_NS) {
+        device.acted = device.acting.number;
+    }
+    now.acted = device.acted;
     PUT(device.samples, now);
     if (IS_NEW(device.forces)) {
         device.acting = TAKE(device.forces);
+        device.acting_ns = now.time_ns;
         device.silent = 0;
     } else if (++device.silent >= SILENT_TICKS) {
         memset(device.acting.force_n, 0, sizeof device.acting.force_n);
@@ -72,7 +81,7 @@ static void tick(void *unused) {
 intptr_t mailbox_open(double force_limit_n) {
     memset(&device.acting, 0, sizeof device.acting);
     device.force_limit_n = force_limit_n;
-    device.written = device.silent = 0;
+    device.written = device.silent = device.acted = device.acting_ns = 0;
     device.lost = 0;
     RESET(device.samples);
     RESET(device.forces);

@@ -104,7 +104,7 @@ static void *run(void *unused) {
             struct timespec wait = {0, (long)wait_ns};
             nanosleep(&wait, 0);
         } else {
-            due_ns = now_ns();
+            due_ns = now_ns(); /* late: the next one follows at once */
         }
     }
     return 0;
