@@ -68,9 +68,7 @@ class DesignerPlace(Place):
         self.banner = BannerCard()
         self.banner_words = self.banner.words
         self.outline = OutlineCard()
-        self.form = FormCard()
-        self.file = FileCard()
-        self.problems = ProblemsCard()
+        self.form, self.file, self.problems = FormCard(), FileCard(), ProblemsCard()
         self.new_page = NewStudyPage()
         self.pane = RightPane()
         self.measures = MeasuresPage()
