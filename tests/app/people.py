@@ -23,7 +23,8 @@ from study_app.store.sessions.reopen import check_can_go_on
 
 def window(kind):
     """Return the window of that kind that is shown, or None."""
-    shown = [widget for widget in QApplication.topLevelWidgets() if isinstance(widget, kind) and widget.isVisible()]
+    own = [widget for widget in QApplication.topLevelWidgets() if widget.graphicsProxyWidget() is None]
+    shown = [widget for widget in own if isinstance(widget, kind) and widget.isVisible()]
     return shown[0] if shown else None
 
 

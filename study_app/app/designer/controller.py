@@ -92,6 +92,7 @@ class DesignerController(QObject):
         place.id_typed.connect(self._judge_id)
         editing.changed.connect(self.show)
         self.preview = ParticipantPreview(editing, place)
+        self.playing.where = lambda: self.preview.position
         editing.edited.connect(self._resting.start)
         editing.refused.connect(self._refuse)
         editing.made.connect(self._show_step)

@@ -74,7 +74,6 @@ class DesignerPlace(Place):
         self.measures = MeasuresPage()
         self.pane.add_page(PanePage("measures", "Measures", self.measures, self.measures.controls, with_facts=False))
         self.pane.add_page(PanePage("file", "File", self.file))
-        self.pane.show_tab("file")
         self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
         self.sides = self.parts.sides
         self.adding = AddList(self)

@@ -195,10 +195,10 @@ def test_a_change_by_another_program_is_noticed_while_the_place_is_shown(designe
     other.write_text(before.replace("A first look", "Another look"))
     other.replace(designer.file)
     qtbot.waitUntil(designer.place.banner.isVisible)
-    click(qtbot, designer.place.banner_buttons[2])
+    click(qtbot, designer.place.banner.buttons[2])
     assert designer.controller.changes.card.view.chosen == "file"
     assert 'pages.welcome.title: "Another look" before, "A first look" now' in rows(designer)
-    click(qtbot, designer.place.banner_buttons[1])
+    click(qtbot, designer.place.banner.buttons[1])
     assert "Another look" in designer.text
     designer.editing.undo()
     assert "repetitions = 3" in designer.text
@@ -362,6 +362,6 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any, qtbot: A
     other("Typed elsewhere", "leave")
     designer.saving.leave()
     assert designer.place.banner_words.text().startswith("Another window of the program edits this study, too")
-    designer.place.banner_buttons[0].click()
+    designer.place.banner.buttons[0].click()
     QApplication.processEvents()
     assert any("Typed elsewhere" in sentence for sentence in rows(designer))

@@ -24,11 +24,14 @@ _SIDES: Final[dict[str, Side]] = {
 
 
 class StepPosition(NamedTuple):
-    """Where a preview is: a page, form or block by its id, which of the block's trials (from 1), language and seed."""
+    """Where a preview is: a page, form or block by its id, which of the block's trials (from 1), language and seed.
 
-    name: str
-    trial: int
-    language: str
+    Without a name it is the first step that shows the selected element.
+    """
+
+    name: str = ""
+    trial: int = 1
+    language: str = ""
     seed: int = SEED
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from study_app.app.designer.participant.shown_step import StepPosition
 from study_app.app.designer.play.first_step import first_step, graph_of, reached
 from study_app.authoring.names import named_at
 from study_app.authoring.study import Study
@@ -22,25 +23,12 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, Step, Trial
 from study_app.protocol.source.document import Path, entries, has
 from study_app.protocol.source.liquid_files import with_liquid_files
-from study_app.session.preview import SEED, Preview, preview
+from study_app.session.preview import Preview, preview
 
 _LACKING: Final = re.compile(r'is missing in "([a-z]{2})"$')
 _STEPS: Final = ("pages", "blocks")
 """Sections whose tables must come in the sequence."""
 _PARTS: Final = ("questionnaires", "tasks", "conditions", "liquids", "scales", "stimuli", "designs", "methods")
-
-
-@dataclass(frozen=True, slots=True)
-class Position:
-    """A place in a preview: a page, form or block by its id, which of the block's trials (from 1), language and seed.
-
-    Without a name it is the first step that shows the selected element.
-    """
-
-    name: str = ""
-    trial: int = 1
-    language: str = ""
-    seed: int = SEED
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +45,7 @@ class Playable:
         The index of the first step that is shown, in the preview's schedule.
     words : str
         That step, as "Liquids, trial 3 of 6".
-    position : Position
+    position : StepPosition
         Language and seed.
     """
 
@@ -65,7 +53,7 @@ class Playable:
     protocol: Protocol = field(repr=False)
     step: int
     words: str
-    position: Position
+    position: StepPosition
 
 
 class NotPlayableError(StudyError):
@@ -76,7 +64,7 @@ class NotPlayableError(StudyError):
         super().__init__("; ".join(map(str, problems)))
 
 
-def playable(study: Study, path: Path, position: Position | None = None) -> Playable:
+def playable(study: Study, path: Path, position: StepPosition | None = None) -> Playable:
     """Return what is played from a position on, or from the first step that shows an element.
 
     Parameters
@@ -85,7 +73,7 @@ def playable(study: Study, path: Path, position: Position | None = None) -> Play
         The study as it is edited.
     path : tuple of str or int
         The selected element.
-    position : Position, optional
+    position : StepPosition, optional
         Where the preview is.
 
     Raises
@@ -93,7 +81,7 @@ def playable(study: Study, path: Path, position: Position | None = None) -> Play
     NotPlayableError
         The study is faulty from there on.
     """
-    position = position or Position()
+    position = position or StepPosition()
     if not study.is_toml:
         raise NotPlayableError(study.problems)
     language = position.language or next((str(one) for _, one in entries(study.document, "study.languages.*")), "")
@@ -112,7 +100,7 @@ def playable(study: Study, path: Path, position: Position | None = None) -> Play
         found.protocol,
         step,
         _words(shown, shown.schedule.steps[step], language),
-        Position(position.name, position.trial, language, position.seed),
+        StepPosition(position.name, position.trial, language, position.seed),
     )
 
 
@@ -168,7 +156,7 @@ def _tables(document: Mapping[str, Any], section: str) -> list[Path]:
     return [path for path, _ in entries(document, f"{section}.*")]
 
 
-def _step_at(shown: Preview, position: Position) -> int:
+def _step_at(shown: Preview, position: StepPosition) -> int:
     """Return the index of the step at a position; the nearest trial of its block, or the first step."""
     steps = list(enumerate(shown.schedule.steps))
     named = [at for at, step in steps if position.name in {_name(step)}]

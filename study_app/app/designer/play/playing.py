@@ -14,7 +14,8 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.designer.editing import Editing
-from study_app.app.designer.play.playable import NotPlayableError, Playable, Position, playable
+from study_app.app.designer.participant.shown_step import StepPosition
+from study_app.app.designer.play.playable import NotPlayableError, Playable, playable
 from study_app.app.designer.play.played_session import PlayedSession
 from study_app.app.lab_rows import device_choices
 from study_app.app.session.live_session import BUG
@@ -61,7 +62,7 @@ class Playing(QObject):
     def __init__(self, editing: Editing, place: DesignerPlace) -> None:
         super().__init__(editing)
         self.editing, self.place = editing, place
-        self.where: Callable[[], Position | None] = lambda: None
+        self.where: Callable[[], StepPosition | None] = lambda: None
         self.device = SIMULATED
         self.pilot: _Pilot | None = None
         self._asked: Playable | None = None

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.app.designer.play.playable import NotPlayableError, Position, playable
+from study_app.app.designer.participant.shown_step import StepPosition
+from study_app.app.designer.play.playable import NotPlayableError, playable
 from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.protocol.load import load, parse, source_bytes
@@ -20,7 +21,7 @@ def edited(name: str, *edits: Edit) -> Study:
 
 def test_a_sound_draft_is_played_as_it_is() -> None:
     study = Study(source_bytes("rek2024").decode())
-    found = playable(study, ("study",), Position("liquids", trial=3, language="nl", seed=7))
+    found = playable(study, ("study",), StepPosition("liquids", trial=3, language="nl", seed=7))
     step = preview(load("rek2024"), 7).schedule.steps[found.step]
     assert isinstance(step, Trial)
     assert (step.block, step.index) == ("liquids", 3)
@@ -31,12 +32,12 @@ def test_a_sound_draft_is_played_as_it_is() -> None:
 def test_a_missing_text_of_another_language_prevents_nothing() -> None:
     study = edited("rek2024", Unset(("pages", "debrief", "title", "nl")))
     assert study.protocol is None
-    found = playable(study, ("blocks", "liquids"), Position("liquids", language="en"))
+    found = playable(study, ("blocks", "liquids"), StepPosition("liquids", language="en"))
     title = found.protocol.pages["debrief"].title
     assert isinstance(title, dict)
     assert title["nl"] == title["en"]
     with pytest.raises(NotPlayableError) as refused:
-        playable(study, ("blocks", "liquids"), Position("liquids", language="nl"))
+        playable(study, ("blocks", "liquids"), StepPosition("liquids", language="nl"))
     (problem,) = refused.value.problems
     assert problem.place == "pages.debrief.title"
     assert problem.line is not None

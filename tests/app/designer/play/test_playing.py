@@ -14,8 +14,8 @@ from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from study_app.app.designer.participant.shown_step import StepPosition
 from study_app.app.designer.play import playing
-from study_app.app.designer.play.playable import Position
 from study_app.app.session.termination import Patience
 from study_app.authoring.new_study import template
 from study_app.errors import DeviceLost
@@ -226,7 +226,7 @@ def test_an_adaptive_study_is_played_from_its_tenth_trial(qtbot: Any, designer: 
     designer.controller.open("kitchen")
     protocol = designer.editing.opened.study.protocol
     assert protocol is not None
-    designer.controller.playing.where = lambda: Position("viscosity", trial=10, language="en", seed=5)
+    designer.controller.playing.where = lambda: StepPosition("viscosity", trial=10, language="en", seed=5)
     player = play_to_the_end(qtbot, designer)
     trials = {trial.number: trial for trial in preview(protocol, 5).schedule.trials}
     played = [page.trial for page in player.pages if isinstance(page, TaskPage)]
