@@ -11,8 +11,8 @@ from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study import Study
 from study_app.haptics.model.steady_state import HAND_MPS, steady
 from study_app.protocol.describe import warnings
-from study_app.protocol.durations import duration_range_s, expected_duration_s, step_duration_s
 from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
 
 MOST_PARTICIPANTS: Final = 200
 _MISSING: Final = re.compile(r'is missing in "([a-z]{2})"$')

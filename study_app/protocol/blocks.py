@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.liquid import MAX_ID
 from study_app.haptics.model.ranges import within
-from study_app.protocol.order_constraint import Constraint
+from study_app.protocol.orders.order_constraint import Constraint
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id, Localised
 

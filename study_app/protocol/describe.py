@@ -10,13 +10,13 @@ from study_app.haptics.model.scene import Scene
 from study_app.protocol import liquid_summary
 from study_app.protocol.checks.delay_warnings import delay_warnings
 from study_app.protocol.checks.level_warnings import level_warnings
-from study_app.protocol.durations import block_duration_s, expected_duration_s
 from study_app.protocol.groups.own_protocol import Variant, variants
 from study_app.protocol.groups.steps import sessions_differ
 from study_app.protocol.instruments.summary import sources
 from study_app.protocol.instruments.summary import warnings as from_memory
 from study_app.protocol.model import Block, Condition, Protocol, Questionnaire, Reach
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
+from study_app.protocol.orders.durations import block_duration_s, expected_duration_s
 from study_app.protocol.orders.latin_squares import row_count
 from study_app.protocol.questions.question import Context, Question
 from study_app.protocol.trials.limits import Limits

@@ -16,8 +16,8 @@ from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, UNKNOWN, Dyn
 from study_app.haptics.model.limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.protocol.checks.pace import beyond_slope_limit, highest_damping
-from study_app.protocol.durations import expected_duration_s
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.latin_squares import enrolment
 
 if TYPE_CHECKING:

@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from study_app.protocol.describe import describe
-from study_app.protocol.durations import expected_duration_s
 from study_app.protocol.load import load, parse
+from study_app.protocol.orders.durations import expected_duration_s
 from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")

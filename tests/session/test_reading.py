@@ -9,9 +9,9 @@ import pytest
 from pydantic import ValidationError
 
 from study_app.errors import SessionError
-from study_app.protocol.durations import expected_duration_s
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.session.pages import Progress, TextPage
 from study_app.session.transitions.commands import ShowPage, Write

@@ -15,9 +15,9 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.strip import Strip
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.protocol.durations import expected_duration_s
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.schedule import Schedule, stream
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import Page, TaskPage

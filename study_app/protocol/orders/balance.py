@@ -16,9 +16,9 @@ from study_app.errors import StudyError
 from study_app.protocol.groups.allocation import group_of
 from study_app.protocol.groups.own_protocol import variants
 from study_app.protocol.model import Protocol
-from study_app.protocol.order_constraint import longest_run, shortest_distance
 from study_app.protocol.orders.block_orders import BlockOrder, CodeOrder, orders_of
 from study_app.protocol.orders.latin_squares import borders_even, enrolment, row_count
+from study_app.protocol.orders.order_constraint import longest_run, shortest_distance
 from study_app.protocol.orders.schedule import codes_of
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.keyed import draw_secret

@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import TypeAlias, TypeVar
 
-from study_app.protocol.order_constraint import Constraint
+from study_app.protocol.orders.order_constraint import Constraint
 from study_app.protocol.streams import Draw, shuffle
 
 T = TypeVar("T")

@@ -26,10 +26,10 @@ from typing import TypeAlias
 
 from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
-from study_app.protocol.order_constraint import Constraint
 from study_app.protocol.orders.block_orders import BlockOrder, FormOrder, Orders, block_codes, orders_of
 from study_app.protocol.orders.constrained import arrange
 from study_app.protocol.orders.latin_squares import assigned_row, row, row_count
+from study_app.protocol.orders.order_constraint import Constraint
 from study_app.protocol.streams import Draw, shuffle, stream
 from study_app.protocol.trials.tracks import tracks_of
 

@@ -15,8 +15,8 @@ from typing import Any, Final
 from study_app.errors import SessionError
 from study_app.protocol.forms.simulated_observer import NOTHING_FELT
 from study_app.protocol.model import Protocol
-from study_app.session.preview import preview
 from study_app.session.simulated.answers_only import Answering, SimulatedTime
+from study_app.session.simulated.preview import preview
 from study_app.session.transitions.table import open_session
 from study_app.store.clock import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin

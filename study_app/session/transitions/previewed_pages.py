@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 from study_app.protocol.forms.show_if import Value
 from study_app.protocol.orders.schedule import FormStep, PageStep, Trial
 from study_app.session.pages import FeedbackPage, Page, TextPage
-from study_app.session.preview import Preview
+from study_app.session.simulated.preview import Preview
 from study_app.session.transitions import page_builder
 from study_app.session.transitions.state import Answer, Phase, Plan, SessionState
 

@@ -13,9 +13,9 @@ from study_app.authoring.new_study import Answers
 from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.authoring.templates import QUESTIONS
-from study_app.protocol.durations import expected_duration_s, step_duration_s
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.outline_rows import icon_of

@@ -13,8 +13,8 @@ from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study import Study, read
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.haptics.model.limits import slope_limit
-from study_app.protocol.durations import duration_range_s, expected_duration_s
 from study_app.protocol.load import load, shipped
+from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.source.files import shipped_file
 from tests.protocol.cases import CASES
 

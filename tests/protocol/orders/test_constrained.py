@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.order_constraint import Constraint, longest_run, shortest_distance
 from study_app.protocol.orders.constrained import PROPOSALS, Remaining, arrange, propose
+from study_app.protocol.orders.order_constraint import Constraint, longest_run, shortest_distance
 from study_app.protocol.streams import stream
 
 Order = tuple[int, ...]

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.order_constraint import Constraint
 from study_app.protocol.orders.block_orders import order_of, orders_of
+from study_app.protocol.orders.order_constraint import Constraint
 from study_app.protocol.orders.schedule import (
     PageStep,
     Schedule,

@@ -12,8 +12,8 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.trials.due import next_level
 from study_app.protocol.trials.keyed import Key
-from study_app.session.preview import preview
 from study_app.session.resume import Start, resume_at
+from study_app.session.simulated.preview import preview
 from study_app.session.simulated.skipping import begin_at
 from study_app.store.blinded.blinding import read_key
 from study_app.store.folders import locate

@@ -9,8 +9,8 @@ import pytest
 
 from study_app.protocol.load import load
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
-from study_app.session.preview import preview
 from study_app.session.resume import FIRST
+from study_app.session.simulated.preview import preview
 from study_app.session.transitions.commands import ShowPage
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone, TimeUp
 from study_app.session.transitions.previewed_pages import Moment, moments, previewed_page

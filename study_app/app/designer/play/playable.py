@@ -23,7 +23,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, Step, Trial
 from study_app.protocol.source.document import Path, entries, has
 from study_app.protocol.source.liquid_files import with_liquid_files
-from study_app.session.preview import Preview, preview
+from study_app.session.simulated.preview import Preview, preview
 
 _LACKING: Final = re.compile(r'is missing in "([a-z]{2})"$')
 _STEPS: Final = ("pages", "blocks")

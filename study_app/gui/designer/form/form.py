@@ -10,8 +10,9 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout
 from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.form_foot import FormFoot
 from study_app.gui.designer.form.form_head import LABEL_PX, FormHead
+from study_app.gui.designer.form.languages_field import LanguagesField, stacked
 from study_app.gui.designer.form.question_rows import Panel, QuestionRow, QuestionRows
-from study_app.gui.designer.form.row_fields import LanguagesField, add_button, stacked
+from study_app.gui.designer.form.row_fields import add_button
 from study_app.gui.designer.form.row_widget import RowWidget, is_wide, language_heads, structure_of
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.theme.themed import dress, take_away

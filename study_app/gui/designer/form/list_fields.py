@@ -10,11 +10,11 @@ from PySide6.QtWidgets import QBoxLayout
 
 from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.language_list import LanguageListField
+from study_app.gui.designer.form.languages_field import LanguagesField
 from study_app.gui.designer.form.row_fields import (
     ChecksField,
     ChoiceField,
     Field,
-    LanguagesField,
     LineField,
     LinesField,
     SwitchField,

@@ -6,15 +6,15 @@ import re
 from typing import Any
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QWidget
 
-from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.designer.form_rows import FormRow, choice_words, is_right_to_left, new_words
-from study_app.viewmodels.designer.requests import AddEntry, AddNamed, RemoveKey, SetText, SetValue, SwitchKind
+from study_app.viewmodels.designer.form_rows import FormRow, choice_words, new_words
+from study_app.viewmodels.designer.requests import AddEntry, AddNamed, RemoveKey, SetValue, SwitchKind
 
 MOST_SEGMENTS, SEGMENT_LETTERS = 4, 34
 NUMBER_PX = 96
@@ -132,62 +132,6 @@ class LineField(Field):
             self.came.emit()  # the form shows what is wrong with it, or no longer
         if not self.refusal and (text.strip() or row.kind == "text" or row.required):
             self.set_value(value, typing=True)
-
-
-class LanguagesField(Field):
-    """A text in each language, side by side, or below each other where there are more than two or several lines."""
-
-    def __init__(self, row: FormRow) -> None:
-        super().__init__(row)
-        several, down = row.row.kind == "paragraphs", stacked(row)
-        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        self.box.setSpacing(4)
-        self.outer = self.box
-        self.box = QVBoxLayout() if down else QHBoxLayout()
-        self.box.setSpacing(8)
-        self.outer.addLayout(self.box)
-        self.lines: dict[str, TypedLine | TypedText] = {}
-        for code, language in row.languages:
-            name = row.row.label if len(row.languages) == 1 else f"{row.row.label}, {language}"
-            made: TypedLine | TypedText = TypedText(name) if several else TypedLine(name)
-            if len(row.languages) > 1:
-                made.setPlaceholderText(f"Missing in {language}")
-                made.setToolTip(language)
-            if is_right_to_left(code):
-                made.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
-            made.typed.connect(lambda text, code=code: self.asked.emit(SetText(self.row.row.path, code, text)))
-            made.came.connect(self.came)
-            self.lines[code] = made
-            if down and len(row.languages) > 1:
-                self.box.addWidget(label(language, "small", "text2"))
-            self.box.addWidget(made)
-        self.copied = label("", "small", "warn")
-        self.outer.addWidget(self.copied)
-        self.setFocusProxy(next(iter(self.lines.values())))
-        self.show_value()
-
-    @property
-    def some_missing(self) -> bool:
-        """Whether a language has a text and another one has none."""
-        written = [bool(line.words().strip()) for line in self.lines.values()]
-        return any(written) and not all(written)
-
-    def show_value(self) -> None:
-        """Show each text; a plain one stands for the first language. A text that is that of the first one is marked."""
-        value = self.row.row.value
-        (first, named), *others = self.row.languages
-        texts = value if isinstance(value, dict) else {}
-        copies = [name for code, name in others if texts.get(code) and texts[code] == texts.get(first)]
-        self.copied.setText(f"As in {named}, not translated yet: {', '.join(copies)}")
-        self.copied.setVisible(bool(copies))
-        for number, (code, line) in enumerate(self.lines.items()):
-            text = value.get(code, "") if isinstance(value, dict) else value if number == 0 else ""
-            line.show_text(text if isinstance(text, str) else "")
-
-    def take_keyboard(self) -> None:
-        """Give the keyboard to the first empty text."""
-        first = next((line for line in self.lines.values() if not line.words()), self)
-        first.setFocus(Qt.FocusReason.OtherFocusReason)
 
 
 class SwitchField(Field):
@@ -379,11 +323,6 @@ class UnknownField(Field):
     def show_value(self) -> None:
         """Show the value as it would be written."""
         self.value.show_text(_written(self.row.row.value))
-
-
-def stacked(row: FormRow) -> bool:
-    """Return whether texts in several languages are below each other, each with its language."""
-    return len(row.languages) > 2 or row.row.kind == "paragraphs"
 
 
 def add_button(name: str, words: str = "") -> ActionButton:

@@ -8,8 +8,8 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.form_head import LABEL_PX
+from study_app.gui.designer.form.languages_field import LanguagesField, stacked
 from study_app.gui.designer.form.list_fields import field, structure
-from study_app.gui.designer.form.row_fields import LanguagesField, stacked
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText

@@ -16,9 +16,9 @@ from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.haptics.model.gate import calls_for
 from study_app.protocol.blocks import Block
-from study_app.protocol.durations import answering_s
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of
+from study_app.protocol.orders.durations import answering_s
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.measures.cards import (

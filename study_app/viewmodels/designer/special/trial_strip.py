@@ -7,7 +7,7 @@ from typing import Final, Literal, TypeAlias
 
 from study_app.authoring.fields import Row
 from study_app.authoring.study import Study
-from study_app.protocol.durations import ANSWER_S, CHOICE_S
+from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
 from study_app.protocol.trials.design import ORDINALS
 from study_app.protocol.trials.methods.adjustment import Adjustment
 from study_app.protocol.trials.tracks import design_of, method_of

@@ -12,9 +12,9 @@ from study_app.authoring.fields import row_at
 from study_app.authoring.new_study import template
 from study_app.authoring.study import read
 from study_app.authoring.writer.edits import Set
-from study_app.protocol.durations import block_duration_s
 from study_app.protocol.load import load
 from study_app.protocol.orders.block_orders import order_of
+from study_app.protocol.orders.durations import block_duration_s
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.special.level_axis import level_axis
 from study_app.viewmodels.designer.special.trial_strip import trial_strip

@@ -7,7 +7,7 @@ import pytest
 from study_app.app.designer.play.first_step import first_step
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import PageStep, Trial
-from study_app.session.preview import preview
+from study_app.session.simulated.preview import preview
 
 
 @pytest.mark.parametrize("name", ["rek2024", "thickness", "delayjnd"])

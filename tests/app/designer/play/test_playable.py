@@ -10,7 +10,7 @@ from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.orders.schedule import Trial
-from study_app.session.preview import preview
+from study_app.session.simulated.preview import preview
 
 pytestmark = pytest.mark.slow
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from study_app.gui.designer.form.row_fields import LanguagesField
+from study_app.gui.designer.form.languages_field import LanguagesField
 from study_app.gui.designer.form.special_editor import SpecialEditor
 
 QUESTIONS: Final = ("Statement", "Rating", "Slider", "Number", "Choice", "Text")
