@@ -7,11 +7,13 @@ import pickle
 import pytest
 
 from study_app import errors
+from study_app.app.designer.play.playable import NotPlayableError
 from study_app.authoring.study import Refused
 from study_app.authoring.versions.contents import ChangedOutsideError
 from study_app.devices.falcon.boot import BootFailure
 from study_app.devices.falcon.failures import FalconFailure, FalconLost, FalconNotFound, ProgramMissing, UsbFailure
 from study_app.devices.falcon.homing import NotHomed
+from study_app.devices.inverse3.failures import Inverse3Failure, Inverse3Lost, Inverse3NotFound
 from study_app.errors import Problem, ProtocolError, StudyError
 from study_app.workers.messages import Stopped
 
@@ -23,7 +25,7 @@ USB = UsbFailure("busy", "opening it", -6)
 EXAMPLES = [
     *(
         kind(f"what, value, hint of {kind.__name__}")
-        for kind in [*PLAIN, Stopped, Refused, ChangedOutsideError]
+        for kind in [*PLAIN, Stopped, Refused, ChangedOutsideError, NotPlayableError]
         if kind is not ProtocolError
     ),
     PROTOCOL,
@@ -31,6 +33,7 @@ EXAMPLES = [
     *(kind("busy", "opening it", -6) for kind in (UsbFailure, FalconNotFound, FalconLost)),
     BootFailure("echo", 2, "nothing came back", silent=True),
     NotHomed("limp"),
+    *(kind("silent", "it stopped answering") for kind in (Inverse3Failure, Inverse3Lost, Inverse3NotFound)),
 ]
 
 
