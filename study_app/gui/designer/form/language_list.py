@@ -37,6 +37,8 @@ class LanguageListField(Field):
             if len(codes) > 1:
                 away = shown.button("cross", f"Remove {entry.title} from every text")
                 away.clicked.connect(lambda _checked=False, code=code: self.asked.emit(ChangeLanguage("remove", code)))
+            else:
+                shown.row.addSpacing(10)
             self.box.addWidget(shown)
         self.names = Choice()
         self.names.setProperty("dense", "true")

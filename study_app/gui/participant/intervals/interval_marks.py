@@ -13,6 +13,16 @@ SQUARE = 16.0
 GAP = 10.0
 
 
+def interval_width(interval: Interval, words: Words, scale: float) -> float:
+    """Return the width that words and squares take [px]."""
+    return _words_width(interval, words, scale) + GAP * scale + interval.of * (SQUARE + GAP) * scale
+
+
+def _words_width(interval: Interval, words: Words, scale: float) -> float:
+    text = words.reached.format(reached=interval.number, of=interval.of)
+    return QFontMetricsF(font("statement", scale=scale, weight=600)).horizontalAdvance(text) + 4
+
+
 def draw_interval(
     painter: QPainter, width: float, middle: float, interval: Interval, words: Words, scale: float
 ) -> None:
@@ -24,8 +34,8 @@ def draw_interval(
     side, gap = SQUARE * scale, GAP * scale
     painter.save()
     painter.setFont(font("statement", scale=scale, weight=600))
-    wide = QFontMetricsF(painter.font()).horizontalAdvance(text) + 4
-    x = (width - wide - gap - interval.of * (side + gap)) / 2
+    wide = _words_width(interval, words, scale)
+    x = (width - interval_width(interval, words, scale)) / 2
     painter.setPen(QColor(PARTICIPANT.text))
     words_at = QRectF(x, middle - 20 * scale, wide, 40 * scale)
     if words.right_to_left:

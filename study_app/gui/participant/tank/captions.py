@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QRegion
 
-from study_app.gui.participant.intervals.interval_marks import draw_interval
+from study_app.gui.participant.intervals.interval_marks import draw_interval, interval_width
 from study_app.gui.participant.pages.key_caps import draw_key, key_size
 from study_app.gui.participant.pages.page_widget import mirrored, words_scale
 from study_app.gui.participant.pages.progress_line import BEGINNING, draw_progress
@@ -75,6 +75,9 @@ class Captions:
         head, small = 58 * scale, QFontMetricsF(self._small).height()
         count = 300 * scale
         across = width - 2 * margin - (count if isinstance(self._page.task, Reach) else 0)
+        if self._page.interval is not None:
+            marks = interval_width(self._page.interval, self._words, self._head_scale)
+            across = min(across, (width - marks) / 2 - margin - 24 * scale)
         self._head = self._placed(QRectF(margin, head - 20 * scale, across, 40 * scale))
         self._count = self._placed(QRectF(width - margin - count, head - 26 * scale, count, 70 * scale))
         start = max(margin, PATCH_ROOM + 12) if self._words.right_to_left else margin
