@@ -74,6 +74,7 @@ class StatementField(ScaleField):
             self.row.setSpacing(round(sizes.judge_gap))
         self.setFixedHeight(math.floor(sizes.pitch))
         area = self.row.parentWidget()
+        self.cells.parentWidget().updateGeometry()  # else the row remembers the size of earlier cells
         area.setFixedWidth(area.sizeHint().width())
         self._tell()
 

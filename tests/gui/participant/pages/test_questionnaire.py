@@ -310,6 +310,15 @@ def test_growing_window_brings_all_statements_back(qtbot: Any) -> None:
     assert shown.widget.tabs == []
 
 
+def test_cells_lie_side_by_side_after_the_window_has_grown(qtbot: Any) -> None:
+    shown = Shown(qtbot, questionnaire(), (1366, 768))
+    shown.widget.resize(1920, 1080)
+    QApplication.processEvents()
+    for row in shown.rows:
+        for one, other in pairwise(place_in(row, cell) for cell in row.options):
+            assert one.right() < other.left()
+
+
 def test_grid_keeps_cells_large_and_the_row_within_its_width() -> None:
     for width in range(800, 2600, 60):
         for height in range(600, 1500, 60):
