@@ -36,7 +36,7 @@ def _tidy_each(value: Any) -> Any:
         return tidy(_printable(value))
     if isinstance(value, dict) and value and all(isinstance(text, str) for text in value.values()):
         return {language: tidy(_printable(text)) for language, text in value.items()}
-    raise PydanticCustomError("text_type", 'a text is a string, or one string per language: {{en = "…", nl = "…"}}')
+    raise PydanticCustomError("text_type", 'a text is a string, or one string per language: {en = "…", nl = "…"}')
 
 
 def _printable(text: str) -> str:

@@ -127,7 +127,7 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
             )
         ),
         duration=f"about {extent.minutes}",
-        needs=f"Falcon or mouse; at most {protocol.device.force_limit_n:g} N",
+        needs=f"Haptic device or mouse; at most {protocol.device.force_limit_n:g} N",
     )
 
 

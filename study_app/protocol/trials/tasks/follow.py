@@ -14,7 +14,7 @@ from study_app.protocol.trials.tasks.stroke import Point, Radius, Stroke
 
 
 class Follow(Table):
-    """A target that moves as A r(t) sin 2πft along an axis, with a raised-cosine ramp r over ``lead_s``.
+    """A target that moves as A r(t) sin 2πft along an axis, with a raised-cosine ramp r over lead_s.
 
     It ends by time alone, after the lead and ``cycles`` whole swings; what follows the lead is judged.
     """
