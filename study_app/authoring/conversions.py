@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from study_app.authoring.additions import initial
+from study_app.authoring.changes.initial_values import initial
 from study_app.authoring.schema_nodes import node_at, table_of, tags
 from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Set, Unset

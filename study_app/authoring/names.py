@@ -10,7 +10,7 @@ from study_app.authoring.writer.edits import Edit, Rename, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.haptics.model.liquid import MAX_ID
 from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
-from study_app.protocol.source.document import Path, entries, has, names
+from study_app.protocol.source.document import Path, entries, has, names, value_at
 
 Document = Mapping[str, Any]
 ITEMS = "items"
@@ -18,7 +18,7 @@ ITEMS = "items"
 
 def named_at(document: Document, place: Path) -> Path | None:
     """Return the path of what the text at ``place`` names; None where it names nothing that is there."""
-    name = _value(document, place)
+    name = value_at(document, place)
     if not isinstance(name, str):
         return None
     for pattern, sections in CHOICES.items():
@@ -177,14 +177,6 @@ def _siblings(document: Document, thing: Path) -> Iterable[str]:
     for step in thing[:-1]:
         node = node[step] if has(node, step) else {}
     return tuple(node) if isinstance(node, Mapping) else ()
-
-
-def _value(document: Any, path: Path) -> Any:
-    for step in path:
-        if not has(document, step):
-            return None
-        document = document[step]
-    return document
 
 
 def _matches(place: Path, pattern: str) -> bool:

@@ -7,13 +7,14 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
+from study_app.authoring.changes.initial_values import initial
 from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Insert, Rename, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.checks.pace import paced
-from study_app.protocol.source.document import has
+from study_app.protocol.source.document import value_at
 from study_app.protocol.source.problems import Fault, shown
 
 _MEANT: Final = re.compile(r'did you mean "([^"]+)"\?')
@@ -48,15 +49,6 @@ def _removes(study: Study, fault: Fault, repair: Repair) -> bool:
     return (fault.path, fault.message) not in found and len(found) <= len(known)
 
 
-def _value(study: Study, path: tuple[str | int, ...]) -> Any:
-    value: Any = study.document
-    for step in path:
-        if not has(value, step):
-            return None
-        value = value[step]
-    return value
-
-
 def _meant(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield the word that was meant, for a key or a value."""
     if found := _MEANT.search(fault.hint):
@@ -67,8 +59,6 @@ def _meant(study: Study, fault: Fault) -> Iterator[Repair]:
 
 def _missing(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield an initial value for a key that is missing."""
-    from study_app.authoring.additions import initial  # noqa: PLC0415 - new elements need repairs, too
-
     if fault.message == "is missing" and fault.path:
         with suppress(Refused):
             yield Repair("Add it", (Set(fault.path, initial(study.document, fault.path)),))
@@ -92,8 +82,8 @@ def _constrained(study: Study, fault: Fault) -> Iterator[Repair]:
 
 def _targets(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield the nearest place in the tank for a target."""
-    found, point = _OUTSIDE.match(fault.message), _value(study, fault.path)
-    size = _value(study, ("device", "workspace_mm"))
+    found, point = _OUTSIDE.match(fault.message), value_at(study.document, fault.path)
+    size = value_at(study.document, ("device", "workspace_mm"))
     if found is None or not isinstance(point, tuple) or not isinstance(size, tuple):
         return
     axis = "xyz".index(found[1])
@@ -113,8 +103,8 @@ def _within_bounds(study: Study, fault: Fault) -> Iterator[Repair]:
 
 def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield a copy of the text in the first language, for languages that lack it."""
-    languages = _value(study, ("study", "languages"))
-    text = _value(study, fault.path)
+    languages = value_at(study.document, ("study", "languages"))
+    text = value_at(study.document, fault.path)
     if (found := _LANGUAGE.match(fault.message)) and isinstance(text, Mapping) and text:
         first = next(iter(text))
         yield Repair(f'Copy the text in "{first}"', (Set((*fault.path, found[1]), text[first]),))
@@ -125,7 +115,7 @@ def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
 
 def _steps(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield the place in the session that a page or block lacks."""
-    sequence = _value(study, ("sequence",))
+    sequence = value_at(study.document, ("sequence",))
     if fault.message == "comes nowhere in sequence" and isinstance(sequence, tuple):
         at = max(len(sequence) - 1, 0)
         yield Repair("Add to the session", (Insert(("sequence", at), fault.path[-1]),))
@@ -133,7 +123,7 @@ def _steps(study: Study, fault: Fault) -> Iterator[Repair]:
 
 def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield the highest level that is not beyond a limit."""
-    levels = _value(study, fault.path)
+    levels = value_at(study.document, fault.path)
     if fault.path[:1] != ("stimuli",) or fault.path[-1:] != ("levels",) or not isinstance(levels, tuple):
         return
     if len(levels) == 2 and all(isinstance(level, int | float) for level in levels):

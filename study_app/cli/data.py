@@ -40,8 +40,8 @@ def export(
     """Write the tidy tables of all participants, with a codebook."""
     if validator is not None and not psych_ds:
         raise click.UsageError("--validator checks the folder that --psych-ds writes: give both")
-    from study_app.analysis.export.export import Extra
     from study_app.analysis.export.export import export as export_study
+    from study_app.analysis.export.table_files import Extra
 
     asked: dict[Extra, bool] = {"wide": wide, "parquet": parquet, "sav": sav, "psych-ds": psych_ds}
     extras = [name for name, wanted in asked.items() if wanted]

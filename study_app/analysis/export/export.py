@@ -4,21 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import Final, Literal, TypeAlias
 
 from study_app.analysis.export import psychds_dataset, spss
-from study_app.analysis.export.codebook import codebook_bytes
-from study_app.analysis.export.delivered import Delivered
 from study_app.analysis.export.frame_csv import table_bytes
-from study_app.analysis.export.typed_tables import deliver
-from study_app.analysis.export.wide_table import wide
+from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_files, tables_of
 from study_app.analysis.tables.study import Study, load_study
 from study_app.store.output_files import write_files
-
-Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
-OPENED: Final = ("tracks", "thresholds", "settings")
-"""Tables of levels that SPSS files are made of."""
-NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
 
 
 def export(
@@ -59,26 +50,11 @@ def export(
 
 def export_files(study: Study, extras: Collection[Extra] = NOTHING_ELSE) -> dict[str, bytes]:
     """Return the tables and the codebook of a study, and the ``extras``, by the names of their files."""
-    tables = list(deliver(study))
-    responses = tables[0]
-    across, cells = wide(study) if extras else (None, {})
-    if across is not None and "wide" in extras:
-        tables.append(across)
-    files = {_name(study, table, "csv"): table_bytes(table) for table in tables}
-    columns = {_name(study, table, "csv"): table.columns for table in tables}
-    files["codebook.json"] = codebook_bytes(study, columns)
-    if "parquet" in extras:
-        from study_app.analysis.export.parquet import parquet_bytes  # noqa: PLC0415 - loads its library where it is asked for
-
-        files |= {_name(study, table, "parquet"): parquet_bytes(table) for table in tables}
-    if across is not None and "sav" in extras:
-        files[_name(study, responses, "sav")] = spss.long_sav(study, responses)
-        files[_name(study, across, "sav")] = spss.wide_sav(study, across, cells)
-        files |= {_name(study, one, "sav"): spss.plain_sav(study, one) for one in tables if one.name in OPENED}
-    if across is not None and "psych-ds" in extras:
-        held = {_name(study, table, "csv"): table for table in dict.fromkeys((*tables, across))}
-        contents = {name: files.get(name) or table_bytes(table) for name, table in held.items()}
-        described = {name: table.columns for name, table in held.items()}
+    files = table_files(study, extras)
+    if "psych-ds" in extras:
+        tables = {file_name(study, table, "csv"): table for table in tables_of(study, with_wide=True)}
+        contents = {name: files.get(name) or table_bytes(table) for name, table in tables.items()}
+        described = {name: table.columns for name, table in tables.items()}
         files |= psychds_dataset.dataset_files(study, contents, described, _report(study))
     return files
 
@@ -87,7 +63,3 @@ def _report(study: Study) -> dict[str, bytes]:
     from study_app.analysis.report.write_report import asks, report_files  # noqa: PLC0415 - only to share a study
 
     return report_files(study)[0] if asks(study) else {}
-
-
-def _name(study: Study, table: Delivered, ending: str) -> str:
-    return f"study-{study.name}_description-{table.name}_data.{ending}"

@@ -11,7 +11,7 @@ from typing import Any
 
 from study_app import __version__
 from study_app.analysis.evaluate import Progress, evaluate
-from study_app.analysis.export.export import export_files
+from study_app.analysis.export.table_files import table_files
 from study_app.analysis.figures.levels.level_figure import level_pictures
 from study_app.analysis.figures.levels.settings_figure import setting_pictures
 from study_app.analysis.figures.levels.track_figure import track_pictures
@@ -148,7 +148,7 @@ def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: F
     for one in drawn:
         files |= {f"{one.name}.{form}": content for form, content in one.files.items()}
         files[f"{one.name}.txt"] = f"{one.caption}\n".encode()
-    exported = failures.attempt("exported tables", lambda: export_files(study))
+    exported = failures.attempt("exported tables", lambda: table_files(study))
     files |= {} if isinstance(exported, Failure) else exported
     page_ = _page(study, results, drawn, texts, failures).encode()
     return {"report.html": page_, "report.json": number_files.document(study, results, texts, failures), **files}

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from study_app.authoring.additions import added, duplicated, fitted, singular
+from study_app.authoring.additions import added, duplicated, fitted
 from study_app.authoring.changes.fragments import pasted
+from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import filled_in, languages_of, with_language, without_language
 from study_app.authoring.changes.moves import moved
 from study_app.authoring.fields import label_of, row_at
@@ -17,9 +18,9 @@ from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Insert, Move, Set
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.instruments.instrument import instrument
-from study_app.protocol.source.document import Path, names
+from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import LANGUAGES
-from study_app.viewmodels.designer.form_rows import step_of, value_at
+from study_app.viewmodels.designer.form_rows import step_of
 from study_app.viewmodels.designer.problem_rows import element_of
 from study_app.viewmodels.designer.prompts import DeletePrompt
 from study_app.viewmodels.designer.requests import (

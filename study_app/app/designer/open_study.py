@@ -17,11 +17,12 @@ from study_app.authoring.versions.runs import Run, Standing, check_saving, stand
 from study_app.authoring.writer.edits import Set
 from study_app.authoring.writer.refused import Refused
 from study_app.errors import StoreError
+from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.source.liquid_files import unbundled, with_liquid_files
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import is_open
-from study_app.viewmodels.designer.form_rows import first_element, value_at
+from study_app.viewmodels.designer.form_rows import first_element
 from study_app.viewmodels.designer.outline_rows import FIRST
 from study_app.workspace import workspace
 

@@ -15,6 +15,15 @@ def has(node: Any, step: str | int) -> bool:
     return isinstance(node, Mapping) and step in node
 
 
+def value_at(document: Any, path: Path) -> Any:
+    """Return the value at ``path``, None where there is none."""
+    for step in path:
+        if not has(document, step):
+            return None
+        document = document[step]
+    return document
+
+
 def entries(document: Any, pattern: str) -> Iterator[tuple[Path, Any]]:
     """Yield what is at the places of ``pattern`` with their paths: "blocks.*.conditions.*", where ``*`` is any."""
     yield from _entries((), document, tuple(pattern.split(".")))

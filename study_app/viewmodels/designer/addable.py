@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
-from study_app.authoring.additions import singular
+from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import languages_of
 from study_app.authoring.fields import label_of, row_at, rows
 from study_app.authoring.outline import title_of

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from study_app.authoring.additions import singular
+from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.protocol.groups.group import sequences_in
-from study_app.protocol.source.document import Path, entries, has
+from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.line_numbers import Places, places_of
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
@@ -208,15 +208,6 @@ def first_element(document: Mapping[str, Any]) -> Path:
     """Return what is selected first: the first step of the session, else the study's own table."""
     steps = ((*place, 0) for place, listed in sequences_in(document) if listed)
     return next((named for step in steps if (named := named_at(document, step)) is not None), FIRST)
-
-
-def value_at(document: Any, path: Path) -> Any:
-    """Return the value at ``path``, None where there is none."""
-    for step in path:
-        if not has(document, step):
-            return None
-        document = document[step]
-    return document
 
 
 def _kind(path: Path) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
-from study_app.authoring.additions import singular
+from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.outline import Element, found, outline
 from study_app.authoring.study import Study
 from study_app.protocol.source.document import Path, names

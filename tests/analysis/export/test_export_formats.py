@@ -16,9 +16,10 @@ from click.testing import CliRunner
 from pyarrow import parquet
 
 from study_app.analysis.export import spss
-from study_app.analysis.export.export import Extra, export
+from study_app.analysis.export.export import export
 from study_app.analysis.export.psychds_dataset import FOLDER
 from study_app.analysis.export.spss import CANNOT_JUDGE, NOT_ANSWERED, names_of
+from study_app.analysis.export.table_files import Extra
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse

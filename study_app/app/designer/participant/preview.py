@@ -30,13 +30,12 @@ from study_app.gui.display.screens import choose_screens
 from study_app.protocol.forms.show_if import Value
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
-from study_app.protocol.source.document import Path
+from study_app.protocol.source.document import Path, value_at
 from study_app.session.pages import DesignPage, TaskPage
 from study_app.session.simulated.preview import preview
 from study_app.session.simulated.programmed_ball import ProgrammedBall
 from study_app.session.transitions.events import Chosen, Continue, LanguageChosen, Retracted, Submitted
 from study_app.session.transitions.previewed_pages import Moment, moments, previewed_page, tested_condition
-from study_app.viewmodels.designer.form_rows import value_at
 from study_app.viewmodels.designer.participant_page import (
     SIZES,
     ParticipantView,

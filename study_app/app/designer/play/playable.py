@@ -21,7 +21,7 @@ from study_app.errors import Problem, StudyError
 from study_app.protocol.groups.steps import numbered_parts
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, Step, Trial
-from study_app.protocol.source.document import Path, entries, has
+from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.liquid_files import with_liquid_files
 from study_app.session.simulated.preview import Preview, preview
 
@@ -115,7 +115,7 @@ def _edited(study: Study, edits: tuple[Edit, ...]) -> Study:
 def _filled_texts(study: Study, language: str) -> Iterator[Edit]:
     """Yield the edits that fill in the texts that languages lack that are not shown."""
     for fault in study.faults:
-        text = _value(study.document, fault.path)
+        text = value_at(study.document, fault.path)
         lacking = _LACKING.match(fault.message)
         if lacking and lacking[1] != language and isinstance(text, Mapping) and text:
             yield Set((*fault.path, lacking[1]), text.get(language) or next(iter(text.values())))
@@ -143,13 +143,13 @@ def _from_step(study: Study, path: Path, name: str) -> Study:
     edits: list[Edit] = [Unset(table) for table in tables if table not in needed]
     if "analysis" in document and any(table[0] == "analysis" for table in faulty):
         edits.append(Unset(("analysis",)))
-    written = {table[1]: _value(document, (*table, "part")) for table in _tables(document, "blocks")}
+    written = {table[1]: value_at(document, (*table, "part")) for table in _tables(document, "blocks")}
     parts = numbered_parts(
         [str(step[1]) for step in steps[first:] if step is not None],
         {str(block): part if isinstance(part, int) else None for block, part in written.items()},
     )
     edits += [Set(("blocks", block, "part"), part) for block, part in parts.items() if written[block] != part]
-    return _edited(study, (Set(("sequence",), list(_value(document, ("sequence",))[first:])), *edits))
+    return _edited(study, (Set(("sequence",), list(value_at(document, ("sequence",))[first:])), *edits))
 
 
 def _tables(document: Mapping[str, Any], section: str) -> list[Path]:
@@ -176,12 +176,3 @@ def _words(shown: Preview, step: Step, language: str) -> str:
         return title if step.of == 1 else f"{title}, trial {step.index} of {step.of}"
     table = protocol.pages[step.page_id] if isinstance(step, PageStep) else protocol.questionnaires[step.form]
     return protocol.text(table.title, language) if table.title is not None else _name(step)
-
-
-def _value(document: Mapping[str, Any], path: Path) -> Any:
-    value: Any = document
-    for step in path:
-        if not has(value, step):
-            return None
-        value = value[step]
-    return value

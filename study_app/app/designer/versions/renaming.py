@@ -11,8 +11,7 @@ from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.authoring.writer.comments import comments_naming
 from study_app.gui.designer.versions.rename_cards import CommentsCard, UnlockCard
 from study_app.gui.designer.view import DesignerPlace
-from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.form_rows import value_at
+from study_app.protocol.source.document import Path, value_at
 from study_app.viewmodels.designer.requests import RenameElement, Request
 from study_app.viewmodels.sessions import counted
 
