@@ -115,10 +115,14 @@ class DesignerController(QObject):
         self.show()
 
     def open(self, source: str) -> None:
-        """Open a study of the workspace, one that ships, or a file."""
+        """Open a study of the workspace, one that ships, or a file; one that is open stays, with its steps."""
         self.saving.leave()
         try:
             file = Path(source) if Path(source).suffix == ".toml" else find(source)
+            if self.editing.opened is not None and self.editing.opened.file.resolve() == file.resolve():
+                self.place.close_new()
+                self.enter()
+                return
             opened = self._others.get(file.resolve())
             if opened is None or not opened.edited:
                 draft = None if file.exists() else draft_of(file)

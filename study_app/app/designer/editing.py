@@ -48,7 +48,7 @@ class Editing(QObject):
         self.results = results
         self.opened: OpenStudy | None = None
         self._steps = Steps()
-        self._joins: tuple[object, float] = (None, 0.0)
+        self._last: tuple[object, float] = (None, 0.0)
         self._back: list[Place] = []
         self._made: Step | None = None
 
@@ -65,7 +65,7 @@ class Editing(QObject):
     def open(self, opened: OpenStudy) -> None:
         """Take another study from now on."""
         self.opened = opened
-        self._steps, self._joins, self._back = Steps(), (None, 0.0), []
+        self._steps, self._last, self._back = Steps(), (None, 0.0), []
         self.opened_other.emit()
 
     # selection
@@ -78,7 +78,7 @@ class Editing(QObject):
         if not back:
             self._back.append(opened.history.selected)
         self._steps.leave()
-        self._joins = (None, 0.0)
+        self._last = (None, 0.0)
         opened.history = replace(opened.history, selected=path)
         self.keep_selection()
         self.changed.emit()
@@ -106,7 +106,7 @@ class Editing(QObject):
                 text = retyped(opened.study.text, asked.text)
                 if text == opened.study.text:
                     return
-                opened.history = opened.history.typed("Edit the file", text, joins=self._joined("file"))
+                self._take(opened, opened.history.typed("Edit the file", text, joins=self._joins("file")), "file")
             else:
                 self._make(opened, self._steps.step(opened.study, asked, opened.history.selected))
         except Refused as refusal:
@@ -119,20 +119,21 @@ class Editing(QObject):
             self.made.emit(step)
 
     def _make(self, opened: OpenStudy, step: Step) -> None:
-        joins = step.continues is not None and self._joined(step.continues)
-        if step.continues is None:
-            self._joins = (None, 0.0)
         history = opened.history.typed(step.words, step.text) if step.text else opened.history
-        joins = joins or bool(step.text)
-        opened.history = history.edited(step.words, *step.edits, select=step.select, joins=joins)
+        joins = bool(step.text) or self._joins(step.continues)
+        self._take(opened, history.edited(step.words, *step.edits, select=step.select, joins=joins), step.continues)
         self._made = step
 
-    def _joined(self, key: object) -> bool:
-        """Return whether an edit continues the last step, and remember it."""
-        before, then = self._joins
-        now = time.monotonic()
-        self._joins = (key, now)
-        return key == before and now - then < JOIN_S
+    def _joins(self, key: object) -> bool:
+        """Return whether an edit continues the last step."""
+        before, then = self._last
+        return key is not None and key == before and time.monotonic() - then < JOIN_S
+
+    def _take(self, opened: OpenStudy, history: History, key: object = None) -> None:
+        """Take the history after a step, which edits of the same key may continue; an edit without effect is none."""
+        if history.study is not opened.history.study:
+            self._last = (key, time.monotonic())
+        opened.history = history
 
     def make(self, words: str, *edits: Edit, select: Place | None = None) -> None:
         """Make a step of edits.
@@ -143,15 +144,13 @@ class Editing(QObject):
             The step cannot be made; nothing is changed.
         """
         if (opened := self.writable) is not None:
-            opened.history = opened.history.edited(words, *edits, select=select)
-            self._joins = (None, 0.0)
+            self._take(opened, opened.history.edited(words, *edits, select=select))
             self._note()
 
     def type_text(self, words: str, text: str) -> None:
         """Give the file another text, as a step of its own."""
         if (opened := self.writable) is not None:
-            opened.history = opened.history.typed(words, text)
-            self._joins = (None, 0.0)
+            self._take(opened, opened.history.typed(words, text))
             self._note()
 
     def undo(self) -> None:
@@ -164,8 +163,7 @@ class Editing(QObject):
 
     def _travel(self, to: Callable[[History], History]) -> None:
         if (opened := self.writable) is not None:
-            opened.history = to(opened.history)
-            self._joins = (None, 0.0)
+            self._take(opened, to(opened.history))
             self._note()
 
     def _note(self) -> None:

@@ -70,6 +70,29 @@ def test_typing_in_one_field_is_one_step(designer: Any) -> None:
     assert designer.text == before
 
 
+def test_an_edit_without_effect_joins_no_later_edit_to_the_step_before(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    title = (*designer.editing.opened.history.selected, "title")
+    designer.editing.ask(RenameElement(("liquids", "thin"), "thinner"))
+    renamed = designer.text
+    designer.editing.select(title[:-1])
+    designer.editing.ask(SetText(title, "en", designer.editing.opened.study.document["pages"][title[1]]["title"]))
+    assert designer.text == renamed
+    designer.editing.ask(SetText(title, "en", "Hello"))
+    designer.editing.undo()
+    assert designer.text == renamed
+
+
+def test_opening_the_open_study_again_keeps_its_steps(designer: Any) -> None:
+    before = designer.file.read_text()
+    designer.controller.open("kitchen")
+    designer.editing.ask(SetValue(("study", "version"), "0.7"))
+    designer.controller.open(str(designer.file))
+    assert designer.saving.banner is None
+    designer.editing.undo()
+    assert designer.text == before
+
+
 def test_a_draft_is_kept_on_leaving_and_found_again_until_it_is_discarded(designer: Any) -> None:
     before = designer.file.read_text()
     designer.controller.open("kitchen")
