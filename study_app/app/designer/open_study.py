@@ -191,10 +191,12 @@ class OpenStudy:
         Refused
             The name is not permitted, or taken.
         StoreError
-            The draft of this one cannot be deleted.
+            The draft of the other cannot be written, or that of this one not be deleted.
         """
         file = check_free(name)
         made = OpenStudy(file, self.history.typed(f"Save as {name}", copy_of(self.study, name).text))
+        made.note_edit(0.0)
+        made.write_draft()
         self.discard_draft()
         return made
 

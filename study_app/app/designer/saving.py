@@ -206,7 +206,7 @@ class Saving(QObject):
 
     def _write(self, opened: OpenStudy) -> None:
         try:
-            opened.save(self.runs.known)
+            opened.save(self.runs.read())
         except ChangedOutsideError:
             self._say_changed()
             self.editing.announce()

@@ -19,6 +19,7 @@ from study_app.app.designer.controller import DesignerController
 from study_app.app.main_controller import MainController
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.versions.contents import kept_content, kept_versions
+from study_app.errors import StoreError
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.receipt import without_conditions
@@ -137,6 +138,31 @@ def test_what_changes_the_measure_can_be_saved_as_another_study(ran: Any, qtbot:
     assert (ran.file.read_bytes(), draft_of(ran.file)) == (before, None)
     ran.controller.open("kitchen")
     assert ran.text.encode() == before
+
+
+def test_another_study_that_cannot_be_saved_keeps_its_edits_as_a_draft(
+    ran: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_args: object) -> str:
+        raise StoreError("the disk is full")
+
+    monkeypatch.setattr("study_app.app.designer.open_study.save", full)
+    ran.editing.ask(SetValue(REPETITIONS, 3))
+    ran.saving.save_as_another("pantry")
+    draft = draft_of(ran.file.with_name("pantry.toml"))
+    assert ("The study was not saved", "the disk is full.") in ran.messages
+    assert draft is not None
+    assert draft.text == ran.text
+    assert "repetitions = 3" in ran.text
+    assert draft_of(ran.file) is None
+
+
+def test_another_study_is_not_saved_over_a_version_that_was_run_under_its_name(ran: Any) -> None:
+    run(ran, "P001", ran.file.read_bytes().replace(b'"1.0"', b'"0.1"'), study="pantry")
+    ran.editing.ask(SetValue(REPETITIONS, 3))
+    ran.saving.save_as_another("pantry")
+    assert not ran.file.with_name("pantry.toml").exists()
+    assert "version 0.1 was run by 1 session with another content" in ran.messages[-1][1]
 
 
 def test_changes_lists_what_differs_and_reverts_single_differences(ran: Any, qtbot: Any) -> None:
