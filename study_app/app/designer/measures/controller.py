@@ -88,7 +88,7 @@ class MeasuresController(QObject):
     def show(self) -> None:
         """Show the numbers of the study as it is now, and order those that are not known."""
         opened = self._editing.opened
-        if opened is None:
+        if opened is None or not self._place.isVisible():
             self.slow.want(())
             return
         study, path = opened.study, opened.history.selected

@@ -143,6 +143,9 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
 
     designer.window.go("home")
     assert not worker.works  # a session may begin: nothing is simulated any more
+    designer.controller.measures.fit.found.emit()  # as what was looked for when it was left
+    qtbot.wait(120)
+    assert not designer.controller.measures.slow.rest.isActive()
     designer.window.go("designer")
     designer.editing.make("Break", Set(("study", "version"), 1))
     qtbot.wait(120)
