@@ -80,6 +80,9 @@ class Feeling(QObject):
             return
         path: Path = ("liquids", before.id)
         document = opened.study.document
+        if value_at(document, path) is None:
+            self.place.message.emit("It was not put back", f"The study has no liquid {before.id} any more.")
+            return
         title = title_of(document, path)
         if file_of(value_at(document, path)) is not None:
             sentence = f"{title} is in a liquid file of its own. Save it there as a preset."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Final
@@ -15,6 +16,7 @@ from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.authoring.versions.contents import kept_versions
 from study_app.authoring.versions.runs import Run, run_of
 from study_app.authoring.writer.refused import Refused
+from study_app.errors import StoreError
 from study_app.gui.designer.pane.right_pane import PanePage
 from study_app.gui.designer.versions.changes_card import ChangesCard
 from study_app.gui.designer.view import DesignerPlace
@@ -91,8 +93,12 @@ class ChangesController(QObject):
 
     def _choices(self, opened: OpenStudy) -> tuple[VersionChoice, ...]:
         file = ""
-        if opened.base and opened.file.exists() and (opened.edited or opened.changed_outside()):
-            file = "The file as another program wrote it" if opened.changed_outside() else "The file, without the edits"
+        with suppress(StoreError):  # a file that cannot be read is no version to compare with
+            if opened.base and opened.file.exists():
+                if opened.changed_outside():
+                    file = "The file as another program wrote it"
+                elif opened.edited:
+                    file = "The file, without the edits"
         now = datetime.now().astimezone()
         return version_choices(self._known(), kept_versions(opened.file), file, now)
 
