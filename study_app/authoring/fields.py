@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, TypeAlias
 from study_app.authoring.names import choices_at, sections_at
 from study_app.authoring.schema_nodes import OWN, Node, alternatives, node_at, table_of, tags
 from study_app.haptics.model.ranges import REASON
-from study_app.protocol.source.document import Path, has
+from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.source.problems import rule_of, shown
 from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
 
@@ -104,7 +104,7 @@ class Row:
 
 def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
     """Return the rows of the table or array at ``path``: its keys in the order of its model, then unknown ones."""
-    nodes, value = node_at(document, path), _at(document, path)
+    nodes, value = node_at(document, path), value_at(document, path)
     node = table_of(nodes, value)
     if node is None:
         return ()
@@ -120,13 +120,13 @@ def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
 
 def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Return the sections that the model of a table declares: each heading with its keys; keys in none come last."""
-    node = table_of(node_at(document, path), _at(document, path)) or {}
+    node = table_of(node_at(document, path), value_at(document, path)) or {}
     return tuple((heading, tuple(keys)) for heading, keys in node.get(SECTIONS, ()))
 
 
 def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
     """Return the keys that do not belong to a table with what it gives."""
-    table = _at(document, path)
+    table = value_at(document, path)
     node = table_of(node_at(document, path), table) or {}
     if not isinstance(table, Mapping):
         return frozenset()
@@ -136,8 +136,8 @@ def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
 
 def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
     """Return the row of one place; None where it is in nothing that a model knows."""
-    siblings, value = node_at(document, path[:-1]), _at(document, path)
-    around = table_of(siblings, _at(document, path[:-1]))
+    siblings, value = node_at(document, path[:-1]), value_at(document, path)
+    around = table_of(siblings, value_at(document, path[:-1]))
     if around is None:
         return None
     key, named = tags(siblings)
@@ -262,11 +262,3 @@ def _first_sentence(node: Node) -> str:
 def _sentences(description: str) -> dict[str, str]:
     """Return the sentence of each value in a description such as "fixed: as written; shuffled: anew in every trial"."""
     return {value: match[2].strip() for match in _SENTENCES.finditer(description) for value in match[1].split(", ")}
-
-
-def _at(document: Any, path: Path) -> Any:
-    for step in path:
-        if not has(document, step):
-            return None
-        document = document[step]
-    return document

@@ -18,7 +18,7 @@ from study_app.authoring.writer.refused import Refused
 from study_app.authoring.writer.spans import spans_of
 from study_app.authoring.writer.splices import Editor, applied
 from study_app.authoring.writer.values import tables
-from study_app.protocol.source.document import Path, entries, frozen, has, names
+from study_app.protocol.source.document import Path, entries, frozen, names, value_at
 
 MOST_LINES: Final = 200
 SHORT: Final = 40
@@ -49,9 +49,7 @@ def copied(study: Study, paths: Sequence[Path]) -> str:
     spans = spans_of(study.text)
     found: list[str] = []
     for path in paths:
-        value: Any = study.document
-        for step in path:
-            value = value[step] if has(value, step) else None
+        value = value_at(study.document, path)
         if not isinstance(value, Mapping) or len(path) < 2:
             continue
         pieces = spans.pieces(path)

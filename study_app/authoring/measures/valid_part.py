@@ -12,7 +12,7 @@ from study_app.authoring.measures.texts import text_keys
 from study_app.authoring.study import Study
 from study_app.protocol.load import examined
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.document import Path, has
+from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.source.problems import Fault
 
 ROUNDS: Final = 8
@@ -76,7 +76,7 @@ def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]
     """
     path = fault.path
     if (missing := _MISSING.search(fault.message)) is not None and path and path[-1] != missing[1]:
-        known = _at(document, path)
+        known = value_at(document, path)
         others = known.values() if isinstance(known, Mapping) else ()
         return (*path, missing[1]), next(iter(others), TEXT)
     if fault.message == "unknown key":
@@ -90,12 +90,12 @@ def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]
         return path[:2], _STAND_IN[path[0], path[1]]  # type: ignore[index]
     if path[:1] and path[0] in _LEFT_OUT:
         return path[:1], None
-    listed = len(path) > 1 and isinstance(path[-1], int) and isinstance(_at(document, path), str)
+    listed = len(path) > 1 and isinstance(path[-1], int) and isinstance(value_at(document, path), str)
     if listed:
         return path, None
     if of_others and len(path) > 2 and _is_there(document, path[:3]):
         return path[:3], None
-    return (path[:2], None) if len(path) > 1 and isinstance(_at(document, path[:2]), Mapping) else ((), None)
+    return (path[:2], None) if len(path) > 1 and isinstance(value_at(document, path[:2]), Mapping) else ((), None)
 
 
 def _text(document: Any) -> Any:
@@ -103,16 +103,8 @@ def _text(document: Any) -> Any:
     return dict.fromkeys(codes, TEXT) if len(codes) > 1 else TEXT
 
 
-def _at(document: Any, path: Path) -> Any:
-    for step in path:
-        if not has(document, step):
-            return None
-        document = document[step]
-    return document
-
-
 def _is_there(document: Any, path: Path) -> bool:
-    return _at(document, path) is not None
+    return value_at(document, path) is not None
 
 
 def _with(document: Any, path: Path, value: Any) -> Any:
