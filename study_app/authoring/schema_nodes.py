@@ -67,7 +67,8 @@ def _is_of(node: Node, tables: list[Node], value: Mapping[str, Any]) -> bool:
     if not key:
         return True
     default = next((name for name, one in named.items() if one["properties"].get(key, {}).get("default") == name), None)
-    return named.get(value.get(key, None if None in named else default)) is node
+    chosen = value.get(key, None if None in named else default)
+    return (chosen is None or isinstance(chosen, str)) and named.get(chosen) is node
 
 
 def _tells_apart(key: str, tables: list[Node]) -> bool:

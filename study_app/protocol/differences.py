@@ -104,8 +104,11 @@ def _differences(place: Place, old: Any, new: Any) -> Iterator[Difference]:
 
 
 def _by_id(value: Any) -> bool:
-    """Whether it is a list of tables with ids."""
-    return isinstance(value, list) and all(isinstance(entry, Mapping) and "id" in entry for entry in value)
+    """Whether it is a list of tables with ids, each of which is there once."""
+    if not isinstance(value, list):
+        return False
+    ids = [entry.get("id") if isinstance(entry, Mapping) else None for entry in value]
+    return all(isinstance(one, str) for one in ids) and len(set(ids)) == len(ids)
 
 
 def _listed(place: Place, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]) -> Iterator[Difference]:

@@ -62,7 +62,8 @@ def _initial(document: Mapping[str, Any], row: Row, node: Node) -> Any:
         return [[x] + [0] * (size - 1) for x in (-20, 20)][: max(2, node.get("minItems", 2))]
     if kind == "texts":
         return [label_of(f"text_{number}") for number in range(1, node.get("minItems", 1) + 1)]
-    if kind == "tables" and node.get("additionalProperties", {}).get("type") == "array":
+    entry = node.get("additionalProperties")
+    if kind == "tables" and isinstance(entry, Mapping) and entry.get("type") == "array":
         points = [f"Point {number}" for number in range(1, POINTS + 1)]
         return {str(language): points for _, language in entries(document, "study.languages.*")}
     return _tables(document, path, node) if kind == "list" else {}

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
+from study_app.authoring.changes.languages import languages_of
 from study_app.authoring.fields import is_localised, label_of
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import alternatives
@@ -34,7 +35,7 @@ class Revealing:
 
 def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
     """Return for each language how many texts it has, and how many it should have."""
-    languages = [str(code) for code in study.document.get("study", {}).get("languages", ())] or ["en"]
+    languages = languages_of(study)
     counted = {code: [0, 0] for code in languages}
     for _, value in _texts(study.document):
         for place, code in enumerate(languages):

@@ -12,7 +12,7 @@ from study_app.authoring.measures.texts import text_keys
 from study_app.authoring.study import Study
 from study_app.protocol.load import examined
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.document import Path, value_at
+from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.problems import Fault
 
 ROUNDS: Final = 8
@@ -99,7 +99,7 @@ def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]
 
 
 def _text(document: Any) -> Any:
-    codes = [str(code) for code in document.get("study", {}).get("languages", ())]
+    codes = [str(code) for _, code in entries(document, "study.languages.*")]
     return dict.fromkeys(codes, TEXT) if len(codes) > 1 else TEXT
 
 

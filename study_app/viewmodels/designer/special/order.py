@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 from study_app.authoring.fields import Row
 from study_app.authoring.study import Study
 from study_app.protocol.orders.latin_squares import borders_even, row_count
-from study_app.protocol.source.document import has
+from study_app.protocol.source.document import value_at
 from study_app.viewmodels.designer.row_facts import RowFacts
 from study_app.viewmodels.tones import Tone
 
@@ -29,9 +29,7 @@ class OrderBalance:
 
 def order_balance(study: Study, row: Row) -> OrderBalance | None:
     """Return how balanced the order of a block is; None where it has one condition, or another method orders it."""
-    block: Any = study.document
-    for step in row.path[:-1]:
-        block = block[step] if has(block, step) else {}
+    block = value_at(study.document, row.path[:-1])
     conditions = block.get("conditions") if isinstance(block, Mapping) else None
     if not isinstance(conditions, tuple) or len(conditions) < 2 or "design" in block:
         return None
@@ -40,7 +38,7 @@ def order_balance(study: Study, row: Row) -> OrderBalance | None:
         return OrderBalance(
             "neutral", "ring", "same for all", "Effects of condition and of position cannot be separated."
         )
-    if order not in SQUARES:
+    if not isinstance(order, str) or order not in SQUARES:
         return OrderBalance(
             "neutral", "ring", "even on average", "Drawn anew in every session: positions are even on average only."
         )

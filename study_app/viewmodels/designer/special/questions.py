@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from study_app.authoring.fields import Row, label_of
 from study_app.authoring.study import Study
-from study_app.protocol.source.document import Path, entries, has
+from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.row_facts import RowFacts
 
@@ -55,12 +55,10 @@ class QuestionLines:
 
 def question_lines(study: Study, path: Path) -> QuestionLines:
     """Return a line for each question of the list at ``path``."""
-    document: Any = study.document
-    codes = [str(code) for _, code in entries(document, "study.languages.*")] or ["en"]
-    for step in path:
-        document = document[step] if has(document, step) else ()
-    items = document if isinstance(document, tuple) else ()
-    numbers = {item.get("id"): at for at, item in enumerate(items, start=1) if isinstance(item, Mapping)}
+    codes = [str(code) for _, code in entries(study.document, "study.languages.*")] or ["en"]
+    listed = value_at(study.document, path)
+    items = listed if isinstance(listed, tuple) else ()
+    numbers = {str(item.get("id")): at for at, item in enumerate(items, start=1) if isinstance(item, Mapping)}
     lines = tuple(
         _line(study, (*path, at), item, codes, numbers) for at, item in enumerate(items) if isinstance(item, Mapping)
     )
@@ -68,7 +66,7 @@ def question_lines(study: Study, path: Path) -> QuestionLines:
 
 
 def _line(
-    study: Study, path: Path, item: Mapping[str, Any], codes: list[str], numbers: Mapping[Any, int]
+    study: Study, path: Path, item: Mapping[str, Any], codes: list[str], numbers: Mapping[str, int]
 ) -> QuestionLine:
     kind, text = str(item.get("kind", STATEMENT)), item.get("text", "")
     texts = [text.get(code, "") for code in codes] if isinstance(text, Mapping) else [text, *[""] * (len(codes) - 1)]
@@ -78,11 +76,11 @@ def _line(
     return QuestionLine(path, number, kind, ICONS.get(kind, "scale"), shown, _note(item, numbers), faults)
 
 
-def _note(item: Mapping[str, Any], numbers: Mapping[Any, int]) -> str:
+def _note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
     rule = item.get("show_if")
     if not isinstance(rule, Mapping):
         return ""
-    name, values = rule.get("item"), rule.get("is", ())
+    name, values = str(rule.get("item")), rule.get("is", ())
     words = [label_of(str(value)) for value in (values if isinstance(values, tuple) else (values,))]
     limits = [f"{label_of(key).lower()} {rule[key]:g}" for key in ("at_least", "at_most")
               if isinstance(rule.get(key), int | float)]  # fmt: skip
