@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Final
@@ -15,7 +14,6 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
 
 MOST_PARTICIPANTS: Final = 200
-_MISSING: Final = re.compile(r'is missing in "([a-z]{2})"$')
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +54,8 @@ def facts(study: Study) -> Facts:
     """Return the facts of a study."""
     missing: dict[str, int] = {}
     for fault in study.faults:
-        if found := _MISSING.match(fault.message):
-            missing[found[1]] = missing.get(found[1], 0) + 1
+        if (code := fault.missing_language) is not None:
+            missing[code] = missing.get(code, 0) + 1
     valid = valid_part(study)
     if (protocol := valid.protocol) is None:
         return Facts(missing=missing)

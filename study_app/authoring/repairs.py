@@ -19,7 +19,6 @@ from study_app.protocol.source.problems import Fault, shown
 
 _MEANT: Final = re.compile(r'did you mean "([^"]+)"\?')
 _BOUND: Final = re.compile(r"must be (?:at least |at most )?([\d.e+-]+)(?: |$)")
-_LANGUAGE: Final = re.compile(r'is missing in "([a-z]{2})"$')
 _ORDER: Final = re.compile(r'belongs to order = "([a-z]+)"')
 _OUTSIDE: Final = re.compile(r"([xyz]) = [-\d.e+]+ mm with radius ([\d.e+-]+) mm leaves the tank")
 _HALVINGS: Final = 12
@@ -105,10 +104,10 @@ def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield a copy of the text in the first language, for languages that lack it."""
     languages = value_at(study.document, ("study", "languages"))
     text = value_at(study.document, fault.path)
-    if (found := _LANGUAGE.match(fault.message)) and isinstance(text, Mapping) and text:
+    if (lacking := fault.missing_language) and isinstance(text, Mapping) and text:
         first = next(iter(text))
-        yield Repair(f'Copy the text in "{first}"', (Set((*fault.path, found[1]), text[first]),))
-    elif fault.message.startswith("is in one language") and isinstance(text, str) and languages:
+        yield Repair(f'Copy the text in "{first}"', (Set((*fault.path, lacking), text[first]),))
+    elif fault.in_one_language and isinstance(text, str) and languages:
         copies = dict.fromkeys(languages, text)
         yield Repair("Use this text in every language", (Set(fault.path, copies),))
 

@@ -19,7 +19,6 @@ ROUNDS: Final = 8
 """Leaving one element out may break those that name it: so often the rest is examined again."""
 _PART: Final = re.compile(r"must be (\d+) at its place in sequence")
 TEXT: Final = "…"
-_MISSING: Final = re.compile(r'is missing in "([a-z]{2})"$')
 _STAND_IN: Final = {("study", "version"): "1", ("study", "name"): "study", ("study", "title"): TEXT}
 _LEFT_OUT: Final = ("analysis", "limits")
 """Tables that no session needs."""
@@ -75,10 +74,10 @@ def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]
     A key that is wrong only because another element was left out (``of_others``) is left out before its own element.
     """
     path = fault.path
-    if (missing := _MISSING.search(fault.message)) is not None and path and path[-1] != missing[1]:
+    if (missing := fault.missing_language) is not None and path and path[-1] != missing:
         known = value_at(document, path)
         others = known.values() if isinstance(known, Mapping) else ()
-        return (*path, missing[1]), next(iter(others), TEXT)
+        return (*path, missing), next(iter(others), TEXT)
     if fault.message == "unknown key":
         return path, None
     if (part := _PART.search(fault.message)) is not None:

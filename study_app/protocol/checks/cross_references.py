@@ -11,7 +11,7 @@ from typing import Any
 
 from study_app.protocol.groups.group import SEQUENCES, sequences_in
 from study_app.protocol.source.document import Path, entries, names
-from study_app.protocol.source.problems import Fault, did_you_mean
+from study_app.protocol.source.problems import MISSING_TEXT, ONE_LANGUAGE, Fault, did_you_mean
 from study_app.protocol.wording.languages import LANGUAGES
 
 REFERENCES = {
@@ -199,11 +199,11 @@ def languages(document: Document) -> Iterator[Fault]:
 def _translations(path: Path, text: Any, wanted: tuple[str, ...]) -> Iterator[Fault]:
     if isinstance(text, str) and len(wanted) > 1:
         listed = ", ".join(f'{language} = "…"' for language in wanted)
-        yield Fault(path, "is in one language, the study in several", f"write {{ {listed} }}")
+        yield Fault(path, ONE_LANGUAGE, f"write {{ {listed} }}")
     elif isinstance(text, Mapping):
         for language in wanted:
             if language not in text:
-                yield Fault(path, f'is missing in "{language}"', "every text exists in every language of the study")
+                yield Fault(path, MISSING_TEXT.format(language), "every text exists in every language of the study")
         for language in text:
             if language not in wanted:
                 yield Fault((*path, language), "is not a language of the study", f"these are: {', '.join(wanted)}")

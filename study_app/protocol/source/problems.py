@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -17,6 +18,11 @@ from study_app.protocol.source.line_numbers import Places
 Schema = Mapping[str, Any]
 
 
+MISSING_TEXT: Final = 'is missing in "{}"'
+ONE_LANGUAGE: Final = "is in one language, the study in several"
+_MISSING: Final = re.compile(MISSING_TEXT.format("([a-z]{2})"))
+
+
 class Fault(NamedTuple):
     """A problem before its line is known; indices in ``path`` count from 0."""
 
@@ -24,6 +30,17 @@ class Fault(NamedTuple):
     message: str
     hint: str = ""
     counts_entries: bool = False
+
+    @property
+    def missing_language(self) -> str | None:
+        """The language that a text lacks; None where another thing is wrong."""
+        found = _MISSING.fullmatch(self.message)
+        return None if found is None else found[1]
+
+    @property
+    def in_one_language(self) -> bool:
+        """Whether it is a plain text in a study of several languages."""
+        return self.message == ONE_LANGUAGE
 
     def located(self, places: Places) -> Problem:
         """Return the problem with its line; in the place that people read, entries count from 1."""

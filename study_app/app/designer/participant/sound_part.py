@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
@@ -16,8 +15,6 @@ from study_app.protocol.source.problems import Fault
 
 ROUNDS: Final = 12
 """What is left out may be missing elsewhere: so often faults are looked for again."""
-MISSING: Final = re.compile(r'is missing in "([a-z]{2})"$')
-ONE_LANGUAGE: Final = "is in one language"
 _NOTHING: Final = object()
 
 
@@ -57,10 +54,10 @@ def _mended(document: dict[str, Any], faults: Iterable[Fault], before: Mapping[s
     found: Any = document
     for fault in faults:
         value, sound = _at(found, fault.path), _at(before, fault.path)
-        if fault.message.startswith(ONE_LANGUAGE) and isinstance(value, str):
+        if fault.in_one_language and isinstance(value, str):
             found = _with(found, fault.path, dict.fromkeys(languages, value))
-        elif (lacking := MISSING.match(fault.message)) and isinstance(value, Mapping) and value:
-            found = _with(found, fault.path, {**value, lacking[1]: next(iter(value.values()))})
+        elif (lacking := fault.missing_language) and isinstance(value, Mapping) and value:
+            found = _with(found, fault.path, {**value, lacking: next(iter(value.values()))})
         elif sound is not _NOTHING and sound != value:
             found = _with(found, fault.path, sound)
         elif value is not _NOTHING:

@@ -6,12 +6,11 @@ begins with the step that shows the element, and what no later step needs is lef
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from study_app.app.designer.participant.shown_step import StepPosition
+from study_app.app.designer.participant.shown_step import StepPosition, step_name
 from study_app.app.designer.play.first_step import first_step, graph_of, reached
 from study_app.authoring.names import named_at
 from study_app.authoring.study import Study
@@ -20,12 +19,12 @@ from study_app.authoring.writer.refused import Refused
 from study_app.errors import Problem, StudyError
 from study_app.protocol.groups.steps import numbered_parts
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import PageStep, Step, Trial
+from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.liquid_files import with_liquid_files
 from study_app.session.simulated.preview import Preview, preview
+from study_app.viewmodels.designer.participant_page import step_words
 
-_LACKING: Final = re.compile(r'is missing in "([a-z]{2})"$')
 _STEPS: Final = ("pages", "blocks")
 """Sections whose tables must come in the sequence."""
 _PARTS: Final = ("questionnaires", "tasks", "conditions", "liquids", "scales", "stimuli", "designs", "methods")
@@ -99,7 +98,7 @@ def playable(study: Study, path: Path, position: StepPosition | None = None) -> 
         with_liquid_files(found.text.encode(), found.folder),
         found.protocol,
         step,
-        _words(shown, shown.schedule.steps[step], language),
+        step_words(shown, shown.schedule.steps[step], language),
         StepPosition(position.name, position.trial, language, position.seed),
     )
 
@@ -116,10 +115,10 @@ def _filled_texts(study: Study, language: str) -> Iterator[Edit]:
     """Yield the edits that fill in the texts that languages lack that are not shown."""
     for fault in study.faults:
         text = value_at(study.document, fault.path)
-        lacking = _LACKING.match(fault.message)
-        if lacking and lacking[1] != language and isinstance(text, Mapping) and text:
-            yield Set((*fault.path, lacking[1]), text.get(language) or next(iter(text.values())))
-        elif fault.message.startswith("is in one language") and isinstance(text, str):
+        lacking = fault.missing_language
+        if lacking and lacking != language and isinstance(text, Mapping) and text:
+            yield Set((*fault.path, lacking), text.get(language) or next(iter(text.values())))
+        elif fault.in_one_language and isinstance(text, str):
             languages = [str(one) for _, one in entries(study.document, "study.languages.*")]
             yield Set(fault.path, dict.fromkeys(languages, text))
 
@@ -159,20 +158,6 @@ def _tables(document: Mapping[str, Any], section: str) -> list[Path]:
 def _step_at(shown: Preview, position: StepPosition) -> int:
     """Return the index of the step at a position; the nearest trial of its block, or the first step."""
     steps = list(enumerate(shown.schedule.steps))
-    named = [at for at, step in steps if position.name in {_name(step)}]
+    named = [at for at, step in steps if step_name(step) == position.name]
     exact = [at for at in named if isinstance(step := steps[at][1], Trial) and step.index == position.trial]
     return next(iter([*exact, *named]), 0)
-
-
-def _name(step: Step) -> str:
-    return step.block if isinstance(step, Trial) else step.page_id if isinstance(step, PageStep) else step.form
-
-
-def _words(shown: Preview, step: Step, language: str) -> str:
-    """Return what a step is called: "Welcome", "Liquids, trial 3 of 6"."""
-    protocol = shown.protocol
-    if isinstance(step, Trial):
-        title = protocol.text(protocol.blocks[step.block].title, language)
-        return title if step.of == 1 else f"{title}, trial {step.index} of {step.of}"
-    table = protocol.pages[step.page_id] if isinstance(step, PageStep) else protocol.questionnaires[step.form]
-    return protocol.text(table.title, language) if table.title is not None else _name(step)

@@ -12,7 +12,6 @@ from study_app.viewmodels.designer.outline_rows import OutlineRow
 
 ROW_PX, HEADING_PX = 32, 38
 INDENT = 20
-GRIP_PX = 14
 """So wide is the grip at the left of a row that can be dragged."""
 ROW_ROLE = Qt.ItemDataRole.UserRole + 1
 Index = QModelIndex | QPersistentModelIndex

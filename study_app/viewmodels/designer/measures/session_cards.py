@@ -36,7 +36,6 @@ MOST_CODES: Final = 8
 """Of more codes only how even they are is said."""
 MOST_ROWS: Final = 6
 """Positions that are shown of a long block."""
-NO_ICON: Final[Verdict] = ("neutral", "", "")
 
 
 def session_card(study: Study, facts: Facts, path: Path, parts: int | None = None) -> SessionCard:
