@@ -11,6 +11,7 @@ from study_app import __version__
 from study_app.analysis.export.codebook import codebook_bytes
 from study_app.analysis.tables.compared_blocks import spoken, text_in
 from study_app.analysis.tables.study import Study
+from study_app.errors import ProtocolError
 from study_app.protocol.source.files import at_hand, find, protocol_hash, source_bytes
 from study_app.protocol.source.liquid_files import unbundled
 from study_app.store.tables.cells import variable
@@ -54,10 +55,13 @@ def _own_files(study: Study) -> Iterator[tuple[str, bytes]]:
         return
     hashes = set(study.participants["protocol_hash"])
     for name in at_hand():
-        source = source_bytes(name)
+        try:
+            file, source = find(name), source_bytes(name)
+        except ProtocolError:  # of another study, perhaps: what cannot be read cannot be shared
+            continue
         if protocol_hash(source) in hashes:
             content, liquids = unbundled(source)
-            yield find(name).name, content
+            yield file.name, content
             inside = {name: text for name, text in liquids.items() if ".." not in PurePosixPath(name).parts}
             yield from ((name, text.encode()) for name, text in inside.items() if not PurePosixPath(name).is_absolute())
             return

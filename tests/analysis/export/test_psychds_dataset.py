@@ -66,8 +66,10 @@ def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path,
 
 
 def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path, tmp_path: Path) -> None:
+    (tmp_path / "protocols" / "gone.toml").symlink_to(tmp_path / "nowhere.toml")  # another study, not there any more
     export(kitchen, tmp_path / "out", extras=["psych-ds"])
     folder = tmp_path / "out" / FOLDER
+    assert (folder / "materials" / "kitchen.toml").is_file()
     described = json.loads((folder / "dataset_description.json").read_bytes())
     assert {name for one in described["variableMeasured"] for name in one} <= OF_SCHEMA_ORG
     assert described["author"] == ["A. Kox", "B. Lam"]
