@@ -122,6 +122,14 @@ def maker_force_n(loaded: ctypes.CDLL) -> list[float]:
     return list(force)
 
 
+def write_force(device, context: int | None = None, asked_n=(1.0, 0.0, 0.0)) -> tuple[int, list[float]]:
+    """Return what WRITE answers, and the force that it says it sent."""
+    command = layout.new_command()
+    command[0].force_n = command[0].sent_n = asked_n
+    write = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_ssize_t, ctypes.c_ssize_t)(device.write.address)
+    return write(device.context if context is None else context, command.ctypes.data), command[0].sent_n.tolist()
+
+
 def until(reached, what: str) -> None:
     began = time.monotonic()
     while not reached():
@@ -203,11 +211,9 @@ class TestTemplate:
         with open_device(name, force_limit_n=2.0) as device:
             from liquid_study_example.driver import library
 
-            command = layout.new_command()
-            command[0].force_n = command[0].sent_n = asked_n
-            write = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_ssize_t, ctypes.c_ssize_t)(device.write.address)
-            assert write(device.context, command.ctypes.data) == 0
-            assert command[0].sent_n.tolist() == pytest.approx(sent_n)
+            answer, said_n = write_force(device, asked_n=asked_n)
+            assert answer == 0
+            assert said_n == pytest.approx(sent_n)
             x_n, y_n, z_n = sent_n
             if any(sent_n):
                 until(lambda: maker_force_n(library()) == pytest.approx([z_n, x_n, y_n]), "the force is not sent")
@@ -217,9 +223,24 @@ class TestTemplate:
         with open_device("example-mailbox") as device:
             from liquid_study_example.driver import library
 
-            command = layout.new_command()
-            command[0].force_n = command[0].sent_n = (1.0, 0.0, 0.0)
-            write = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_ssize_t, ctypes.c_ssize_t)(device.write.address)
-            write(device.context, command.ctypes.data)
+            write_force(device)
             until(lambda: any(maker_force_n(library())), "the force is not sent")
             until(lambda: not any(maker_force_n(library())), "the force goes on")
+
+    def test_mailbox_ends_the_force_where_the_device_is_lost(self):
+        with open_device("example-mailbox") as device:
+            from liquid_study_example.driver import library
+
+            write_force(device)
+            until(lambda: any(maker_force_n(library())), "the force is not sent")
+            library().maker_pull_cable()
+            until(lambda: not any(maker_force_n(library())), "the force goes on")
+
+    @pytest.mark.parametrize("name", ["example-direct", "example-mailbox"])
+    def test_servo_that_goes_on_after_close_sends_no_force(self, name: str):
+        with open_device(name) as device:
+            from liquid_study_example.driver import library
+
+            context = device.context
+        write_force(device, context)
+        assert maker_force_n(library()) == [0.0, 0.0, 0.0]

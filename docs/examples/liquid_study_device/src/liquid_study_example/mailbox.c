@@ -53,10 +53,11 @@ static struct {
 
 static void tick(void *unused) {
     sample now;
-    double force_n[3];
+    double force_n[3] = {0.0, 0.0, 0.0};
     (void)unused;
-    if (maker_get(now.position_mm, now.velocity_mmps, &now.time_ns) != 0) {
-        device.lost = 1;
+    if (device.lost || maker_get(now.position_mm, now.velocity_mmps, &now.time_ns) != 0) {
+        device.lost = 1; /* for good: a device that answers again gets no force either */
+        maker_set_force(force_n);
         return;
     }
     if (now.time_ns - device.acting_ns >= ACTS_NS) {
