@@ -203,6 +203,39 @@ def test_silent_host_ends_the_force():
         servo.stop()
 
 
+def test_position_that_is_not_finite_is_passed_over():
+    from study_app.devices.bench.excitation import BenchDriver, Excitation
+    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.servo import Servo
+    from tests.haptics.probe import Probe
+
+    probe = Probe(velocity_mps=(0.0, 0.0, 0.0))
+    probe.state.bad_at_read = 300
+    driver = BenchDriver(probe, 4.0)
+    servo = Servo(driver, clock=VirtualClock(), elements=1)
+    driver.state.alive_ns = 10**12
+    driver.excite(Excitation(stiffness_npm=100.0, damping_nspm=6.0, push_n=(1.0, 0.0, 0.0)))
+    servo.advance(1000)
+    assert probe.forces_n[-1] == pytest.approx([1.0, 0.0, 0.0])
+    assert np.diff(probe.forces_n[:, 0]).min() >= 0.0
+    servo.stop()
+    assert not probe.forces_n[-1].any()
+
+
+def test_fault_during_a_bench_has_the_message_of_the_driver():
+    from study_app.devices.bench.excitation import BenchDriver
+    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.servo import Servo
+
+    with opened("inverse3-emulated") as device:
+        servo = Servo(BenchDriver(device, 4.0), clock=VirtualClock(), elements=1)
+        servo.advance(10)
+        device.hand.take("closes")
+        servo.advance(100)
+        assert "the Inverse Service closed the connection" in servo.fault
+        servo.stop()
+
+
 def test_force_of_an_excitation_never_exceeds_its_limit():
     from study_app.devices.bench.excitation import BenchDriver, Excitation
     from study_app.haptics.runtime.clocks.clock import VirtualClock

@@ -26,7 +26,8 @@ from study_app.haptics.kernels.c_functions import (
     record_at,
 )
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.vector import clear, copy, norm, square_distance
+from study_app.haptics.kernels.sample_validation import can_have_moved
+from study_app.haptics.kernels.vector import clear, copy, is_finite, norm, square_distance
 from study_app.haptics.model.layout import BUTTON_STOP, COMMAND, READING, records
 
 RUNNING, OSCILLATES, MOVED, SILENT_DEVICE, SILENT_HOST, STOP_BUTTON = range(6)
@@ -73,7 +74,7 @@ EXCITATION = np.dtype(
         ("ended", np.int64),  # RUNNING, or why it ended
         ("started", np.int64),
         ("pending", np.int64),  # 1 between a reading and its write
-        ("silent", np.int64),  # readings without a new position in a row
+        ("silent", np.int64),  # readings without a usable new position in a row
         ("now_ns", np.int64),
         ("new_ns", np.int64),  # when the last new position was read
         ("position_m", np.float64, (3,)),
@@ -147,6 +148,12 @@ class BenchDriver:
         self.context = int(self._memory.ctypes.data)
         self.read, self.write = _functions()
 
+    @property
+    def failure(self) -> str | None:
+        """Why the device behind it ended, if it says so."""
+        failure: str | None = getattr(self._inner, "failure", None)
+        return failure
+
     def excite(self, what: Excitation) -> None:
         """Let this act from the next reading on; a spring begins where the handle is, and keeps what it holds up."""
         state = self.state
@@ -181,7 +188,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
         bench.armed = 0
         return answer
     out = _reading_at(reading)
-    if answer == READ_NEW:
+    if answer == READ_NEW and _is_usable(bench, out.position_m, now_ns):
         _see(bench, out.position_m, now_ns)
     else:
         bench.silent += 1
@@ -202,6 +209,13 @@ def _write(context: int, command: int) -> int:
     answer: int = _inner_write(bench.write, bench.context, command)
     clear(asked.force_n)  # what the servo asked for: it then records what was sent instead
     return answer
+
+
+@kernel
+def _is_usable(bench: Any, position_m: Any, now_ns: int) -> bool:
+    if bench.started == 0:
+        return bool(is_finite(position_m))
+    return bool(can_have_moved(bench.position_m, position_m, (now_ns - bench.new_ns) * 1e-9))
 
 
 @kernel

@@ -94,8 +94,14 @@ def _plausible(parameters: Record, state: Record, sample: Record, interval_s: fl
             return False
     if parameters.estimator == device.CODE and not _has_velocity(sample):
         return False
+    return state.tracking == 0 or can_have_moved(state.hand_m, hand_m, interval_s)
+
+
+@part
+def can_have_moved(from_m: Any, to_m: Any, interval_s: float) -> bool:
+    """Return whether a hand of 10 m/s can have moved so far within a time [s]; not where a position is not finite."""
     farthest_m = FASTEST_HAND_MPS * interval_s
-    return state.tracking == 0 or square_distance(hand_m, state.hand_m) <= farthest_m * farthest_m
+    return bool(square_distance(to_m, from_m) <= farthest_m * farthest_m)
 
 
 @part
