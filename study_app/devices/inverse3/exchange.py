@@ -257,7 +257,7 @@ def _take_frames(device: Any, context: int) -> int:
         if size == INCOMPLETE:
             break
         opcode, length = device.header[0], device.header[1]
-        if size + length > INBOX:
+        if length > INBOX - size:
             return TOO_LONG
         at, end = begin + size, begin + size + length
         if end > device.filled:

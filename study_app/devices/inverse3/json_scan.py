@@ -165,9 +165,10 @@ def _keep(found: Any) -> None:
     found.found = 1
     found.known |= found.seen
     for place in range(_OF_DEVICE):
-        found.value[place] = found.candidate[place]
-        if found.seen >> place & 1 and not abs(found.value[place]) < np.inf:
-            found.infinite = 1
+        if found.seen >> place & 1:
+            found.value[place] = found.candidate[place]
+            if not abs(found.value[place]) < np.inf:
+                found.infinite = 1
 
 
 @kernel

@@ -173,7 +173,7 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
     return Session(device_id, described, round_trip_s)
 
 
-def find_device(message: Mapping[str, Any], wanted_id: str, *, inventory: bool = True) -> dict[str, Any]:
+def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: bool = True) -> dict[str, Any]:
     """Return what a message says of the device with this id, or of the first one.
 
     Raises
@@ -184,13 +184,13 @@ def find_device(message: Mapping[str, Any], wanted_id: str, *, inventory: bool =
     listed = message.get("inverse3", [])
     if not isinstance(listed, list):
         raise failure("version", "format 3.0")
-    names = [str(entry.get("device_id")) for entry in listed if isinstance(entry, dict)]
-    for entry, name in zip(listed, names, strict=False):
+    entries = {str(entry["device_id"]): entry for entry in listed if isinstance(entry, dict) and "device_id" in entry}
+    for name, entry in entries.items():
         if not wanted_id or name == wanted_id:
-            if inventory and "filters" not in entry.get("config", {}):
+            if inventory and "filters" not in (entry.get("config") or {}):
                 raise failure("version", "format 3.1")
-            return dict(entry)
-    raise failure("no-device", f"listed: {', '.join(names) or 'none'}")
+            return entry
+    raise failure("no-device", f"listed: {', '.join(entries) or 'none'}")
 
 
 def check_status(status: Mapping[str, Any], *, at_opening: bool) -> None:

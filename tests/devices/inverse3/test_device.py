@@ -14,6 +14,7 @@ from study_app.devices.inverse3.doctor import examine
 from study_app.devices.inverse3.emulated import EmulatedInverse3, EmulatedLink
 from study_app.devices.inverse3.emulator.service import Service
 from study_app.devices.inverse3.exchange import MOST_UNANSWERED
+from study_app.devices.inverse3.opening import find_device
 from study_app.devices.registry import open_device
 from study_app.errors import DeviceError, DeviceNotFound
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
@@ -106,6 +107,12 @@ class TestOpening:
         with EmulatedInverse3(progress=lines.append) as device:
             assert device.describe()["service_settings"]["confirmed"] is False
         assert lines == ["The service did not confirm its settings: compare them in Haply Hub."]
+
+    def test_entries_without_an_id_are_passed_over(self) -> None:
+        mine = {"device_id": "049D", "config": {"filters": {}}}
+        assert find_device({"inverse3": [7, {}, {"device_id": "0000"}, mine]}, "049D") == mine
+        with pytest.raises(DeviceNotFound, match="listed: none"):
+            find_device({"inverse3": [7, {}]})
 
     def test_a_refused_device_leaves_no_connection_open(self) -> None:
         service = Service()

@@ -84,6 +84,13 @@ def test_scan_names_what_is_missing() -> None:
         assert scanned(json.dumps(state()).replace("-0.0123", number))[0] == NOT_FINITE
 
 
+def test_scan_takes_no_number_of_another_device() -> None:
+    own, other = state()["inverse3"][1::-1]
+    said, found = scanned(json.dumps(state(inverse3=[own, other, {"device_id": OWN}])))
+    assert said == UNDERSTOOD
+    assert found.value[POSITION] == -0.0123
+
+
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "01", ".5", "5.", "1e", "+1", "0x1", "--1", "tru", "nul", "'a'"])
 def test_scan_refuses_what_is_no_number_of_json(number: str) -> None:
     assert scanned(json.dumps(state()).replace("-0.0123", number))[0] == NOT_JSON

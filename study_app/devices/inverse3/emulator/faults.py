@@ -40,7 +40,7 @@ OF_STREAM: Final = (
     "binary",  # a binary frame
     "masked",  # a masked frame
     "fragment",  # a message in two frames
-    "too-long",  # a frame that says it is 1 MB long
+    "too-long",  # a frame that says it is 2^63 - 1 bytes long, the most that RFC 6455 permits
 )
 FAULTS: Final = (*OF_OPENING, *OF_TIME, *OF_STREAM)
 
@@ -73,7 +73,7 @@ def faulty_bytes(fault: str, message: dict[str, Any]) -> bytes:
     if fault == "closes":
         return b"\x88\x02" + struct.pack(">H", 1001)
     if fault == "too-long":
-        return b"\x81\x7f" + struct.pack(">Q", 1 << 20)
+        return b"\x81\x7f" + struct.pack(">Q", (1 << 63) - 1)
     first = {"binary": 0x82, "fragment": 0x01}.get(fault, 0x81)
     mask = 0x80 if fault == "masked" else 0
     return bytes([first, mask | 126]) + struct.pack(">H", len(data)) + (b"\0\0\0\0" if mask else b"") + data
