@@ -24,7 +24,8 @@ from study_app.store.atomic import cause, sync_folder
 from study_app.store.journals.journal import Line
 
 if TYPE_CHECKING:
-    from study_app.store.recording_files import SamplesFile, Written
+    from study_app.store.recording_files import Written
+    from study_app.store.recording_writer import SamplesFile
 
 ROOM = 120_000  # samples that may wait: two minutes at 1 kHz, 37 MB
 ENOUGH = 5_000  # samples that are worth waking the thread for
@@ -103,9 +104,9 @@ class Recorder:
 
     def __init__(self, folder: Path, facts: Mapping[str, Any], *, waits: bool = False, room: int = ROOM) -> None:
         # The Parquet library takes a while to load: now, before a participant sits down, and only where it is needed.
-        from study_app.store import recording_files as recording  # noqa: PLC0415
+        from study_app.store import recording_writer  # noqa: PLC0415
 
-        self._files = recording
+        self._files = recording_writer
         self._folder = folder
         self._facts = dict(facts)
         self._waits = waits

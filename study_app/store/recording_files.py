@@ -11,14 +11,11 @@ Parquet reader gives the columns, with unit and meaning in each column's metadat
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
@@ -35,8 +32,7 @@ from study_app.haptics.model.layout import (
     SAMPLE,
     records,
 )
-from study_app.store.atomic import cannot_read, sync_folder, temporary_path
-from study_app.store.journals.journal import plain
+from study_app.store.atomic import cannot_read
 from study_app.store.journals.parsing import parse_json
 from study_app.store.tables.column import Column
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
@@ -51,24 +47,21 @@ ROUNDED_TO = {
     "force_n": FORCE_STEP_N,
 }
 """Fields of ``layout.SAMPLE`` that are recorded rounded, and the step."""
-GROUP_SECONDS = 30  # rows of so many seconds are compressed together
-
 FRAME = np.dtype([("painted_ns", np.int64), ("sample_ns", np.int64), ("age_ns", np.int64)])
 
-_FACTS = b"liquid_study"
-_COMPRESSION = ("zstd", 9)
-_AXES = ("x", "y", "z")
-_MEASURED = {
-    **{f"device_velocity_{axis}_mps": ("device_velocity_mps", i, MEASURED_VELOCITY) for i, axis in enumerate(_AXES)},
+FACTS_KEY = b"liquid_study"
+AXES = ("x", "y", "z")
+MEASURED = {
+    **{f"device_velocity_{axis}_mps": ("device_velocity_mps", i, MEASURED_VELOCITY) for i, axis in enumerate(AXES)},
     **{f"orientation_{part}": ("orientation", i, MEASURED_ORIENTATION) for i, part in enumerate("wxyz")},
     "gripper_m": ("gripper_m", None, MEASURED_GRIPPER),
 }
 """What a device may measure itself: field of ``layout.SAMPLE``, its component, and its bit."""
-_LATER = frozenset(
-    {"delay_ticks", *(f"undelivered_{axis}_n" for axis in _AXES)}  # columns that format 1 lacks
-    | {"measured", "device_time_ns", *_MEASURED}  # and format 2
-)
-_SHORT = frozenset({"buttons", "delay_ticks", "limiters", "measured", "scene", "status"})
+_SINCE_2 = frozenset({"delay_ticks", *(f"undelivered_{axis}_n" for axis in AXES)})
+_SINCE_3 = frozenset({"measured", "device_time_ns", *MEASURED})
+_LACKING = {1: _SINCE_2 | _SINCE_3, 2: _SINCE_3, FORMAT: frozenset[str]()}
+"""Columns of samples that recordings of each format lack."""
+SHORT = frozenset({"buttons", "delay_ticks", "limiters", "measured", "scene", "status"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,73 +82,6 @@ class Checks:
     effect_force: tuple[int, ...]
 
 
-class SamplesFile:
-    """A recording being written: not there under its name until ``finish``.
-
-    Parameters
-    ----------
-    path : Path
-        Where it is to be.
-    facts : mapping
-        What the samples are of; kept in the file. Nothing that tells a condition.
-    rate_hz : float
-        Samples a second, nominally.
-
-    Raises
-    ------
-    OSError
-        From every method: the disk does not take it.
-    """
-
-    def __init__(self, path: Path, facts: Mapping[str, Any], rate_hz: float) -> None:
-        self.path = path
-        self.check_rows = max(1, round(rate_hz))
-        self.group_rows = self.check_rows * GROUP_SECONDS
-        self.rows = 0
-        self._facts = {**facts, "rate_hz": rate_hz}
-        self._half = _Half(path, SAMPLES)
-        self._device: list[int] = []
-        self._effect: list[int] = []
-
-    def write(self, samples: Any) -> None:
-        """Add a group of samples (array of ``SAMPLE``): ``group_rows`` of them, except the last time."""
-        if self.rows == 0:
-            self._facts["first_device_force_n"] = plain(samples["device_force_n"][:1].ravel())
-            self._facts["first_command_n"] = plain(samples["command_n"][:1].ravel())
-        self._device += crcs(samples["device_force_n"], self.check_rows)
-        self._effect += crcs(samples["force_n"], self.check_rows)
-        self._half.write(sample_columns(samples))
-        self.rows += len(samples)
-
-    def finish(self, dropped: int = 0) -> Written:
-        """Close the file and put it in its place; ``dropped`` samples are known to be missing."""
-        checks = {"rows": self.check_rows, "device_force": self._device, "effect_force": self._effect}
-        facts = {"format": FORMAT, "kind": "samples", **self._facts, "dropped": dropped, "crc32": checks}
-        return self._half.finish(facts, self.rows)
-
-    def abandon(self) -> None:
-        """Take away what was written."""
-        self._half.abandon()
-
-
-def write_frames(path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any]) -> Written:
-    """Write what was shown: when painted and of which moment (n, 2) [ns, the servo's clock].
-
-    Raises
-    ------
-    OSError
-        The disk does not take it; nothing is left.
-    """
-    half = _Half(path, FRAMES)
-    try:
-        painted, shown = frames[:, 0], frames[:, 1]
-        half.write({"painted_ns": painted, "sample_ns": shown, "age_ns": painted - shown})
-        return half.finish({"format": FORMAT, "kind": "frames", **facts}, len(frames))
-    except OSError:
-        half.abandon()
-        raise
-
-
 def read_samples(path: Path) -> Any:
     """Return the samples (n,) as a recarray of ``SAMPLE``; ``busy_ns``, which is not recorded, is 0.
 
@@ -174,7 +100,7 @@ def read_samples(path: Path) -> Any:
         samples[name] = columns[name]
     samples["delay_ticks"] = columns.get("delay_ticks", BELIEVED_TICKS)
     samples["lateness_ns"] = columns["time_ns"] - columns["due_ns"]
-    for i, axis in enumerate(_AXES):
+    for i, axis in enumerate(AXES):
         samples["position_m"][:, i] = columns[f"position_{axis}_m"]
         samples["velocity_mps"][:, i] = columns[f"velocity_{axis}_mps"]
         samples["wake_mps"][:, i] = columns[f"wake_{axis}_mps"]
@@ -184,7 +110,7 @@ def read_samples(path: Path) -> Any:
         samples["force_n"][:, i] = device + columns[f"withheld_{axis}_n"]
     if "measured" in columns and len(samples):
         samples["measured"], samples["device_time_ns"] = columns["measured"], columns["device_time_ns"]
-        for name, (field, component, bit) in _MEASURED.items():
+        for name, (field, component, bit) in MEASURED.items():
             values = np.where(columns["measured"] & bit, columns[name], 0.0)
             samples[field][... if component is None else (..., component)] = values
     if len(samples) and None not in facts["first_device_force_n"]:
@@ -246,108 +172,13 @@ def crcs(forces: NDArray[np.float64], rows: int) -> list[int]:
     return [zlib.crc32(exact[first : first + rows].tobytes()) for first in range(0, len(exact), rows)]
 
 
-def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
-    """Return the columns of ``samples`` as they are kept: times and positions exact, the rest rounded."""
-    columns: dict[str, NDArray[Any]] = {
-        "tick": samples["tick"],
-        "time_ns": samples["time_ns"],
-        "due_ns": samples["time_ns"] - samples["lateness_ns"],
-        **{name: samples[name] for name in ("fresh", *sorted(_SHORT), "device_time_ns")},
-    }
-    with np.errstate(invalid="ignore", over="ignore"):  # a fault's numbers are kept as they are
-        device = _rounded(samples["device_force_n"], FORCE_STEP_N)
-        undelivered = _rounded(samples["command_n"], FORCE_STEP_N) - device
-        withheld = _rounded(samples["force_n"], FORCE_STEP_N) - device
-        for i, axis in enumerate(_AXES):
-            columns[f"position_{axis}_m"] = samples["position_m"][:, i]
-            columns[f"velocity_{axis}_mps"] = _rounded(samples["velocity_mps"][:, i], SPEED_STEP_MPS)
-            columns[f"wake_{axis}_mps"] = _rounded(samples["wake_mps"][:, i], SPEED_STEP_MPS)
-            columns[f"device_force_{axis}_n"] = device[:, i]
-            columns[f"undelivered_{axis}_n"] = undelivered[:, i]
-            columns[f"withheld_{axis}_n"] = withheld[:, i]
-        for name, (field, component, bit) in _MEASURED.items():
-            values = samples[field] if component is None else samples[field][:, component]
-            columns[name] = np.where(samples["measured"] & bit, values, np.nan)
-        return {name: np.ascontiguousarray(column, _NUMPY_TYPES[name]) for name, column in columns.items()}
-
-
-def _rounded(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    rounded: NDArray[np.float64] = np.rint(values / step) * step
-    return rounded
-
-
-class _Half:
-    """A Parquet file under a temporary name, until it is whole."""
-
-    def __init__(self, path: Path, columns: Sequence[Column]) -> None:
-        self._path = path
-        self._temporary = temporary_path(path)
-        self._schema = _schema(columns)
-        self._file: BinaryIO = self._temporary.open("xb")
-        self._writer = parquet.ParquetWriter(
-            self._file,
-            self._schema,
-            compression=_COMPRESSION[0],
-            compression_level=_COMPRESSION[1],
-            use_dictionary=False,
-            write_statistics=False,
-            column_encoding={field.name: _encoding(field.type) for field in self._schema},
-        )
-
-    def write(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        arrays = [_array(columns[field.name], field.type) for field in self._schema]
-        self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
-
-    def finish(self, facts: Mapping[str, Any], rows: int) -> Written:
-        self._writer.add_key_value_metadata({_FACTS: json.dumps(facts, ensure_ascii=False)})
-        self._writer.close()
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._file.close()
-        with self._temporary.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-        self._temporary.replace(self._path)
-        sync_folder(self._path.parent)
-        return Written(self._path, rows, digest)
-
-    def abandon(self) -> None:
-        for end in (self._writer.close, self._file.close):
-            try:
-                end()
-            except OSError:  # what it could not write is not wanted
-                continue
-        self._temporary.unlink(missing_ok=True)
-
-
-def _schema(columns: Sequence[Column]) -> pa.Schema:
-    fields = []
-    for column in columns:
-        metadata = {"description": column.description, **({"unit": column.unit} if column.unit else {})}
-        fields.append(pa.field(column.name, _type(column), nullable=False, metadata=metadata))
-    return pa.schema(fields)
-
-
-def _type(column: Column) -> pa.DataType:
+def column_type(column: Column) -> pa.DataType:
+    """Return how a column is kept."""
     if column.kind == "flag":
         return pa.bool_()
     if column.kind == "integer":
-        return pa.int32() if column.name in _SHORT else pa.int64()
+        return pa.int32() if column.name in SHORT else pa.int64()
     return pa.float64() if column.name.startswith(("position_", "device_velocity_")) else pa.float32()
-
-
-_NUMPY_TYPES = {column.name: _type(column).to_pandas_dtype() for column in (*SAMPLES, *FRAMES)}
-
-
-def _encoding(of: pa.DataType) -> str:
-    if pa.types.is_boolean(of):
-        return "RLE"
-    return "BYTE_STREAM_SPLIT" if pa.types.is_floating(of) else "DELTA_BINARY_PACKED"
-
-
-def _array(values: NDArray[Any], of: pa.DataType) -> pa.Array:
-    """Return ``values`` for Arrow without a copy, and without the library that it would load to look at them."""
-    kept = np.packbits(values, bitorder="little") if pa.types.is_boolean(of) else np.ascontiguousarray(values)
-    return pa.Array.from_buffers(of, len(values), [None, pa.py_buffer(kept)])
 
 
 def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
@@ -361,20 +192,21 @@ def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any
         raise cannot_read(path, error) from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
         raise _damaged(path, error) from error
-    if not _are_of(table, SAMPLES if kind == "samples" else FRAMES, facts["rows"]):
+    lacking = _LACKING[facts["format"]]
+    columns = FRAMES if kind == "frames" else [column for column in SAMPLES if column.name not in lacking]
+    if not _are_of(table, columns, facts["rows"]):
         raise StoreError(f"{path} is damaged (its columns differ from those of {kind}): restore it from a copy")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
 
 
 def _are_of(table: pa.Table, columns: Sequence[Column], rows: int) -> bool:
-    """Return whether a table has these columns, each once and whole, but for those that earlier formats lack."""
-    expected = {column.name: _type(column) for column in columns}
+    """Return whether a table has these columns and no others, each once and whole."""
+    expected = {column.name: column_type(column) for column in columns}
     held = {field.name: field.type for field in table.schema}
     return (
         table.num_rows == rows
         and len(table.column_names) == len(held)
-        and held.items() <= expected.items()
-        and expected.keys() - held.keys() <= _LATER
+        and held == expected
         and not any(column.null_count for column in table.columns)
     )
 
@@ -391,7 +223,7 @@ def _numbers(column: pa.ChunkedArray, rows: int) -> NDArray[Any]:
 
 def _facts(path: Path, metadata: Any) -> dict[str, Any]:
     try:
-        facts = parse_json(metadata.metadata[_FACTS])
+        facts = parse_json(metadata.metadata[FACTS_KEY])
         if facts["format"] not in range(1, FORMAT + 1):
             found, readable = facts["format"], f"1 to {FORMAT}"
             raise StoreError(f"{path} has format {found!r}, this version reads {readable}: use a newer version")

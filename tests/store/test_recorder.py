@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.store import recording_files as recording
+from study_app.store import recording_writer
 from study_app.store.recorder import Lost, Recorded, Recorder, recording_files
-from study_app.store.recording_files import SamplesFile, read_facts, read_frames, read_samples
+from study_app.store.recording_files import Written, read_facts, read_frames, read_samples
+from study_app.store.recording_writer import SamplesFile
 
 pytestmark = pytest.mark.slow
 
@@ -45,7 +46,7 @@ class Disk:
                 assert disk.works.wait(20)
                 super().write(samples)
 
-        monkeypatch.setattr(recording, "SamplesFile", SlowFile)
+        monkeypatch.setattr(recording_writer, "SamplesFile", SlowFile)
 
 
 @pytest.fixture
@@ -195,7 +196,7 @@ def test_what_cannot_even_be_taken_away_loses_one_recording_and_not_the_next(
     recorder: Recorder, samples_of: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Stuck(SamplesFile):
-        def finish(self, dropped: int = 0) -> recording.Written:
+        def finish(self, dropped: int = 0) -> Written:
             raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
         def abandon(self) -> None:
@@ -203,7 +204,7 @@ def test_what_cannot_even_be_taken_away_loses_one_recording_and_not_the_next(
             raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
     with monkeypatch.context() as patched:
-        patched.setattr(recording, "SamplesFile", Stuck)
+        patched.setattr(recording_writer, "SamplesFile", Stuck)
         record(recorder, samples_of(200), trial=1)
         with recorder.changed:
             assert recorder.changed.wait_for(lambda: recorder.lost, 20)
@@ -222,7 +223,7 @@ def test_any_failure_loses_one_recording_and_tells_it_at_once(
             raise ValueError("a column of another length")
 
     with monkeypatch.context() as patched:
-        patched.setattr(recording, "SamplesFile", Broken)
+        patched.setattr(recording_writer, "SamplesFile", Broken)
         record(recorder, samples_of(200), trial=1)
         with recorder.changed:
             assert recorder.changed.wait_for(lambda: recorder.lost, 20)
@@ -317,7 +318,7 @@ def test_a_thread_that_ends_loses_its_trial_at_once_and_the_next_trial_starts_an
         raise Ended("pulled")
 
     with monkeypatch.context() as patched:
-        patched.setattr(recording, "SamplesFile", ends)
+        patched.setattr(recording_writer, "SamplesFile", ends)
         patched.setattr(threading, "excepthook", lambda _arguments: None)
         recorder.start(1, 1, 1000.0)
         with recorder.changed:

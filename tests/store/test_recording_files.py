@@ -19,8 +19,9 @@ from pyarrow import parquet
 
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import SAMPLE
-from study_app.store import recording_files
-from study_app.store.recording_files import SamplesFile, Written, read_checks, read_facts, read_frames, read_samples
+from study_app.store import recording_writer
+from study_app.store.recording_files import Written, read_checks, read_facts, read_frames, read_samples
+from study_app.store.recording_writer import SamplesFile, write_frames
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
 
 Make = Callable[..., np.ndarray[Any, Any]]
@@ -89,6 +90,17 @@ def test_recordings_of_format_2_are_read(tmp_path: Path, samples_of: Make) -> No
     read = read_samples(path)
     assert not read["measured"].any()
     assert np.array_equal(read["position_m"], samples_of(100)["position_m"])
+
+
+def test_recording_that_lacks_a_column_of_its_format_is_damaged(tmp_path: Path, samples_of: Make) -> None:
+    path = write(tmp_path / "trial-003.parquet", samples_of(10)).path
+    table, facts = parquet.read_table(path), parquet.read_metadata(path).metadata[b"liquid_study"]
+    fewer = table.drop_columns("gripper_m")
+    with parquet.ParquetWriter(path, fewer.schema) as writer:
+        writer.write_table(fewer)
+        writer.add_key_value_metadata({b"liquid_study": facts})
+    with pytest.raises(StoreError, match="its columns differ from those of samples"):
+        read_samples(path)
 
 
 def test_numbers_of_a_fault_come_back_as_they_are(tmp_path: Path, samples_of: Make) -> None:
@@ -160,7 +172,7 @@ def test_a_recording_says_what_it_is_without_being_read(tmp_path: Path, samples_
 
 def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Path, samples_of: Make) -> None:
     written = write(tmp_path / "trial-003.parquet", samples_of(100))
-    frames = recording_files.write_frames(tmp_path / "frames.parquet", np.array([[5, 3]]), FACTS)
+    frames = write_frames(tmp_path / "frames.parquet", np.array([[5, 3]]), FACTS)
     for path, columns in ((written.path, SAMPLES), (frames.path, FRAMES)):
         schema = parquet.read_schema(path)
         assert schema.names == [column.name for column in columns]
@@ -172,7 +184,7 @@ def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Pat
 
 def test_frames_come_back_with_their_age(tmp_path: Path) -> None:
     shown = np.array([[10**15 + 16_666_667 * i, 10**15 + 16_666_667 * i - 4_000_000 - i] for i in range(1000)])
-    written = recording_files.write_frames(tmp_path / "trial-003_frames.parquet", shown, FACTS)
+    written = write_frames(tmp_path / "trial-003_frames.parquet", shown, FACTS)
     read = read_frames(written.path)
     assert np.array_equal(read["painted_ns"], shown[:, 0])
     assert np.array_equal(read["sample_ns"], shown[:, 1])
@@ -181,7 +193,7 @@ def test_frames_come_back_with_their_age(tmp_path: Path) -> None:
 
 def test_nothing_recorded_is_a_file_of_no_rows(tmp_path: Path) -> None:
     samples = write(tmp_path / "trial-003.parquet", np.zeros(0, SAMPLE))
-    frames = recording_files.write_frames(tmp_path / "frames.parquet", np.zeros((0, 2), np.int64), FACTS)
+    frames = write_frames(tmp_path / "frames.parquet", np.zeros((0, 2), np.int64), FACTS)
     assert (len(read_samples(samples.path)), len(read_frames(frames.path))) == (0, 0)
     assert read_checks(samples.path).device_force == ()
 
@@ -221,13 +233,13 @@ def test_a_full_disk_is_told_and_leaves_nothing(
 def test_frames_that_do_not_fit_leave_nothing(tmp_path: Path, files_up_to: FullDisk) -> None:
     shown = np.random.default_rng(1).integers(0, 2**60, (50_000, 2))
     with files_up_to(10_000), pytest.raises(OSError, match="File too large"):
-        recording_files.write_frames(tmp_path / "frames.parquet", shown, FACTS)
+        write_frames(tmp_path / "frames.parquet", shown, FACTS)
     assert names_in(tmp_path) == []
 
 
 def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None:
     samples = write(tmp_path / "trial-003.parquet", samples_of(100)).path
-    frames = recording_files.write_frames(tmp_path / "frames.parquet", np.array([[5, 3]]), FACTS).path
+    frames = write_frames(tmp_path / "frames.parquet", np.array([[5, 3]]), FACTS).path
     other = tmp_path / "other.parquet"
     parquet.write_table(pa.table({"x": pa.array([1])}), other)
     torn = tmp_path / "torn.parquet"
@@ -250,7 +262,7 @@ def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None
 
 def test_a_newer_format_is_told(tmp_path: Path, samples_of: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as newer:
-        newer.setattr(recording_files, "FORMAT", 4)
+        newer.setattr(recording_writer, "FORMAT", 4)
         path = write(tmp_path / "trial-003.parquet", samples_of(10)).path
     with pytest.raises(StoreError, match="has format 4, this version reads 1 to 3: use a newer version"):
         read_samples(path)
@@ -261,14 +273,14 @@ import sys
 from pathlib import Path
 import numpy as np
 from study_app.haptics.model.layout import SAMPLE
-from study_app.store import recording_files
+from study_app.store import recording_files, recording_writer
 path = Path(sys.argv[1])
-file = recording_files.SamplesFile(path, {}, 1000.0)
+file = recording_writer.SamplesFile(path, {}, 1000.0)
 file.write(np.zeros(2000, SAMPLE))
 file.finish()
 recording_files.read_samples(path)
 frames = path.with_name("frames.parquet")
-recording_files.read_frames(recording_files.write_frames(frames, np.zeros((3, 2), np.int64), {}).path)
+recording_files.read_frames(recording_writer.write_frames(frames, np.zeros((3, 2), np.int64), {}).path)
 print([name for name in ("pandas", "numba", "scipy", "PySide6") if name in sys.modules])
 """
 

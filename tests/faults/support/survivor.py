@@ -28,7 +28,7 @@ from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.plots import TracePlot
 from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage, TroublePage
-from study_app.store import recording_files
+from study_app.store import recording_writer
 from tests.faults.support import short
 from tests.faults.support.windows import Person
 
@@ -152,7 +152,7 @@ class Scene:
         self.picture("panels")
         participant.come_forward()
         StepLine.paintEvent, TracePlot.show_traces = self.painted, self.drawn
-        self.samples_file, recording_files.SamplesFile = recording_files.SamplesFile, _ends
+        self.samples_file, recording_writer.SamplesFile = recording_writer.SamplesFile, _ends
         self.trial = participant.page.trial if isinstance(participant.page, TaskPage) else None
         self.step = self.lose_recording
         return False
@@ -162,7 +162,7 @@ class Scene:
     def lose_recording(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         lost = operator.rail.tally.beyond.text()
         if "lost" in lost:
-            recording_files.SamplesFile = self.samples_file
+            recording_writer.SamplesFile = self.samples_file
             self.told["recording"] = lost
             self.told["page at the loss"] = type(participant.page).__name__
             self.told["force without a recording"] = self.rig.servo.force_is_on
