@@ -1,0 +1,127 @@
+"""Sessions that replay computes again, and how their recordings are changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+from pyarrow import parquet
+
+from study_app.devices.scripted import ScriptedDevice
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.session.pages import Page, TaskPage
+from study_app.session.ports import Ports
+from study_app.session.resume import resume_at
+from study_app.session.runner import Runner
+from study_app.session.transitions.events import (
+    Begin,
+    Continue,
+    EndAsked,
+    ForceStopped,
+    PauseAsked,
+    RepeatAsked,
+    ResumeAsked,
+)
+from study_app.store.clock import SessionClock
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.open_session import SessionStore
+from tests.session import small
+
+
+def begun(folder: Path, device: ScriptedDevice, servo: Servo) -> SessionStore:
+    return begin(
+        folder,
+        small.protocol(),
+        b"small",
+        SessionStart(
+            "P001",
+            seed=1,
+            operator="",
+            language="en",
+            device=device.describe(),
+            screens={},
+            simulated=True,
+            recordings=True,
+        ),
+        clock=SessionClock(servo.now_ns),
+    )
+
+
+def held(store: SessionStore, device: ScriptedDevice, servo: Servo) -> tuple[Runner, Callable[[int], None]]:
+    """Return the runner of a session in which a hand moves, and what lets ticks pass."""
+    study, t_s = small.protocol(), np.arange(0, 60, 0.005)
+    schedule = build_schedule(study, "P001", 1)
+
+    def present(page: Page) -> None:
+        if isinstance(page, TaskPage):
+            runner.frame_shown(servo.now_ns(), servo.now_ns())
+
+    def wait(ticks: int) -> None:
+        for _ in range(ticks // 50):
+            servo.advance(50)
+            runner.poll()
+
+    ports = Ports(servo, store, present, store.clock.seconds, store.recorder, paints=False)
+    runner = Runner(study, schedule, store.key.codes, ports, "en", resume_at(study, schedule, store.lines))
+    device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.01 * np.cos(9 * t_s), 0 * t_s)))
+    return runner, wait
+
+
+def troubled(folder: Path) -> Path:
+    """Hold a session in which all happens that changes a force from outside; return its folder."""
+    device = ScriptedDevice()
+    with device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        store = begun(folder, device, servo)
+        clock = store.clock
+        with store:
+            runner, wait = held(store, device, servo)
+            runner.post(Begin(clock.seconds()))
+            servo.advance(20)
+            runner.post(Continue(clock.seconds()))  # so early that the servo's own fade is under way
+            wait(700)
+            runner.post(RepeatAsked(clock.seconds(), "a sneeze"))  # from one force into the next
+            wait(850)
+            servo.advance(7)
+            runner.post(RepeatAsked(clock.seconds(), "another"))
+            wait(900)
+            runner.post(ForceStopped(clock.seconds(), "operator"))
+            wait(300)
+            runner.post(ResumeAsked(clock.seconds(), "operator"))
+            wait(800)
+            runner.post(PauseAsked(clock.seconds(), "operator"))
+            wait(2000)
+            runner.post(ResumeAsked(clock.seconds(), "operator"))
+            wait(1500)
+            runner.post(EndAsked(clock.seconds(), "aborted", ""))
+            place: Path = store.folder.path
+    return place
+
+
+def session(results: Path) -> Path:
+    return StudyFolder(results).sessions()[0].path
+
+
+def copied(results: Path, to: Path) -> Path:
+    for path in results.rglob("*"):
+        if path.is_file():
+            there = to / path.relative_to(results)
+            there.parent.mkdir(parents=True, exist_ok=True)
+            there.write_bytes(path.read_bytes())
+    return session(to)
+
+
+def rewrite(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    """Change the columns of a recording and keep its checks, as a mistake or a forger would."""
+    facts = parquet.read_metadata(path).metadata[b"liquid_study"]
+    table = parquet.read_table(path)
+    columns = {name: table.column(name).to_numpy().copy() for name in table.column_names}
+    change(columns)
+    with parquet.ParquetWriter(path, table.schema) as writer:
+        writer.write_table(pa.table(columns, schema=table.schema))
+        writer.add_key_value_metadata({b"liquid_study": facts})
