@@ -26,7 +26,7 @@ def test_every_device_is_shown_once_and_those_that_people_feel_with_first():
     names = [device.name for device in shown]
     assert set(list_devices()) <= set(names)
     assert len(names) == len(set(names))
-    assert set(names[:4]) == {"mouse", "spacemouse", "falcon", "inverse3"}
+    assert set(names[:5]) == {"mouse", "spacemouse", "falcon", "force-dimension", "inverse3"}
     assert all(device.can.endswith(".") for device in shown)
     (real,) = (device for device in shown if device.name == "falcon")
     assert [way.by.split()[0] for way in real.ways] == ["libusb", "ftd2xx"]

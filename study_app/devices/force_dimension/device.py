@@ -1,0 +1,190 @@
+"""A Force Dimension device: opened and checked through the maker's library, closed with zero force."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Protocol, Self
+
+from study_app.devices.base import Device
+from study_app.devices.force_dimension import exchange
+from study_app.devices.force_dimension.exchange import COUNTERS, FUNCTIONS, exchange_functions, finish, new_exchange
+from study_app.devices.force_dimension.failures import CAUSES, FAILURES
+from study_app.devices.force_dimension.library import Library
+from study_app.errors import DeviceError
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+
+WORKSPACE_M: Final = (0.05, 0.05, 0.05)
+FORCE_LIMIT_N: Final = 8.0
+_LEAVE_S: Final = 0.5  # a call takes less than a millisecond
+_SILENT_NS: Final = 40_000_000  # after 50 ms without a new position the servo ends the force
+_ENDED: Final = {
+    exchange.ERROR: "error",
+    exchange.BAD_NUMBER: "not-finite",
+    exchange.FORCE_OFF: "force-off",
+}
+
+
+class Functions(Protocol):
+    """What a device is opened and run with: the maker's library, or an emulated one."""
+
+    def open(self, serial: int | None) -> int:
+        """Open the device with this serial number, or the first one; return its id."""
+        ...
+
+    def prepare(self, device: int, force_limit_n: float) -> dict[str, Any]:
+        """Check an open device and enable its force; return what the receipt records."""
+        ...
+
+    def address(self, name: str) -> int:
+        """Return where a function is, for compiled code."""
+        ...
+
+    def abandon(self, device: int) -> None:
+        """End the force and close a device that could not be prepared."""
+        ...
+
+    def close(self, device: int) -> None:
+        """Close a device."""
+        ...
+
+
+class ForceDimensionDevice(Device):
+    """A device behind the maker's library.
+
+    Parameters
+    ----------
+    serial : its serial number; "": the first device
+    library : path of libdrd; None: see ``library.Library``
+    workspace_m : half extents of where the handle shall reach [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    """
+
+    name = "force-dimension"
+
+    def __init__(
+        self,
+        serial: str = "",
+        *,
+        library: str | Path | None = None,
+        workspace_m: tuple[float, float, float] = WORKSPACE_M,
+        force_limit_n: float = FORCE_LIMIT_N,
+    ) -> None:
+        if serial and not serial.isdecimal():
+            raise DeviceError(
+                f"'{serial}' is not a serial number of a Force Dimension device: give digits, as the device's label "
+                "shows them, such as force-dimension:10233"
+            )
+        self.workspace_m = workspace_m
+        self.force_limit_n = force_limit_n
+        self._serial = int(serial) if serial else None
+        self._path = library
+        self._functions: Functions | None = None
+        self._found: dict[str, Any] = {}
+        self.memory = new_exchange(force_limit_n)
+        self.exchange = self.memory[0]
+        self.context = int(self.memory.ctypes.data)
+        self.read, self.write = exchange_functions()
+
+    def open(self) -> None:
+        """Load the library, open and check the device, and enable its force at zero.
+
+        Raises
+        ------
+        DeviceFailure
+            There is no library or device, or it cannot be used.
+        """
+        if self._functions is not None:
+            if self.exchange.ended == exchange.RUNS:
+                return
+            self.close()
+        if self.exchange.inside:
+            raise FAILURES.failure("hangs")
+        functions = self._load()
+        device = functions.open(self._serial)
+        try:
+            found = functions.prepare(device, self.force_limit_n)
+            self.memory[:] = new_exchange(self.force_limit_n)
+            for field, name in FUNCTIONS.items():
+                self.exchange[field] = functions.address(name)
+        except BaseException:
+            functions.abandon(device)
+            raise
+        self._found, self._functions = found, functions
+        self.exchange.id = device
+        self.exchange.wrist = found["wrist"]
+        self.exchange.gripper = found["gripper"]
+        self.exchange.active = found["active_wrist"] or found["active_gripper"]
+        self.exchange.ended = exchange.RUNS
+
+    def close(self) -> None:
+        """Send zero force, take the current off the motors, and close the device; a second call does nothing.
+
+        Where a call of the library does not return, its thread does the first two once it does; until then the
+        device's watchdog is what ends the force.
+        """
+        functions = self._functions
+        if functions is None:
+            return
+        ran = self.exchange.ended == exchange.RUNS
+        if ran:
+            self.exchange.ended = exchange.LET_GO
+        patience = time.monotonic() + _LEAVE_S
+        while self.exchange.inside and time.monotonic() < patience:
+            time.sleep(0.001)
+        if self.exchange.inside:
+            return
+        self._functions = None
+        try:
+            if ran:
+                finish(self.exchange)
+        finally:
+            functions.close(int(self.exchange.id))
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """What is believed of a device that was not measured: encoder count and mass cannot be asked for."""
+        return UNKNOWN
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """How many ticks and new positions there were since it was opened: see ``exchange.FORCE_DIMENSION``."""
+        return {name: int(self.exchange[name]) for name in COUNTERS}
+
+    @property
+    def failure_mode(self) -> str | None:
+        """The id of what ended the exchange in ``failures.FAILURES``; None while nothing did."""
+        state = self.exchange
+        silent = state.ticks and state.now_ns - state.fresh_ns > _SILENT_NS
+        return "rate" if state.ended == exchange.RUNS and silent else _ENDED.get(int(state.ended))
+
+    @property
+    def failure(self) -> str | None:
+        """Symptom, cause and cure of what ended the exchange in a sentence; None while nothing did."""
+        mode = self.failure_mode
+        if mode is None:
+            return None
+        return FAILURES.sentence(mode, CAUSES.get(int(self.exchange.off_cause), "") if mode == "force-off" else "")
+
+    def describe(self) -> dict[str, Any]:
+        """Return what the receipt says of it."""
+        return {
+            "name": self.name,
+            "workspace_m": list(self.workspace_m),
+            "force_limit_n": self.force_limit_n,
+            "dynamics": self.dynamics.describe(),
+            **self._found,
+        }
+
+    def _load(self) -> Functions:
+        return Library(self._path)
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

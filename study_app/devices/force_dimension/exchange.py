@@ -1,0 +1,302 @@
+"""A Force Dimension device's tick, compiled: the maker's functions are called at their addresses.
+
+Each call exchanges with the device over USB before it returns. The library's time guard answers some readings from
+memory (``TIMEGUARD``); such a reading is not new. Whatever fails ends the exchange at once: zero force, then
+``dhdStop``, which takes the current off the motors.
+
+The maker's axes are x toward the participant, y to the right, z up (examples of the SDK; CHAI3D 3.3.0): the hand frame
+turned by a permutation, see ``_from_maker``.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+from numba import types
+
+from study_app.devices.force_dimension.library import FORCE, FORCE_OFF_CAUSE, STATUS_WORDS
+from study_app.haptics.kernels.c_functions import (
+    READ,
+    READ_LOST,
+    READ_NEW,
+    READ_NOTHING_NEW,
+    WRITE,
+    c_function,
+    call_at,
+    fence,
+    full_fence,
+    record_at,
+)
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import (
+    COMMAND,
+    MEASURED_GRIPPER,
+    MEASURED_ORIENTATION,
+    MEASURED_VELOCITY,
+    READING,
+    records,
+)
+
+# The library's functions end with the device's id (``char ID``). It is passed as a whole word: a C function takes the
+# low byte of the register, and the emulated functions take the word as the address of their memory.
+VECTOR = types.int32(types.intp, types.intp, types.intp, types.intp)
+"""``dhdGetPosition``, ``dhdGetLinearVelocity`` (dhdc.h 3.17.5, lines 264 and 285)."""
+FILL = types.int32(types.intp, types.intp)
+"""``dhdGetOrientationFrame``, ``dhdGetGripperGap``, ``dhdGetStatus`` (lines 274, 277 and 241)."""
+BUTTONS = types.uint32(types.intp)
+"""``dhdGetButtonMask`` (line 247)."""
+PUSH = types.int32(types.float64, types.float64, types.float64, types.intp)
+"""``dhdSetForce`` (line 266)."""
+PUSH_ALL = types.int32(*(types.float64,) * 7, types.intp)
+"""``dhdSetForceAndTorqueAndGripperForce`` (line 282)."""
+STOP = types.int32(types.intp)
+"""``dhdStop`` (line 229)."""
+
+TIMEGUARD, MOTOR_SATURATED = 1, 2  # dhdc.h 160, 161
+STATUS_TICKS: Final = 32
+"""The status is read once in so many ticks."""
+_NORM_SLACK = 1.001
+
+RUNS, ERROR, BAD_NUMBER, FORCE_OFF, LET_GO = range(5)  # why the exchange ended; LET_GO: by the program itself
+
+FORCE_DIMENSION = np.dtype(
+    [
+        ("now_ns", np.int64),  # time of the tick; stays first: an emulator reads it here
+        ("id", np.intp),  # of the device, for every function
+        ("get_position", np.intp),  # addresses of the functions
+        ("get_velocity", np.intp),
+        ("get_orientation", np.intp),
+        ("get_gripper", np.intp),
+        ("get_buttons", np.intp),
+        ("get_status", np.intp),
+        ("set_force", np.intp),
+        ("set_all_forces", np.intp),
+        ("stop", np.intp),
+        ("wrist", np.int64),  # 1 where it measures orientation
+        ("gripper", np.int64),  # 1 where it has a gripper
+        ("active", np.int64),  # 1 where wrist or gripper have motors, whose torque and force are kept at 0
+        ("ended", np.int64),  # RUNS or why it ended
+        ("off_cause", np.int64),  # what the device stated where its force is off
+        ("inside", np.int64),  # 1 while a read or write runs
+        ("force_limit_n", np.float64),
+        # what the library fills in
+        ("position_m", np.float64, (3,)),
+        ("velocity_mps", np.float64, (3,)),
+        ("rotation", np.float64, (3, 3)),
+        ("gap_m", np.float64),
+        ("status", np.int32, (STATUS_WORDS,)),
+        ("fresh_ns", np.int64),  # time of the last tick with a new position
+        # counters
+        ("ticks", np.int64),
+        ("fresh", np.int64),  # ticks with a new position
+        ("guarded", np.int64),  # ticks without, because of the library's time guard
+        ("saturated", np.int64),  # forces that the library said the motors could not give
+    ],
+    align=True,
+)
+COUNTERS: Final = ("ticks", "fresh", "guarded", "saturated")
+FUNCTIONS: Final = {
+    "get_position": "dhdGetPosition",
+    "get_velocity": "dhdGetLinearVelocity",
+    "get_orientation": "dhdGetOrientationFrame",
+    "get_gripper": "dhdGetGripperGap",
+    "get_buttons": "dhdGetButtonMask",
+    "get_status": "dhdGetStatus",
+    "set_force": "dhdSetForce",
+    "set_all_forces": "dhdSetForceAndTorqueAndGripperForce",
+    "stop": "dhdStop",
+}
+
+_device_at = record_at(FORCE_DIMENSION)
+_reading_at = record_at(READING)
+_command_at = record_at(COMMAND)
+_call_vector, _call_fill, _call_buttons = call_at(VECTOR), call_at(FILL), call_at(BUTTONS)
+_call_push, _call_push_all, _call_stop = call_at(PUSH), call_at(PUSH_ALL), call_at(STOP)
+_fields = FORCE_DIMENSION.fields
+assert _fields is not None  # noqa: S101 - it is a record
+_POSITION, _VELOCITY, _ROTATION, _GAP, _STATUS = (
+    int(_fields[name][1]) for name in ("position_m", "velocity_mps", "rotation", "gap_m", "status")
+)
+
+
+def new_exchange(force_limit_n: float) -> Any:
+    """Return the memory of an exchange, shape (1,), without a device: its address is the device's ``context``."""
+    memory = records(FORCE_DIMENSION, 1)
+    memory[0].ended = LET_GO
+    memory[0].force_limit_n = force_limit_n
+    return memory
+
+
+@cache
+def exchange_functions() -> tuple[Any, Any]:
+    """Compile read and write, once for all devices."""
+    return c_function(READ, _read), c_function(WRITE, _write)
+
+
+def _read(context: int, now_ns: int, reading: int) -> int:
+    device = _device_at(context)
+    answer = READ_LOST
+    if _enter(device):
+        answer = _take_sample(device, context, now_ns, _reading_at(reading))
+        _leave(device)
+    return answer
+
+
+def _write(context: int, command: int) -> int:
+    device, asked = _device_at(context), _command_at(command)
+    for axis in range(3):
+        asked.sent_n[axis] = 0.0
+    answer = READ_LOST
+    if _enter(device):
+        answer = _send_force(device, asked)
+        _leave(device)
+    return answer
+
+
+@kernel
+def _enter(device: Any) -> bool:
+    """Return whether the library may be called until `_leave`; who closes sets ``ended``, then reads ``inside``."""
+    device.inside = 1
+    full_fence()
+    if device.ended != RUNS:
+        device.inside = 0
+        return False
+    return True
+
+
+@kernel
+def _leave(device: Any) -> None:
+    if device.ended == LET_GO:  # closed meanwhile: the call before had not returned
+        finish(device)
+    fence()
+    device.inside = 0
+
+
+@kernel
+def finish(device: Any) -> None:
+    """Send zero force, and take the current off the motors."""
+    _push(device, 0.0, 0.0, 0.0)
+    _call_stop(device.stop, device.id)
+
+
+@kernel
+def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
+    device.now_ns = now_ns
+    device.ticks += 1
+    if device.ticks % STATUS_TICKS == 0:
+        if np.int32(_call_fill(device.get_status, context + _STATUS, device.id)) < 0:
+            return _end(device, ERROR)
+        if device.status[FORCE] == 0:
+            device.off_cause = device.status[FORCE_OFF_CAUSE]
+            return _end(device, FORCE_OFF)
+    at = context + _POSITION
+    got = np.int32(_call_vector(device.get_position, at, at + 8, at + 16, device.id))
+    if got < 0:
+        return _end(device, ERROR)
+    if got == TIMEGUARD:
+        device.guarded += 1
+        return READ_NOTHING_NEW
+    if not _finite(device.position_m):
+        return _end(device, BAD_NUMBER)
+    device.fresh += 1
+    device.fresh_ns = now_ns
+    _from_maker(device.position_m, out.position_m)
+    out.buttons = np.int64(np.uint32(_call_buttons(device.get_buttons, device.id)))
+    at = context + _VELOCITY
+    if np.int32(_call_vector(device.get_velocity, at, at + 8, at + 16, device.id)) >= 0 and _finite(
+        device.velocity_mps
+    ):
+        _from_maker(device.velocity_mps, out.velocity_mps)
+        out.measured |= MEASURED_VELOCITY
+    if (
+        device.wrist != 0
+        and np.int32(_call_fill(device.get_orientation, context + _ROTATION, device.id)) >= 0
+        and _put_quaternion(device.rotation, out.orientation)
+    ):
+        out.measured |= MEASURED_ORIENTATION
+    if (
+        device.gripper != 0
+        and np.int32(_call_fill(device.get_gripper, context + _GAP, device.id)) >= 0
+        and math.isfinite(device.gap_m)
+    ):
+        out.gripper_m = device.gap_m
+        out.measured |= MEASURED_GRIPPER
+    return READ_NEW
+
+
+@kernel
+def _finite(vector: Any) -> bool:
+    return math.isfinite(vector[0]) and math.isfinite(vector[1]) and math.isfinite(vector[2])
+
+
+@kernel
+def _from_maker(vector: Any, out: Any) -> None:
+    """Give a vector of the maker's axes (toward the participant, right, up) in the hand frame (right, up, toward)."""
+    out[0], out[1], out[2] = vector[1], vector[2], vector[0]
+
+
+@kernel
+def _put_quaternion(rotation: Any, out: Any) -> bool:
+    """Give a rotation matrix of the maker's axes as a unit quaternion w, x, y, z of the hand frame; False: it is none.
+
+    Shepperd's method: the largest of w^2, x^2, y^2, z^2 is found first (S. W. Shepperd, J. Guidance and Control 1,
+    1978, 223). Turning the axes by a permutation permutes the vector part alike.
+    """
+    trace = rotation[0, 0] + rotation[1, 1] + rotation[2, 2]
+    i = 0
+    for axis in range(1, 3):
+        if rotation[axis, axis] > rotation[i, i]:
+            i = axis
+    j, k = (i + 1) % 3, (i + 2) % 3
+    if trace >= rotation[i, i]:
+        w = 1.0 + trace
+        out[1] = rotation[2, 1] - rotation[1, 2]
+        out[2] = rotation[0, 2] - rotation[2, 0]
+        out[3] = rotation[1, 0] - rotation[0, 1]
+    else:
+        w = rotation[k, j] - rotation[j, k]
+        out[1 + i] = 1.0 + 2.0 * rotation[i, i] - trace
+        out[1 + j] = rotation[i, j] + rotation[j, i]
+        out[1 + k] = rotation[i, k] + rotation[k, i]
+    x, y, z = out[1], out[2], out[3]
+    size = math.sqrt(w * w + x * x + y * y + z * z)
+    if not (size > 0.0 and math.isfinite(size)):
+        return False
+    out[0], out[1], out[2], out[3] = w / size, y / size, z / size, x / size
+    return True
+
+
+@kernel
+def _send_force(device: Any, asked: Any) -> int:
+    """Send a force [N, hand frame], and say in the record which one was sent."""
+    x_n, y_n, z_n = asked.force_n[0], asked.force_n[1], asked.force_n[2]
+    square = x_n * x_n + y_n * y_n + z_n * z_n
+    most_n = _NORM_SLACK * device.force_limit_n
+    if not square <= most_n * most_n:  # nor NaN: the servo sends neither
+        x_n = y_n = z_n = 0.0
+    got = _push(device, x_n, y_n, z_n)
+    if got < 0:
+        return _end(device, ERROR)
+    if got == MOTOR_SATURATED:
+        device.saturated += 1
+    asked.sent_n[0], asked.sent_n[1], asked.sent_n[2] = x_n, y_n, z_n
+    return 0
+
+
+@kernel
+def _push(device: Any, x_n: float, y_n: float, z_n: float) -> Any:
+    """Send a force of the hand frame in the maker's axes; motors of wrist and gripper get 0."""
+    if device.active != 0:
+        return np.int32(_call_push_all(device.set_all_forces, z_n, x_n, y_n, 0.0, 0.0, 0.0, 0.0, device.id))
+    return np.int32(_call_push(device.set_force, z_n, x_n, y_n, device.id))
+
+
+@kernel
+def _end(device: Any, why: int) -> int:
+    """End the exchange with zero force."""
+    finish(device)
+    device.ended = why
+    return READ_LOST

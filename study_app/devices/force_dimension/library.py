@@ -1,0 +1,239 @@
+"""The maker's library as it is installed: found, loaded, and called while a device is opened and closed.
+
+Signatures follow ``dhdc.h`` and ``drdc.h`` of the Force Dimension SDK 3.17.5 (public in CHAI3D 3.3.0,
+``externals/DHD/include``); nothing of the maker's is part of this program. Loads no compiler.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+import sys
+import time
+from collections.abc import Sequence
+from ctypes import POINTER, c_bool, c_byte, c_char_p, c_double, c_int, c_ubyte, c_uint, c_ushort, c_void_p
+from pathlib import Path
+from typing import Any, Final
+
+from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
+from study_app.devices.failure_table import DeviceFailure
+from study_app.devices.force_dimension.failures import CAUSES, FAILURES, VARIABLE
+
+_OUT: Final = POINTER(c_double)
+SIGNATURES: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
+    "dhdErrorGetLastStr": (c_char_p, ()),  # dhdc.h 74
+    "dhdGetDeviceCount": (c_int, ()),  # 218
+    "dhdGetSerialNumber": (c_int, (POINTER(c_ushort), c_byte)),  # 222
+    "dhdOpen": (c_int, ()),  # 223
+    "dhdOpenSerial": (c_int, (c_int,)),  # 225
+    "dhdClose": (c_int, (c_byte,)),  # 227
+    "dhdStop": (c_int, (c_byte,)),  # 229
+    "dhdEnableForce": (c_int, (c_ubyte, c_byte)),  # 231
+    "dhdGetSystemType": (c_int, (c_byte,)),  # 233
+    "dhdGetSystemName": (c_char_p, (c_byte,)),  # 235
+    "dhdGetSDKVersion": (None, (POINTER(c_int),) * 4),  # 238
+    "dhdGetStatus": (c_int, (POINTER(c_int), c_byte)),  # 241
+    "dhdGetEffectorMass": (c_int, (_OUT, c_byte)),  # 244
+    "dhdGetButtonMask": (c_uint, (c_byte,)),  # 247
+    "dhdHasWrist": (c_bool, (c_byte,)),  # 251
+    "dhdHasActiveWrist": (c_bool, (c_byte,)),  # 252
+    "dhdHasGripper": (c_bool, (c_byte,)),  # 253
+    "dhdHasActiveGripper": (c_bool, (c_byte,)),  # 254
+    "dhdSetGravityCompensation": (c_int, (c_int, c_byte)),  # 259
+    "dhdGetPosition": (c_int, (_OUT, _OUT, _OUT, c_byte)),  # 264
+    "dhdSetForce": (c_int, (c_double, c_double, c_double, c_byte)),  # 266
+    "dhdGetOrientationFrame": (c_int, (_OUT, c_byte)),  # 274: double matrix[3][3]
+    "dhdGetGripperGap": (c_int, (_OUT, c_byte)),  # 277
+    "dhdSetForceAndTorqueAndGripperForce": (c_int, (*(c_double,) * 7, c_byte)),  # 282
+    "dhdGetLinearVelocity": (c_int, (_OUT, _OUT, _OUT, c_byte)),  # 285
+    "dhdGetMaxForce": (c_double, (c_byte,)),  # 306
+    "dhdEnableExpertMode": (c_int, ()),  # 315
+    "dhdDisableExpertMode": (c_int, ()),  # 316
+    "dhdSetTimeGuard": (c_int, (c_int, c_byte)),  # 319
+    "dhdGetVelocityThreshold": (c_int, (POINTER(c_uint), c_byte)),  # 321
+    "dhdSetWatchdog": (c_int, (c_ubyte, c_byte)),  # 373
+    "dhdGetWatchdog": (c_int, (POINTER(c_ubyte), c_byte)),  # 374
+    "drdIsInitialized": (c_bool, (c_byte,)),  # drdc.h 41
+}
+STATUS_WORDS: Final = 32
+"""Room for more than the DHD_MAX_STATUS (17) words of 3.17.5 (dhdc.h 164)."""
+RESET, FORCE, FORCE_OFF_CAUSE = 3, 5, 14  # dhdc.h 170, 172, 181
+DEFAULT_TIME_GUARD: Final = -1
+LONGEST_WATCHDOG: Final = 255
+WATCHDOG_S: Final = 125e-6
+"""Unit of the watchdog: documentation of forcedimension_core 1.0.0, expert.setWatchdog; CHAI3D 3.3.0 sets 255, too."""
+_ENABLE_S: Final = 0.5
+_CAN: Final = "force up to the device's own limit, through the maker's library; not proved on hardware"
+
+
+class Library:
+    """The maker's library, loaded.
+
+    Parameters
+    ----------
+    path : of the library; None: as the environment variable states, else the usual names
+
+    Raises
+    ------
+    DeviceFailure
+        It is not there, or lacks functions.
+    """
+
+    def __init__(self, path: str | Path | None = None) -> None:
+        self._functions = _load(path)
+        missing = [name for name in SIGNATURES if not hasattr(self._functions, name)]
+        if missing:
+            raise FAILURES.failure("old-library", ", ".join(missing))
+        for name, (returned, taken) in SIGNATURES.items():
+            function = getattr(self._functions, name)
+            function.restype, function.argtypes = returned, taken
+
+    @property
+    def version(self) -> str:
+        """The version of the SDK."""
+        numbers = [c_int() for _ in range(4)]
+        self._functions.dhdGetSDKVersion(*numbers)
+        return ".".join(str(number.value) for number in numbers)
+
+    @property
+    def devices(self) -> int:
+        """How many devices are connected."""
+        return int(self._functions.dhdGetDeviceCount())
+
+    def address(self, name: str) -> int:
+        """Return where a function is, for compiled code."""
+        return int(ctypes.cast(getattr(self._functions, name), c_void_p).value or 0)
+
+    def open(self, serial: int | None) -> int:
+        """Open the device with this serial number, or the first one; return its id.
+
+        Raises
+        ------
+        DeviceFailure
+            There is none that can be opened.
+        """
+        found = self._functions.dhdOpen() if serial is None else self._functions.dhdOpenSerial(serial)
+        if found < 0:
+            raise FAILURES.failure("no-device", self._last_error())
+        return int(found)
+
+    def prepare(self, device: int, force_limit_n: float) -> dict[str, Any]:
+        """Check an open device, keep its safety functions on, and enable its force; return what the receipt records.
+
+        Raises
+        ------
+        DeviceFailure
+            It is not calibrated, not safe, or its force cannot be enabled.
+        """
+        call = self._functions
+        if not call.drdIsInitialized(device) or self._status(device)[RESET]:
+            raise FAILURES.failure("uncalibrated")
+        most_n = float(call.dhdGetMaxForce(device))
+        if 0.0 <= most_n < force_limit_n:
+            raise FAILURES.failure("max-force", f"{most_n:g} N instead of {force_limit_n:g} N")
+        safety = self._keep_safe(device)
+        call.dhdSetGravityCompensation(1, device)
+        self._enable_force(device)
+        serial, mass = c_ushort(), c_double()
+        has_serial = call.dhdGetSerialNumber(serial, device) >= 0
+        has_mass = call.dhdGetEffectorMass(mass, device) >= 0 and math.isfinite(mass.value)
+        return {
+            "sdk": self.version,
+            "system": (call.dhdGetSystemName(device) or b"").decode(errors="replace"),
+            "system_type": int(call.dhdGetSystemType(device)),
+            "serial": str(serial.value) if has_serial else None,
+            "wrist": bool(call.dhdHasWrist(device)),
+            "gripper": bool(call.dhdHasGripper(device)),
+            "active_wrist": bool(call.dhdHasActiveWrist(device)),
+            "active_gripper": bool(call.dhdHasActiveGripper(device)),
+            "gravity_compensation": True,
+            "effector_mass_kg": mass.value if has_mass else None,
+            "max_force_n": most_n if most_n >= 0.0 else None,
+            **safety,
+        }
+
+    def close(self, device: int) -> None:
+        """Close a device; the force was ended before."""
+        self._functions.dhdClose(device)
+
+    def abandon(self, device: int) -> None:
+        """End the force and close a device that could not be prepared."""
+        self._functions.dhdSetForce(0.0, 0.0, 0.0, device)
+        self._functions.dhdStop(device)
+        self._functions.dhdClose(device)
+
+    def _keep_safe(self, device: int) -> dict[str, Any]:
+        """Keep the safety functions on and return them; a watchdog, if there is one, is set to its longest: 32 ms."""
+        call, threshold, watchdog = self._functions, c_uint(), c_ubyte()
+        call.dhdEnableExpertMode()
+        try:
+            if call.dhdSetTimeGuard(DEFAULT_TIME_GUARD, device) < 0:
+                raise FAILURES.failure("safety", f"time guard: {self._last_error()}")
+            if call.dhdGetVelocityThreshold(threshold, device) < 0 or threshold.value == 0:
+                raise FAILURES.failure("safety", f"the velocity threshold is {threshold.value}")
+            watched = call.dhdSetWatchdog(LONGEST_WATCHDOG, device) >= 0 and call.dhdGetWatchdog(watchdog, device) >= 0
+        finally:
+            call.dhdDisableExpertMode()
+        return {
+            "time_guard": "default",
+            "velocity_threshold": threshold.value,
+            "watchdog_s": watchdog.value * WATCHDOG_S if watched and watchdog.value else None,
+        }
+
+    def _enable_force(self, device: int) -> None:
+        """Enable the force at zero, and wait until the device says that it is."""
+        call = self._functions
+        if call.dhdEnableForce(1, device) < 0:
+            raise FAILURES.failure("force-off", self._last_error())
+        patience = time.monotonic() + _ENABLE_S
+        while True:
+            call.dhdSetForce(0.0, 0.0, 0.0, device)
+            status = self._status(device)
+            if status[FORCE]:
+                return
+            if time.monotonic() > patience:
+                raise FAILURES.failure("force-off", CAUSES.get(status[FORCE_OFF_CAUSE], ""))
+            time.sleep(0.01)
+
+    def _status(self, device: int) -> list[int]:
+        words = (c_int * STATUS_WORDS)()
+        if self._functions.dhdGetStatus(words, device) < 0:
+            raise FAILURES.failure("error", f"dhdGetStatus: {self._last_error()}")
+        return list(words)
+
+    def _last_error(self) -> str:
+        return (self._functions.dhdErrorGetLastStr() or b"").decode(errors="replace")
+
+
+def probe() -> Backend:
+    """Return whether the library is installed, and how many devices it finds; opens none."""
+    try:
+        library = Library()
+    except DeviceFailure as failed:
+        return Backend("force-dimension", "libdrd", NOT_AVAILABLE, _CAN, FAILURES.sentence(failed.mode))
+    by, found = f"libdrd {library.version}", library.devices
+    if found < 1:
+        return Backend("force-dimension", by, NONE, _CAN, FAILURES.sentence("no-device"))
+    return Backend("force-dimension", by, f"connected: {found}", _CAN)
+
+
+def _load(path: str | Path | None) -> ctypes.CDLL:
+    given = path or os.environ.get(VARIABLE)
+    reason = ""
+    for candidate in (str(given),) if given else _usual_names():
+        try:
+            return ctypes.CDLL(candidate)
+        except OSError as error:
+            reason = " ".join(str(error).split())
+    raise FAILURES.failure("no-library", reason)
+
+
+def _usual_names() -> Sequence[str]:
+    """Return the names under which the library is installed; CHAI3D 3.3.0 loads drd64.dll, too."""
+    if sys.platform == "win32":
+        return ("drd64.dll",)
+    name = "libdrd.dylib" if sys.platform == "darwin" else "libdrd.so"
+    folders = (Path.home() / ".local" / "lib", Path("/usr/local/lib"))
+    versions = "libdrd*.dylib" if sys.platform == "darwin" else "libdrd.so*"
+    return (name, *(file for folder in folders for file in sorted(map(str, folder.glob(versions)), reverse=True)))

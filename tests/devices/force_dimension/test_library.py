@@ -1,0 +1,360 @@
+"""The real driver with a stand-in library of our own, built by the C compiler: opening, ticks, faults, ends."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.devices.descriptor import NONE, NOT_AVAILABLE
+from study_app.devices.failure_table import DeviceFailure
+from study_app.devices.force_dimension.failures import FAILURES, VARIABLE
+from study_app.devices.force_dimension.library import LONGEST_WATCHDOG, SIGNATURES, Library, probe
+from study_app.devices.registry import open_device
+from study_app.errors import DeviceError, DeviceLost, DeviceNotFound, ServoFault
+from tests.compiled import needs_servo
+
+COMPILER = shutil.which("cc")
+SOURCE = Path(__file__).with_name("standin.c")
+STROKE_TICKS = 1000
+
+pytestmark = [
+    needs_servo,
+    pytest.mark.skipif(COMPILER is None, reason="no C compiler ('cc') is installed"),
+    pytest.mark.skipif(sys.platform == "win32", reason="the stand-in is built with the options of a POSIX compiler"),
+]
+
+FAULTS = (
+    "none",
+    "no-device",
+    "uncalibrated",
+    "no-threshold",
+    "weak",
+    "stays-off",
+    "error",
+    "nan",
+    "turns-off",
+    "slow",
+    "guarded",
+    "write-error",
+    "saturated",
+    "status-error",
+    "hangs",
+)
+"""In the order of the stand-in's enumeration."""
+OPENING = {
+    "no-device": "no-device",
+    "uncalibrated": "uncalibrated",
+    "no-threshold": "safety",
+    "weak": "max-force",
+    "stays-off": "force-off",
+}
+STREAM = {
+    "error": "error",
+    "nan": "not-finite",
+    "turns-off": "force-off",
+    "write-error": "error",
+    "status-error": "error",
+}
+REFUSED_WRITES = {"write-error"}
+"""The stand-in takes no force then, not the last zero either: `dhdStop` is what ends it."""
+
+
+def build(folder: Path, *options: str) -> Path:
+    library = folder / "libdrd-standin.so"
+    command = [COMPILER, "-std=c11", "-D_POSIX_C_SOURCE=199309L", "-Wall", "-Werror", "-shared", "-fPIC", *options]
+    subprocess.run([*command, SOURCE, "-o", library, "-lm"], check=True)
+    return library
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(tmp_path_factory.mktemp("standin"))
+
+
+class StandIn:
+    """The stand-in's own functions, for tests."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.loaded = ctypes.CDLL(str(path))  # the same instance that the driver loads
+
+    def fault(self, name: str) -> None:
+        self.loaded.standin_fault(FAULTS.index(name))
+
+    def rotate(self, rotation: Any) -> None:
+        self.loaded.standin_rotate((ctypes.c_double * 9)(*np.ravel(rotation)))
+
+    @property
+    def state(self) -> dict[str, Any]:
+        out = (ctypes.c_double * 14)()
+        self.loaded.standin_state(out)
+        names = ("force_on", "open", "closed", "stopped", "time_guard", "watchdog", "gravity")
+        return {"force_n": list(out[:3]), "torque": list(out[3:6]), "grip": out[6]} | dict(
+            zip(names, out[7:], strict=True)
+        )
+
+
+@pytest.fixture
+def standin(built: Path) -> Iterator[StandIn]:
+    one = StandIn(built)
+    one.loaded.standin_reset()
+    yield one
+    one.loaded.standin_reset()
+
+
+def opened(standin: StandIn, name: str = "force-dimension", **limits: Any) -> Any:
+    return open_device(name, options={"dhd-library": standin.path}, **limits)
+
+
+def ticking(device: Any) -> Any:
+    """Return a servo in mid-stroke through honey; a reading of the stand-in is a millisecond."""
+    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.servo import Servo
+    from study_app.protocol.load import load
+
+    servo = Servo(device, clock=VirtualClock())
+    servo.load(load("rek2024").scene_for("honey"))
+    servo.advance(STROKE_TICKS)
+    return servo
+
+
+def ended(standin: StandIn) -> bool:
+    """Whether no force acts: zero was sent, or the motors were turned off."""
+    state = standin.state
+    return state["stopped"] == 1.0 and state["force_on"] == 0.0
+
+
+class TestLibrary:
+    def test_a_library_that_is_not_there_is_refused_with_the_cure(self, tmp_path: Path) -> None:
+        with pytest.raises(DeviceNotFound, match=rf"cannot be loaded .*--dhd-library or {VARIABLE}$"):
+            open_device("force-dimension", options={"dhd-library": tmp_path / "libdrd.so"})
+
+    def test_a_library_without_a_function_is_refused_with_its_name(self, tmp_path: Path) -> None:
+        with pytest.raises(DeviceFailure, match=r"\(dhdSetWatchdog, dhdGetWatchdog\): it is older") as refused:
+            Library(build(tmp_path, "-DLACKS_WATCHDOG"))
+        assert refused.value.mode == "old-library"
+
+    def test_the_stand_in_has_every_function(self, standin: StandIn) -> None:
+        library = Library(standin.path)
+        assert library.version == "3.17.5.0"
+        assert all(library.address(name) for name in SIGNATURES)
+
+    def test_probe_finds_library_and_devices_without_opening(
+        self, standin: StandIn, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv(VARIABLE, str(standin.path))
+        assert probe().state == "connected: 1"
+        standin.fault("no-device")
+        assert probe().state == NONE
+        monkeypatch.setenv(VARIABLE, str(standin.path.with_name("nowhere.so")))
+        found = probe()
+        assert found.state == NOT_AVAILABLE
+        assert VARIABLE in found.why
+        assert standin.state["open"] == 0.0
+
+
+class TestOpening:
+    def test_safety_functions_stay_on_and_are_recorded(self, standin: StandIn) -> None:
+        with opened(standin) as device:
+            found = device.describe()
+            state = standin.state
+            assert (state["time_guard"], state["watchdog"], state["gravity"]) == (-1.0, LONGEST_WATCHDOG, 1.0)
+            assert state["force_on"] == 1.0
+            assert state["force_n"] == [0.0, 0.0, 0.0]
+        assert found["velocity_threshold"] == 40
+        assert found["watchdog_s"] == pytest.approx(0.031875)
+        assert (found["sdk"], found["system"], found["serial"]) == ("3.17.5.0", "stand-in omega.7", "10233")
+        assert ended(standin)
+        assert standin.state["closed"] == 1.0
+
+    def test_a_serial_number_chooses_the_device(self, standin: StandIn) -> None:
+        opened(standin, "force-dimension:10233").close()
+        with pytest.raises(DeviceNotFound, match="the library opens no such device"):
+            opened(standin, "force-dimension:10234")
+        with pytest.raises(DeviceError, match="'left' is not a serial number"):
+            opened(standin, "force-dimension:left")
+
+    @pytest.mark.parametrize("fault", OPENING)
+    def test_a_fault_of_opening_is_refused_with_cause_and_cure_and_without_force(
+        self, standin: StandIn, fault: str
+    ) -> None:
+        standin.fault(fault)
+        with pytest.raises(DeviceFailure) as refused:
+            opened(standin)
+        mode = FAILURES.mode(OPENING[fault])
+        assert refused.value.mode == mode.id
+        message = str(refused.value)
+        assert "\n" not in message
+        assert mode.cause in message
+        assert message.endswith(mode.cure)
+        assert standin.state["force_n"] == [0.0, 0.0, 0.0]
+        assert standin.state["open"] == 0.0
+        assert fault == "no-device" or ended(standin)
+
+
+class TestTicks:
+    def test_position_velocity_buttons_orientation_and_gripper_are_in_the_hand_frame(self, standin: StandIn) -> None:
+        standin.rotate([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # 90 degrees about the maker's z: up
+        standin.loaded.standin_press(0b101)
+        with opened(standin) as device:
+            from study_app.haptics.runtime.clocks.clock import VirtualClock
+            from study_app.haptics.runtime.servo import Servo
+
+            servo = Servo(device, clock=VirtualClock())
+            reader = servo.telemetry.reader()
+            servo.advance(500)
+            rows = reader.read()[1:]
+        t_s = 1e-3 * np.arange(2, len(rows) + 2)
+        assert rows.position_m[:, 0] == pytest.approx(0.03 * np.sin(2 * np.pi * t_s))
+        assert (rows.position_m[:, 1] == 0.01).all()
+        assert (rows.position_m[:, 2] == 0.0).all()
+        assert rows.device_velocity_mps[:, 0] == pytest.approx(0.06 * np.pi * np.cos(2 * np.pi * t_s))
+        half = math.sqrt(0.5)
+        assert rows.orientation[-1] == pytest.approx([half, 0.0, half, 0.0])  # about the hand frame's y: up
+        assert (rows.gripper_m == 0.012).all()
+        assert (rows.buttons == 0b101).all()
+        assert (rows.measured == 0b111).all()
+
+    @pytest.mark.parametrize("axis", range(3))
+    @pytest.mark.parametrize("angle", [0.3, 2.0, 3.1, -3.1])
+    def test_an_orientation_about_each_axis_is_that_about_the_hand_frames(
+        self, standin: StandIn, axis: int, angle: float
+    ) -> None:
+        from study_app.haptics.model.layout import new_reading
+
+        rotation = np.eye(3)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        rotation[i, i] = rotation[j, j] = math.cos(angle)
+        rotation[j, i] = math.sin(angle)
+        rotation[i, j] = -math.sin(angle)
+        standin.rotate(rotation)
+        with opened(standin) as device:
+            reading = new_reading()
+            assert device.read.ctypes(device.context, 1_000_000, reading.ctypes.data) == 0
+        expected = np.zeros(4)
+        expected[0] = math.cos(angle / 2)
+        expected[1 + (axis + 2) % 3] = math.sin(angle / 2)  # the maker's x, y, z are z, x, y of the hand frame
+        found = reading[0].orientation
+        assert abs(found @ expected) == pytest.approx(1.0, abs=1e-12)
+
+    def test_force_is_sent_in_the_makers_axes_and_motors_of_the_wrist_get_none(self, standin: StandIn) -> None:
+        from tests.devices.contract import write
+
+        with opened(standin, force_limit_n=4.0) as device:
+            assert write(device, (1.0, 2.0, -3.0))[1].tolist() == [1.0, 2.0, -3.0]
+            state = standin.state
+            assert state["force_n"] == [-3.0, 1.0, 2.0]
+            assert (state["torque"], state["grip"]) == ([0.0, 0.0, 0.0], 0.0)
+            for refused in ((0.0, 5.0, 0.0), (math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0)):
+                assert write(device, refused)[1].tolist() == [0.0, 0.0, 0.0]
+                assert standin.state["force_n"] == [0.0, 0.0, 0.0]
+
+    def test_readings_that_the_time_guard_answers_are_not_new(self, standin: StandIn) -> None:
+        standin.fault("guarded")
+        with opened(standin) as device:
+            servo = ticking(device)
+            servo.check()
+            assert device.counters["guarded"] == pytest.approx(STROKE_TICKS / 2, abs=1)
+            assert device.counters["fresh"] + device.counters["guarded"] == device.counters["ticks"]
+
+    def test_forces_that_saturate_the_motors_are_counted(self, standin: StandIn) -> None:
+        standin.fault("saturated")
+        with opened(standin) as device:
+            ticking(device).check()
+            assert device.counters["saturated"] >= STROKE_TICKS
+
+
+class TestFaults:
+    def test_the_tables_have_every_fault(self) -> None:
+        assert {"none", "slow", "hangs", "guarded", "saturated", *OPENING, *STREAM} == set(FAULTS)
+
+    @pytest.mark.parametrize("fault", STREAM)
+    def test_a_fault_in_a_stroke_ends_in_its_message_and_zero_force(self, standin: StandIn, fault: str) -> None:
+        device = opened(standin)
+        servo = ticking(device)
+        assert np.linalg.norm(standin.state["force_n"]) > 0.5
+        standin.fault(fault)
+        assert servo.advance(100) < 60
+        assert device.failure_mode == STREAM[fault]
+        with pytest.raises((DeviceLost, ServoFault)) as stopped:
+            servo.check()
+        mode, message = FAILURES.mode(STREAM[fault]), str(stopped.value)
+        assert message.startswith("the device 'force-dimension' stopped: ")
+        assert mode.symptom in message
+        assert mode.cure in message
+        assert message.endswith("; the force is zero")
+        assert fault != "turns-off" or "(velocity threshold)" in message
+        assert ended(standin)  # before anything is closed
+        assert fault in REFUSED_WRITES or standin.state["force_n"] == [0.0, 0.0, 0.0]
+        servo.stop()
+        device.close()
+        assert standin.state["closed"] == 1.0
+
+    def test_a_call_that_lasts_ends_the_servo_and_the_force_once_it_returns(self, standin: StandIn) -> None:
+        from study_app.haptics.runtime.servo import Servo
+
+        device = opened(standin)
+        servo = Servo(device)
+        servo.start()
+        standin.fault("slow")
+        patience = time.monotonic() + 10.0
+        while servo.fault is None:
+            assert time.monotonic() < patience
+            time.sleep(0.005)
+        with pytest.raises(ServoFault, match="force-dimension"):
+            servo.check()
+        servo.stop()
+        device.close()
+        assert ended(standin)
+        assert standin.state["force_n"] == [0.0, 0.0, 0.0]
+
+    def test_a_call_that_outlasts_closing_ends_the_force_once_it_returns(self, standin: StandIn) -> None:
+        from study_app.haptics.model.layout import new_reading
+        from tests.devices.contract import write
+
+        device = opened(standin)
+        write(device, (1.0, 0.0, 0.0))
+        standin.fault("hangs")
+        reading = new_reading()
+        call = threading.Thread(target=device.read.ctypes, args=(device.context, 1_000_000, reading.ctypes.data))
+        call.start()
+        while not device.exchange.inside:
+            time.sleep(0.001)
+        device.close()
+        assert standin.state["closed"] == 0.0
+        with pytest.raises(DeviceFailure, match="a call of the library does not return"):
+            device.open()
+        call.join()
+        assert ended(standin)
+        assert standin.state["force_n"] == [0.0, 0.0, 0.0]
+        device.close()
+        assert standin.state["closed"] == 1.0
+
+
+class TestDoctor:
+    def test_a_device_in_order_has_no_finding(self, standin: StandIn) -> None:
+        from study_app.devices.force_dimension.doctor import examine
+
+        report = examine("force-dimension", options={"dhd-library": standin.path}, progress=str, seconds=0.5)
+        assert report.failure is None
+        assert not [one.id for one in report.found if one.id != "rate"]  # a loaded machine may be late
+        assert ended(standin)
+
+    @pytest.mark.parametrize("fault", OPENING)
+    def test_a_fault_of_opening_is_the_finding(self, standin: StandIn, fault: str) -> None:
+        from study_app.devices.force_dimension.doctor import examine
+
+        standin.fault(fault)
+        report = examine("force-dimension", options={"dhd-library": standin.path}, progress=str)
+        assert [one.id for one in report.found] == [OPENING[fault]]
