@@ -69,8 +69,9 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, **device_options
     """Examine a device: find, open and run it without force; say what is wrong, why, and the cure.
 
     NAME is a device that has a doctor: falcon, falcon:SERIAL, falcon-emulated, falcon-socket:PATH, inverse3,
-    inverse3:HOST:PORT or inverse3-emulated. Exit code 3 where something is wrong. The zip file holds this report,
-    versions, settings, log and last error; no participant's id, no answer, no liquid's value.
+    inverse3:HOST:PORT, inverse3-emulated, force-dimension, force-dimension:SERIAL or force-dimension-emulated. Exit
+    code 3 where something is wrong. The zip file holds this report, versions, settings, log and last error; no
+    participant's id, no answer, no liquid's value.
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
     from study_app.devices.doctor_report import lines
