@@ -39,9 +39,9 @@ def _probe_emulated() -> list[Backend]:
 
 
 def _findings() -> tuple[Finding, ...]:
-    from study_app.devices.inverse3.failures import findings  # noqa: PLC0415 - only where it is examined
+    from study_app.devices.inverse3.failures import FAILURES  # noqa: PLC0415 - only where it is examined
 
-    return findings()
+    return FAILURES.findings()
 
 
 def _examine(

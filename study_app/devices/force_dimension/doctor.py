@@ -5,26 +5,18 @@ Everything is done by the driver that a session uses, so what fails there fails 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 from study_app.devices.doctor_report import Report
+from study_app.devices.doctor_run import LEAST_HZ, MOVE, SECONDS, fresh_rate_hz, run_at_rest
 from study_app.devices.failure_table import DeviceFailure
 from study_app.devices.force_dimension.device import ForceDimensionDevice
 from study_app.devices.force_dimension.emulated import EmulatedForceDimension
 from study_app.devices.force_dimension.failures import FAILURES, OPTION
-from study_app.errors import DeviceError, DeviceLost, ServoFault
-from study_app.haptics.runtime.clocks.clock import VirtualClock
-from study_app.haptics.runtime.servo import Servo
+from study_app.errors import DeviceError
 
-SECONDS: Final = 3.0
-LEAST_HZ: Final = 900.0
-MOVE: Final = "Hold the handle and move it about a little …"
-_CHUNK_S = 0.25
 _FAULT_AFTER = 1000  # readings
 _RUNNING: Final = "error"  # modes from here on appear while it runs
 
@@ -59,9 +51,9 @@ def examine(
         return Report((), FAILURES.findings(failed.mode, FAILURES.before(failed.mode)), str(failed))
     with device:
         progress(MOVE)
-        samples, fault = _run(device, seconds)
+        samples, fault = run_at_rest(device, seconds)
         mode, counters, found = device.failure_mode, device.counters, device.describe()
-    fresh_hz = float(samples["fresh"].sum()) / max(len(samples), 1) * 1000.0
+    fresh_hz = fresh_rate_hz(samples)
     if mode is None and fresh_hz < LEAST_HZ:
         mode = "rate"
     passed = {one.id for one in FAILURES.modes} - {mode} if fault is None else FAILURES.before(_RUNNING) - {mode}
@@ -77,27 +69,6 @@ def _device(name: str, options: Mapping[str, str | Path], faults: Sequence[str])
     for fault in faults:
         device.emulated.take(fault, _FAULT_AFTER)
     return device
-
-
-def _run(device: ForceDimensionDevice, seconds: float) -> tuple[Any, str | None]:
-    """Run it without force; return the samples, and the servo's fault, if it stopped itself."""
-    emulated = isinstance(device, EmulatedForceDimension)
-    kept: list[Any] = []
-    with Servo(device, clock=VirtualClock() if emulated else None) as servo:
-        reader = servo.telemetry.reader()
-        for _ in range(max(round(seconds / _CHUNK_S), 1)):
-            if isinstance(device, EmulatedForceDimension):
-                device.hand.reach_to(0.01 * (-1) ** len(kept), 0.005, 0.0)
-                servo.advance(round(_CHUNK_S * servo.rate_hz))
-            else:
-                time.sleep(_CHUNK_S)
-            kept.append(np.asarray(reader.read()).copy())
-        fault = None
-        try:
-            servo.check()
-        except (DeviceLost, ServoFault) as failed:
-            fault = str(failed)
-    return np.concatenate(kept), fault
 
 
 def _words(found: Mapping[str, Any], counters: Mapping[str, int], fresh_hz: float) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from study_app.devices.base import Device
 from study_app.devices.inverse3 import exchange
 from study_app.devices.inverse3.exchange import COUNTERS, exchange_functions, finish, new_exchange
-from study_app.devices.inverse3.failures import failure, sentence
+from study_app.devices.inverse3.failures import FAILURES
 from study_app.devices.inverse3.json_scan import text_hash
 from study_app.devices.inverse3.link import HOST, PORT, Link, SocketLink
 from study_app.devices.inverse3.opening import Messages, open_session
@@ -85,7 +85,7 @@ class Inverse3Device(Device):
 
         Raises
         ------
-        Inverse3Failure
+        DeviceFailure
             There is no service or device, it cannot be used, or its settings are not neutral.
         """
         if self._link is not None:
@@ -157,7 +157,7 @@ class Inverse3Device(Device):
     def failure(self) -> str | None:
         """Symptom, cause and cure of what ended the stream in a sentence; None while nothing did."""
         mode = self.failure_mode
-        return None if mode is None else sentence(mode)
+        return None if mode is None else FAILURES.sentence(mode)
 
     def describe(self) -> dict[str, Any]:
         """Return what the receipt says of it."""
@@ -177,12 +177,12 @@ class Inverse3Device(Device):
 
         Raises
         ------
-        Inverse3Failure
+        DeviceFailure
             It is not 1, so that forces are other than commanded.
         """
         scale = self._force_scale()
         if scale is not None and scale != 1.0:
-            raise failure("settings", f"devices/force_scale is {scale:g}, and 1 is required")
+            raise FAILURES.failure("settings", f"devices/force_scale is {scale:g}, and 1 is required")
         return scale
 
     def _force_scale(self) -> float | None:

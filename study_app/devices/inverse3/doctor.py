@@ -5,25 +5,18 @@ Everything is done by the driver that a session uses, so what fails there fails 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from typing import Any, Final
-
-import numpy as np
+from typing import Final
 
 from study_app.devices.doctor_report import Report
+from study_app.devices.doctor_run import LEAST_HZ, MOVE, SECONDS, fresh_rate_hz, run_at_rest
+from study_app.devices.failure_table import DeviceFailure
 from study_app.devices.inverse3.device import Inverse3Device
 from study_app.devices.inverse3.emulated import EmulatedInverse3
 from study_app.devices.inverse3.emulator.service import Service
-from study_app.devices.inverse3.failures import MODES, Inverse3Failure, findings
-from study_app.errors import DeviceError, DeviceLost, ServoFault
-from study_app.haptics.runtime.clocks.clock import VirtualClock
-from study_app.haptics.runtime.servo import Servo
+from study_app.devices.inverse3.failures import FAILURES
+from study_app.errors import DeviceError
 
-SECONDS: Final = 3.0
-LEAST_HZ: Final = 900.0
-MOVE: Final = "Hold the handle and move it about a little …"
-_CHUNK_S = 0.25
 _FAULT_AFTER = 1000  # commands
 _OPENED: Final = frozenset(
     {
@@ -59,17 +52,17 @@ def examine(
     device = _device(name, faults, progress)
     try:
         device.open()
-    except Inverse3Failure as failed:
-        return Report((), findings(failed.mode, _before(failed.mode)), str(failed))
+    except DeviceFailure as failed:
+        return Report((), FAILURES.findings(failed.mode, _before(failed.mode)), str(failed))
     with device:
         progress(MOVE)
-        samples, fault = _run(device, seconds)
+        samples, fault = run_at_rest(device, seconds)
         mode = device.failure_mode
-    fresh_hz = float(samples["fresh"].sum()) / max(len(samples), 1) * 1000.0
+    fresh_hz = fresh_rate_hz(samples)
     if mode is None and fresh_hz < LEAST_HZ:
         mode = "rate"
-    passed = {one.id for one in MODES} - {mode} if fault is None else _OPENED - {mode}
-    return Report(_words(device, fresh_hz), findings(mode, passed), fault)
+    passed = {one.id for one in FAILURES.modes} - {mode} if fault is None else _OPENED - {mode}
+    return Report(_words(device, fresh_hz), FAILURES.findings(mode, passed), fault)
 
 
 def _device(name: str, faults: Sequence[str], progress: Callable[[str], object]) -> Inverse3Device:
@@ -85,29 +78,8 @@ def _device(name: str, faults: Sequence[str], progress: Callable[[str], object])
 
 def _before(mode: str) -> set[str]:
     """Return the ids of what was tested before a device was refused for ``mode``."""
-    ids = [one.id for one in MODES if one.id in _OPENED]
+    ids = [one.id for one in FAILURES.modes if one.id in _OPENED]
     return set(ids[: ids.index(mode)]) if mode in ids else set()
-
-
-def _run(device: Inverse3Device, seconds: float) -> tuple[Any, str | None]:
-    """Run it at rest; return the samples, and the servo's fault, if it stopped itself."""
-    emulated = isinstance(device, EmulatedInverse3)
-    kept: list[Any] = []
-    with Servo(device, clock=VirtualClock() if emulated else None) as servo:
-        reader = servo.telemetry.reader()
-        for _ in range(max(round(seconds / _CHUNK_S), 1)):
-            if isinstance(device, EmulatedInverse3):
-                device.hand.reach_to(0.01 * (-1) ** len(kept), 0.005, 0.0)
-                servo.advance(round(_CHUNK_S * servo.rate_hz))
-            else:
-                time.sleep(_CHUNK_S)
-            kept.append(np.asarray(reader.read()).copy())
-        fault = None
-        try:
-            servo.check()
-        except (DeviceLost, ServoFault) as failed:
-            fault = str(failed)
-    return np.concatenate(kept), fault
 
 
 def _words(device: Inverse3Device, fresh_hz: float) -> tuple[str, ...]:

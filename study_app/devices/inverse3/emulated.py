@@ -13,7 +13,7 @@ import numpy as np
 
 from study_app.devices.inverse3.device import FORCE_LIMIT_N, WORKSPACE_M, Inverse3Device
 from study_app.devices.inverse3.emulator.service import Service, service_calls
-from study_app.devices.inverse3.failures import failure
+from study_app.devices.inverse3.failures import FAILURES
 from study_app.devices.inverse3.link import Link, TransferCalls
 
 
@@ -48,8 +48,8 @@ class EmulatedLink:
 
     def _nothing(self, timeout_s: float) -> bytes:
         if self._service.state.ended:
-            raise failure("closed", "while it was opened")
-        raise failure("no-reply", f"nothing within {timeout_s:g} s")
+            raise FAILURES.failure("closed", "while it was opened")
+        raise FAILURES.failure("no-reply", f"nothing within {timeout_s:g} s")
 
 
 class EmulatedInverse3(Inverse3Device):

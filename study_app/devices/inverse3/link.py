@@ -8,7 +8,7 @@ import sys
 import time
 from typing import Final, NamedTuple, Protocol
 
-from study_app.devices.inverse3.failures import failure
+from study_app.devices.inverse3.failures import FAILURES
 
 HOST: Final = "127.0.0.1"
 PORT: Final = 10001
@@ -34,11 +34,11 @@ class Link(Protocol):
         ...
 
     def send(self, data: bytes) -> None:
-        """Send all of it; raise an ``Inverse3Failure`` where it does not go."""
+        """Send all of it; raise an ``DeviceFailure`` where it does not go."""
         ...
 
     def receive(self, timeout_s: float) -> bytes:
-        """Return what came, at least a byte; raise an ``Inverse3Failure`` where nothing comes in time."""
+        """Return what came, at least a byte; raise an ``DeviceFailure`` where nothing comes in time."""
         ...
 
     def now_s(self) -> float:
@@ -55,7 +55,7 @@ class SocketLink:
 
     Raises
     ------
-    Inverse3Failure
+    DeviceFailure
         Nothing listens there.
     """
 
@@ -65,7 +65,7 @@ class SocketLink:
         try:
             self._socket = socket.create_connection((host, port), CONNECT_S)
         except OSError as error:
-            raise failure("no-service", f"{host}:{port}: {error.strerror or error}") from error
+            raise FAILURES.failure("no-service", f"{host}:{port}: {error.strerror or error}") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def calls(self) -> TransferCalls:
@@ -78,7 +78,7 @@ class SocketLink:
         try:
             self._socket.sendall(data)
         except OSError as error:
-            raise failure("closed", str(error.strerror or error)) from error
+            raise FAILURES.failure("closed", str(error.strerror or error)) from error
 
     def receive(self, timeout_s: float) -> bytes:
         """Return what came, at least a byte."""
@@ -86,11 +86,11 @@ class SocketLink:
         try:
             data = self._socket.recv(1 << 16)
         except TimeoutError as error:
-            raise failure("no-reply", f"nothing within {timeout_s:g} s") from error
+            raise FAILURES.failure("no-reply", f"nothing within {timeout_s:g} s") from error
         except OSError as error:
-            raise failure("closed", str(error.strerror or error)) from error
+            raise FAILURES.failure("closed", str(error.strerror or error)) from error
         if not data:
-            raise failure("closed", "while it was opened")
+            raise FAILURES.failure("closed", "while it was opened")
         return data
 
     def now_s(self) -> float:

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices.inverse3.failures import failure
+from study_app.devices.inverse3.failures import FAILURES
 from study_app.devices.inverse3.frames import CLOSE, INCOMPLETE, TEXT, VIOLATION, build_frame, parse_header
 from study_app.devices.inverse3.link import Link
 from study_app.devices.inverse3.settings import (
@@ -53,7 +53,7 @@ class Messages:
 
         Raises
         ------
-        Inverse3Failure
+        DeviceFailure
             The answer is not that of a WebSocket.
         """
         key = base64.b64encode(secrets.token_bytes(16))
@@ -63,7 +63,7 @@ class Messages:
         )
         while b"\r\n\r\n" not in self._came:
             if len(self._came) > _LONGEST_HEAD:
-                raise failure("not-websocket", "no end of the answer's head")
+                raise FAILURES.failure("not-websocket", "no end of the answer's head")
             self._came += self._link.receive(REPLY_S)
         head, _, self._came = self._came.partition(b"\r\n\r\n")
         status, *lines = head.split(b"\r\n")
@@ -75,7 +75,7 @@ class Messages:
             or fields.get(b"upgrade", b"").strip() != b"websocket"
             or [value.strip() for value in accept.values()] != [wanted]
         ):
-            raise failure("not-websocket", status.decode("latin-1"))
+            raise FAILURES.failure("not-websocket", status.decode("latin-1"))
 
     def send(self, message: Mapping[str, Any]) -> None:
         """Send a message as one text frame."""
@@ -89,19 +89,19 @@ class Messages:
 
         Raises
         ------
-        Inverse3Failure
+        DeviceFailure
             None comes, or it is not a JSON object.
         """
         while True:
             data = np.frombuffer(self._came, np.uint8)
             size = parse_header(data, 0, data.size, self._header)
             if size == VIOLATION:
-                raise failure("protocol")
+                raise FAILURES.failure("protocol")
             opcode, length = (int(value) for value in self._header)
             if size != INCOMPLETE and len(self._came) >= size + length:
                 text, self._came = self._came[size : size + length], self._came[size + length :]
                 if opcode == CLOSE:
-                    raise failure("closed", "while it was opened")
+                    raise FAILURES.failure("closed", "while it was opened")
                 if opcode == TEXT:
                     return _object(text)
                 continue
@@ -122,9 +122,9 @@ def _object(text: bytes) -> dict[str, Any]:
     try:
         found = json.loads(text, parse_constant=_refuse)
     except ValueError as error:
-        raise failure("not-json", str(error)) from None
+        raise FAILURES.failure("not-json", str(error)) from None
     if not isinstance(found, dict):
-        raise failure("not-json", "it is not an object")
+        raise FAILURES.failure("not-json", "it is not an object")
     return found
 
 
@@ -143,7 +143,7 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
 
     Raises
     ------
-    Inverse3Failure
+    DeviceFailure
         There is no such device, it cannot be used, or its settings are not neutral.
     """
     entry = find_device(messages.receive(), wanted_id)
@@ -157,7 +157,7 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
     if in_force is not None:
         wrong += differing(in_force, SESSION_SCOPED)
     if wrong:
-        raise failure("settings", "; ".join(wrong))
+        raise FAILURES.failure("settings", "; ".join(wrong))
     round_trip_s = _measure(messages, link, device_id)
     described = {
         "device_id": device_id,
@@ -178,28 +178,28 @@ def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: b
 
     Raises
     ------
-    Inverse3Failure
+    DeviceFailure
         The message is of an older version, or lists no such device.
     """
     listed = message.get("inverse3", [])
     if not isinstance(listed, list):
-        raise failure("version", "format 3.0")
+        raise FAILURES.failure("version", "format 3.0")
     entries = {str(entry["device_id"]): entry for entry in listed if isinstance(entry, dict) and "device_id" in entry}
     for name, entry in entries.items():
         if not wanted_id or name == wanted_id:
             if inventory and "filters" not in (entry.get("config") or {}):
-                raise failure("version", "format 3.1")
+                raise FAILURES.failure("version", "format 3.1")
             return entry
-    raise failure("no-device", f"listed: {', '.join(entries) or 'none'}")
+    raise FAILURES.failure("no-device", f"listed: {', '.join(entries) or 'none'}")
 
 
 def check_status(status: Mapping[str, Any], *, at_opening: bool) -> None:
     """Refuse a device that has no power, is not calibrated, or is used by another program."""
     for key, mode in (("power_supply", "not-ready"), ("ready", "not-ready"), ("calibrated", "uncalibrated")):
         if status.get(key) is False:
-            raise failure(mode, f"status.{key} is false")
+            raise FAILURES.failure(mode, f"status.{key} is false")
     if at_opening and status.get("in_use") is True:
-        raise failure("in-use")
+        raise FAILURES.failure("in-use")
 
 
 def _measure(messages: Messages, link: Link, device_id: str) -> float:

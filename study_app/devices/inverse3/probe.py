@@ -8,7 +8,7 @@ import urllib.request
 from typing import Any, Final
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
-from study_app.devices.inverse3.failures import sentence
+from study_app.devices.inverse3.failures import FAILURES
 
 PORTS: Final = (10001, 10000)
 """Of HTTP: docs.haply.co 3.5.x, "Device Configuration" uses the first, "Settings Reference" names the second."""
@@ -21,11 +21,11 @@ def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:
     found = ask(host, "/devices", ports)
     by = "Inverse Service"
     if not isinstance(found, dict):
-        return Backend("inverse3", by, NOT_AVAILABLE, CAN, sentence("no-service"))
+        return Backend("inverse3", by, NOT_AVAILABLE, CAN, FAILURES.sentence("no-service"))
     listed = found.get("inverse3", [])
     names = [str(entry.get("device_id")) for entry in listed if isinstance(entry, dict)]
     if not names:
-        return Backend("inverse3", by, NONE, CAN, sentence("no-device"))
+        return Backend("inverse3", by, NONE, CAN, FAILURES.sentence("no-device"))
     return Backend("inverse3", by, "connected: " + ", ".join(names), CAN)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from study_app.devices.descriptor import READY
-from study_app.devices.inverse3.failures import MODES, failure, findings, sentence
+from study_app.devices.inverse3.failures import FAILURES
 from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceNotFound
 
@@ -17,7 +17,7 @@ def test_descriptor_says_who_moves_the_handle_and_what_examines_it(name: str, by
     device = descriptor_of(name)
     assert (device.moves_by_itself, device.simulated) == (by_itself, by_itself)
     assert device.doctor is not None
-    assert len(device.doctor.findings()) == len(MODES)
+    assert len(device.doctor.findings()) == len(FAILURES.modes)
     assert not device.motion_shows_force
 
 
@@ -29,13 +29,13 @@ def test_the_emulated_one_is_ready_and_takes_no_argument() -> None:
 
 
 def test_every_mode_has_a_cause_a_cure_and_a_sentence_in_one_line() -> None:
-    assert len({mode.id for mode in MODES}) == len(MODES)
-    for mode in MODES:
+    assert len({mode.id for mode in FAILURES.modes}) == len(FAILURES.modes)
+    for mode in FAILURES.modes:
         assert mode.cause
         assert mode.cure
-        assert "\n" not in sentence(mode.id, "seen")
-        assert str(failure(mode.id)).startswith("the Inverse3 cannot be used: ")
-    assert [one.state for one in findings("no-device", ["no-service"])][:4] == [
+        assert "\n" not in FAILURES.sentence(mode.id, "seen")
+        assert str(FAILURES.failure(mode.id)).startswith("the Inverse3 cannot be used: ")
+    assert [one.state for one in FAILURES.findings("no-device", ["no-service"])][:4] == [
         "ok",
         "not checked",
         "not checked",

@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
+from study_app.devices.failure_table import DeviceFailure
 from study_app.devices.inverse3.emulated import EmulatedInverse3
 from study_app.devices.inverse3.emulator.faults import FAULTS, OF_OPENING, OF_STREAM
 from study_app.devices.inverse3.emulator.service import Service
-from study_app.devices.inverse3.failures import BY_ID, Inverse3Failure
+from study_app.devices.inverse3.failures import FAILURES
 from study_app.errors import DeviceError, DeviceLost, ServoFault
 from study_app.haptics.model.layout import STATUS_OK
 from study_app.haptics.runtime.clocks.clock import VirtualClock
@@ -76,9 +77,9 @@ def test_a_fault_of_opening_is_refused_with_cause_and_cure_and_without_force(fau
     service = Service()
     service.take(fault)
     device = EmulatedInverse3(service=service)
-    with pytest.raises(Inverse3Failure) as refused:
+    with pytest.raises(DeviceFailure) as refused:
         device.open()
-    mode = BY_ID[OPENING[fault]]
+    mode = FAILURES.mode(OPENING[fault])
     assert refused.value.mode == mode.id
     message = str(refused.value)
     assert "\n" not in message
@@ -103,7 +104,7 @@ def test_a_fault_in_a_stroke_ends_in_its_message_zero_force_and_silence(fault: s
     assert device.failure_mode == STREAM[fault]
     with pytest.raises((DeviceLost, ServoFault)) as ended:
         servo.check()
-    mode = BY_ID[STREAM[fault]]
+    mode = FAILURES.mode(STREAM[fault])
     message = str(ended.value)
     assert message.startswith("the device 'inverse3-emulated' stopped: ")
     assert mode.symptom in message

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE
+from study_app.devices.failure_table import DeviceFailure
 from study_app.devices.inverse3.device import Inverse3Device
 from study_app.devices.inverse3.emulator.server import ServiceServer
 from study_app.devices.inverse3.emulator.service import Service
-from study_app.devices.inverse3.failures import Inverse3Failure
 from study_app.devices.inverse3.probe import force_scale, probe
 from study_app.errors import DeviceLost
 from study_app.haptics.runtime.servo import Servo
@@ -162,5 +162,5 @@ class HttpAnswer:
 
 
 def test_an_http_server_that_is_no_websocket_is_refused() -> None:
-    with HttpAnswer(json.dumps({}).encode()) as port, pytest.raises(Inverse3Failure, match="something else answers"):
+    with HttpAnswer(json.dumps({}).encode()) as port, pytest.raises(DeviceFailure, match="something else answers"):
         Inverse3Device(f"127.0.0.1:{port}").open()
