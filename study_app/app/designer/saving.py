@@ -222,7 +222,8 @@ class Saving(QObject):
     # drafts
 
     def leave(self) -> None:
-        """Write the draft at once."""
+        """Hand on what is being typed, and write the draft at once."""
+        self.place.flush()
         self.write_draft(at_once=True)
 
     def write_draft(self, *, at_once: bool = False) -> None:

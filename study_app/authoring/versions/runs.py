@@ -17,6 +17,7 @@ from study_app.store import receipt
 from study_app.store.folders import StudyFolder
 
 _VERSION: Final = re.compile(r"[0-9A-Za-z.+-]+")
+_NAME: Final = re.compile(r"[a-z][a-z0-9]*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +66,11 @@ def runs(results: Path, study: str) -> tuple[Run, ...]:
     results : Path
         The folder with the studies' folders.
     study : str
-        The study's name; its pilots and rehearsals are in folders of their own.
+        The study's name; its pilots and rehearsals are in folders of their own. No session has a name that `check`
+        refuses.
     """
+    if not _NAME.fullmatch(study):
+        return ()
     found: dict[str, Run] = {}
     folders = (results / study, results / f"{study}-pilot", *sorted(results.glob(f"{study}-rehearsal-*")))
     for folder in folders:

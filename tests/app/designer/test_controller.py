@@ -93,6 +93,26 @@ def test_opening_the_open_study_again_keeps_its_steps(designer: Any) -> None:
     assert designer.text == before
 
 
+@pytest.mark.parametrize("name", ["kitchen**", "/kitchen"])
+def test_a_study_whose_name_is_refused_by_check_is_saved(designer: Any, name: str) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(SetValue(("study", "name"), name))
+    designer.saving.save()
+    assert designer.file.read_text() == designer.text
+    assert name in designer.text
+
+
+def test_what_is_being_typed_stays_in_its_study_when_another_is_opened(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.place.show_tab("file")
+    designer.place.file.editor.insertPlainText("# mine\n")
+    designer.controller.open("rek2024")
+    assert "# mine" not in designer.text
+    draft = draft_of(designer.file)
+    assert draft is not None
+    assert "# mine" in draft.text
+
+
 def test_a_draft_is_kept_on_leaving_and_found_again_until_it_is_discarded(designer: Any) -> None:
     before = designer.file.read_text()
     designer.controller.open("kitchen")
