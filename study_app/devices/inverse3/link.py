@@ -6,6 +6,7 @@ import ctypes
 import socket
 import sys
 import time
+from contextlib import suppress
 from typing import Final, NamedTuple, Protocol
 
 from study_app.devices.inverse3.failures import FAILURES
@@ -14,6 +15,7 @@ HOST: Final = "127.0.0.1"
 PORT: Final = 10001
 """Of the simulation channel: docs.haply.co 3.5.x, "WebSocket Protocol" and "Settings Reference"."""
 CONNECT_S: Final = 2.0
+CLOSE_S: Final = 0.2
 
 
 class TransferCalls(NamedTuple):
@@ -98,7 +100,17 @@ class SocketLink:
         return time.monotonic()
 
     def close(self) -> None:
-        """Close it; a second call does nothing."""
+        """Close it once the service has read all, or after `CLOSE_S`; a second call does nothing.
+
+        A socket that is closed with bytes unread resets the connection, and some systems (Windows) then throw away what
+        the service has not read yet: zero force and the close frame.
+        """
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_WR)
+            self._socket.settimeout(CLOSE_S)
+            until_s = time.monotonic() + CLOSE_S
+            while self._socket.recv(1 << 16) and time.monotonic() < until_s:
+                pass
         self._socket.close()
 
 

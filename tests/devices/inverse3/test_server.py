@@ -19,6 +19,7 @@ from study_app.devices.failure_table import DeviceFailure
 from study_app.devices.inverse3.device import Inverse3Device
 from study_app.devices.inverse3.emulator.server import ServiceServer
 from study_app.devices.inverse3.emulator.service import Service
+from study_app.devices.inverse3.link import SocketLink
 from study_app.devices.inverse3.probe import force_scale, probe
 from study_app.errors import DeviceLost
 from study_app.haptics.runtime.servo import Servo
@@ -107,6 +108,19 @@ time.sleep(600)
     assert until(lambda: service.force_n == (0.0, 0.0, 0.0))
     commands = int(service.state.commands)
     assert not until(lambda: service.state.commands > commands, 0.2)
+
+
+def test_closing_a_connection_with_unread_replies_does_not_reset_it() -> None:
+    """A reset may throw away the zero force that was sent last."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        link = SocketLink("127.0.0.1", listener.getsockname()[1])
+        connection, _ = listener.accept()
+        with connection:
+            connection.sendall(b"an unread reply")
+            link.send(b"zero force")
+            link.close()
+            assert connection.recv(64) == b"zero force"
+            assert connection.recv(64) == b""
 
 
 def test_a_device_is_probed_without_a_session(service: Service, server: ServiceServer) -> None:
