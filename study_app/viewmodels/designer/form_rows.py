@@ -316,7 +316,7 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
     if row.path == STUDY_LANGUAGES:
         for at, code in enumerate(row.value or ()):
             missing = sum(fault.missing_language == code for fault in study.faults)
-            note = f"{missing} texts missing" if missing > 1 else "1 text missing" if missing else "every text"
+            note = f"{missing} missing" if missing else "every text"
             yield Entry((*row.path, at), _language(str(code)), note, missing)
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))

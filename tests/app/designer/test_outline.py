@@ -201,7 +201,7 @@ def test_a_language_is_added_everywhere_filled_in_and_taken_away(qtbot: Any, des
     assert missing
     assert study.document["pages"]["welcome"]["title"].keys() == {"en"}
     field = designer.row("study", "languages").field
-    assert f"{len(missing)} texts missing" in field.row.entries[1].note
+    assert f"{len(missing)} missing" in field.row.entries[1].note
     qtbot.mouseClick(field.copies["ar"], LEFT)
     assert designer.editing.opened.study.faults == ()
     designer.editing.select(("pages", "welcome"))

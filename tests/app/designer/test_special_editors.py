@@ -10,6 +10,7 @@ from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.authoring.fields import rows
+from study_app.authoring.new_study import Answers
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.widgets.controls import IconButton
 from study_app.haptics.model.steady_state import steady
@@ -230,3 +231,18 @@ def test_a_question_without_an_id_says_so_at_its_id_and_gets_one(qtbot: Any, des
     qtbot.keyClick(head.id, Qt.Key.Key_Return)
     assert designer.editing.opened.study.document["questionnaires"]["liquid"]["items"][1]["id"] == "honey"
     assert not designer.place.form.head.refusal.isVisible()
+
+
+def test_the_form_of_a_questionnaire_without_a_language_fits_its_width(qtbot: Any, designer: Any) -> None:
+    """Many problems of one row neither widen the form nor offer repairs that read the same."""
+    designer.controller.begin("template:compare-liquids", "mine", Answers(languages=("en", "nl")))
+    designer.editing.select(("questionnaires", "liquid"))
+    waiting = designer.controller._repairs
+    qtbot.waitUntil(lambda: not waiting._waiting, timeout=10_000)
+    row = designer.row("questionnaires", "liquid", "items")
+    words = [button.text() for button in row.repairs]
+    assert len(words) == len(set(words))
+    assert row.sentence.text().count("Is missing") == 1
+    assert row.minimumSizeHint().width() <= row.width()
+    area = designer.place.form.area
+    assert area.widget().width() <= area.viewport().width()

@@ -27,7 +27,7 @@ class LanguageListField(Field):
         for at, (code, entry) in enumerate(zip(codes, row.entries, strict=True)):
             shown = EntryRow(entry, f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}")
             if entry.faults and at:
-                made = ActionButton("", f"Copy {first}", height=30)
+                made = ActionButton("", f"Copy {first}", height=FIELD_PX - 2)
                 made.setProperty("dense", "true")
                 made.setFont(font("label"))
                 made.setAccessibleName(f"Copy {first} where {entry.title} has no text")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, Signal
@@ -68,10 +69,9 @@ class RowWidget(Themed, QWidget):
         beside.addWidget(self.sentence, 1)
         self.repairs: list[ActionButton] = []
         self._offered: dict[ProblemRow, tuple[str, ...]] = {}
-        self._buttons = QHBoxLayout()
+        self._buttons = QVBoxLayout()
         self._buttons.setContentsMargins(LABEL_PX + 32, 0, 0, 0)
         self._buttons.setSpacing(6)
-        self._buttons.addStretch()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
@@ -107,7 +107,8 @@ class RowWidget(Themed, QWidget):
     def say(self) -> None:
         """Show what is wrong."""
         found = [sentence for sentence in (self.refusal, self.field.refusal, *self.row.faults) if sentence]
-        self.sentence.setText("\n".join(found))
+        times = Counter(found)
+        self.sentence.setText("\n".join(one if count == 1 else f"{count} × {one}" for one, count in times.items()))
         self.wrong.setVisible(bool(found))
         row = self.row.row
         self.field.setAccessibleDescription(". ".join(filter(None, (row.help, self.row.bounds, *found))))
@@ -120,7 +121,7 @@ class RowWidget(Themed, QWidget):
                 part.show_refused(bool(self.row.faults) and blamed)
 
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
-        """Offer the repairs of the problems of this row, of each the first."""
+        """Offer the repairs of the problems of this row, of each the first; none that reads like another one."""
         path = self.row.row.path
         offered = {one: words for one, words in known.items() if one.fault.path[: len(path)] == path and words}
         if offered == self._offered:
@@ -131,14 +132,15 @@ class RowWidget(Themed, QWidget):
         self.repairs = []
         several = len(offered) > 1
         asked = [(one, word) for one, words in offered.items() for word in words[: 1 if several else 2]]
-        for problem, word in asked[:MOST_REPAIRS]:
+        times = Counter(word for _problem, word in asked)
+        for problem, word in [(one, word) for one, word in asked if times[word] == 1][:MOST_REPAIRS]:
             made = ActionButton("", word, height=32)
             made.setProperty("dense", "true")
             made.setFont(font("label"))
             made.setAccessibleName(f"{word}: {self.row.row.label}")
             made.clicked.connect(lambda _on=False, one=problem, word=word: self.repair_asked.emit(one, word))
             dress(made, self.theme)
-            self._buttons.addWidget(made)
+            self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
             self.repairs.append(made)
 
     @property
