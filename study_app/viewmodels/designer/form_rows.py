@@ -314,7 +314,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
 
 def _entries(study: Study, row: Row) -> Iterator[Entry]:
     if row.path == STUDY_LANGUAGES:
-        for at, code in enumerate(row.value or ()):
+        for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
             missing = sum(fault.missing_language == code for fault in study.faults)
             note = f"{missing} missing" if missing else "every text"
             yield Entry((*row.path, at), _language(str(code)), note, missing)

@@ -21,7 +21,7 @@ class LanguageListField(Field):
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.box.setSpacing(6)
-        codes = [str(code) for code in row.row.value or ()]
+        codes = [str(code) for code in row.row.value] if isinstance(row.row.value, tuple) else []
         first = row.entries[0].title if row.entries else ""
         self.copies: dict[str, ActionButton] = {}
         for at, (code, entry) in enumerate(zip(codes, row.entries, strict=True)):
