@@ -41,7 +41,8 @@ class Answers:
 
 NO_ANSWERS: Final = Answers()
 FIRST_VERSION: Final = "0.1"
-_NAME: Final = re.compile(r"[a-z][a-z0-9]{0,39}")
+NAME_LENGTH: Final = 40
+_NAME: Final = re.compile(rf"[a-z][a-z0-9]{{0,{NAME_LENGTH - 1}}}")
 _SELF: Final = "liquid-study check NAME"
 
 
@@ -136,6 +137,8 @@ def write_new(study: Study, name: str) -> Path:
 
 def _check_name(name: str) -> None:
     if not _NAME.fullmatch(name):
-        raise Refused(f'"{name}" is not a name of a study: write at most 40 small letters and digits, a letter first')
+        raise Refused(
+            f'"{name}" is not a short name: write at most {NAME_LENGTH} small letters and digits, a letter first'
+        )
     if name in shipped():
         raise Refused(f'"{name}" is a study that ships with the program: choose another name')

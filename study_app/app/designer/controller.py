@@ -20,7 +20,7 @@ from study_app.app.designer.participant.preview import ParticipantPreview
 from study_app.app.designer.play.playing import Playing
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.app.designer.saving import Saving
-from study_app.app.designer.studies import header_state, new_choices, studies
+from study_app.app.designer.studies import header_state, new_choices, source_of, studies
 from study_app.app.designer.versions.changes import ChangesController
 from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.app.designer.versions.renaming import Renaming
@@ -255,7 +255,10 @@ class DesignerController(QObject):
 
     def _header(self) -> HeaderState:
         warnings = len({*self._warnings, *self.measures.warnings})
-        return header_state(self.editing.opened, self._choices, warnings, self.runs.chip)
+        opened = self.editing.opened
+        if opened is not None and source_of(opened.file) not in {choice.source for choice in self._choices}:
+            self._choices = studies(opened.file)  # a file that was saved for the first time has a name of its own
+        return header_state(opened, self._choices, warnings, self.runs.chip)
 
     def _show_header(self) -> None:
         self.place.show_header(self._header())

@@ -196,11 +196,13 @@ class DesignerPlace(Place):
         """Show what a new study can begin from."""
         self.new_page.show_choices(choices, chosen)
         self.stack.setCurrentWidget(self.new_page)
-        self.new_page.name.setFocus()
+        self.new_page.card.questions.title.setFocus()
 
     def close_new(self) -> None:
         """Go back to the study."""
-        self.stack.setCurrentIndex(0)
+        if self.stack.currentIndex():
+            self.stack.setCurrentIndex(0)
+            self.outline.tree.setFocus()
 
     def refuse_new(self, sentence: str) -> None:
         """Say why a study cannot begin so."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
@@ -9,7 +11,7 @@ from typing import Final
 from study_app.authoring.fields import row_at, unit_of
 from study_app.authoring.known_answers import KnownAnswer, known_answers
 from study_app.authoring.names import Document
-from study_app.authoring.new_study import Answers
+from study_app.authoring.new_study import NAME_LENGTH, Answers
 from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.authoring.templates import QUESTIONS
@@ -132,6 +134,12 @@ class TemplateChoice:
 def languages_offered() -> tuple[tuple[str, str], ...]:
     """Return code and name of each language that participants can be addressed in."""
     return tuple((code, language.name) for code, language in LANGUAGES.items())
+
+
+def proposed_name(title: str) -> str:
+    """Return a short name made of a title: its letters a to z, small and without accents, and its digits."""
+    plain = unicodedata.normalize("NFKD", title).lower()
+    return re.sub(r"^[0-9]+", "", re.sub(r"[^a-z0-9]+", "", plain))[:NAME_LENGTH]
 
 
 def template_choice(name: str, study: Study) -> TemplateChoice:

@@ -101,3 +101,25 @@ def test_a_study_begins_as_a_copy_of_a_file(designer: Any, monkeypatch: pytest.M
     document = designer.editing.opened.study.document
     assert (document["study"]["name"], document["study"]["version"]) == ("mine", "0.1")
     assert designer.text.count("#") == designer.file.read_text().count("#")
+
+
+@pytest.mark.parametrize(("typed", "name"), [("", "olethickthin"), ("oils", "oils")])
+def test_the_title_gives_the_short_name_where_none_is_typed(qtbot: Any, designer: Any, typed: str, name: str) -> None:
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    title = page.card.questions.title
+    qtbot.waitUntil(title.hasFocus)
+    qtbot.keyClicks(title, "2 Öle: thick & thin")
+    assert page.name.placeholderText() == "olethickthin"
+    qtbot.keyClicks(page.name, typed)
+    qtbot.keyClick(title, Qt.Key.Key_Return)
+    assert designer.editing.opened.name == name
+    assert designer.place.outline.tree.hasFocus()
+
+
+def test_the_header_names_a_study_that_was_saved_for_the_first_time(designer: Any) -> None:
+    designer.controller.begin("template:compare-liquids", "mine")
+    assert designer.place.header.study.currentText() == "mine"
+    designer.place.save_asked.emit()
+    assert designer.editing.opened.file.exists()
+    assert designer.place.header.study.currentText() == "mine"

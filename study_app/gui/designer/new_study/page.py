@@ -261,7 +261,7 @@ class NewStudyPage(Themed, QWidget):
         if isinstance(answers, str):
             self.refuse(f"{answers}.")
         elif chosen is not None:
-            self.begin_asked.emit(chosen.source, self.name.text().strip(), answers)
+            self.begin_asked.emit(chosen.source, self.card.questions.short_name(), answers)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Make room: fewer cards side by side in a narrow window."""

@@ -13,9 +13,16 @@ from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, dress, take_away
 from study_app.gui.widgets.controls import Check
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.new_study import Answers, OwnQuestion, TemplateChoice, languages_offered
+from study_app.viewmodels.designer.new_study import (
+    Answers,
+    OwnQuestion,
+    TemplateChoice,
+    languages_offered,
+    proposed_name,
+)
 
 FIELD_PX, WORDS_PX = 36, 112
+NAME_HINT: Final = "small letters and digits"
 _PARTS: Final = re.compile(r"[,;\s]+")
 
 
@@ -27,7 +34,8 @@ class Questions(Themed, QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.title, self.name = self._field("Title"), self._field("Short name of the new study")
-        self.name.setPlaceholderText("small letters and digits")
+        self.name.setPlaceholderText(NAME_HINT)
+        self.title.textChanged.connect(lambda text: self.name.setPlaceholderText(proposed_name(text) or NAME_HINT))
         self.languages: dict[str, Check] = {}
         self.own: dict[OwnQuestion, QLineEdit] = {}
         self._choice: TemplateChoice | None = None
@@ -93,6 +101,10 @@ class Questions(Themed, QWidget):
             self._own += [self._add(row, question.words, beside), beside]
             self.own[question] = field
             dress(beside, self.theme)
+
+    def short_name(self) -> str:
+        """Return the short name that was typed, else the one that the title gives."""
+        return self.name.text().strip() or proposed_name(self.title.text())
 
     def answers(self) -> Answers | str:
         """Return the answers, or a sentence about one that cannot be taken."""
