@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import count
 from typing import Any
@@ -108,12 +109,13 @@ def deletions(paths: Iterable[Path]) -> tuple[Edit, ...]:
 
 
 def free_name(taken: Iterable[str], name: str) -> str:
-    """Return ``name``, or with the first number from 2 on that is free."""
+    """Return ``name``, or with the first number from 2 on that is free, in place of one that it ends with."""
     used = set(taken)
     if name not in used:
         return name
+    stem = re.sub(r"_[0-9]+$", "", name)
     numbers = (f"_{number}" for number in count(2))
-    return next(new for end in numbers if (new := f"{name[: MAX_ID - len(end)]}{end}") not in used)
+    return next(new for end in numbers if (new := f"{stem[: MAX_ID - len(end)]}{end}") not in used)
 
 
 def check_id(name: str) -> None:

@@ -123,5 +123,6 @@ def test_renamed_refuses_a_taken_name() -> None:
 def test_free_name_counts_from_2() -> None:
     assert free_name(["a", "a_2"], "a") == "a_3"
     assert free_name(["b"], "a") == "a"
+    assert free_name(["a", "a_2"], "a_2") == "a_3"
     long = "x" * MAX_ID
     assert len(free_name([long], long)) <= len(long)
