@@ -246,3 +246,16 @@ def test_the_form_of_a_questionnaire_without_a_language_fits_its_width(qtbot: An
     assert row.minimumSizeHint().width() <= row.width()
     area = designer.place.form.area
     assert area.widget().width() <= area.viewport().width()
+
+
+def test_the_keyboard_stays_in_a_row_that_is_made_anew(qtbot: Any, designer: Any, editors: None) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("blocks", "liquids"))
+    path = ("blocks", "liquids", "conditions")
+    before = designer.row(*path)
+    count = len(before.field.rows)
+    press(qtbot, next(one for one in before.field.rows[0].findChildren(IconButton) if "Remove" in one.accessibleName()))
+    after = designer.row(*path)
+    assert after is not before
+    assert len(after.field.rows) == count - 1
+    assert after.isAncestorOf(QApplication.focusWidget())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.form_foot import FormFoot
@@ -83,9 +83,11 @@ class FormCard(Card):
         self.show_help()
 
     def _make(self, form: Form, *, stays: bool) -> None:
-        focused = (
-            self._focused.row.row.path if self._focused is not None and self.isAncestorOf(self.focusWidget()) else None
-        )
+        keyboard = QApplication.focusWidget()
+        held = next((row for row in self.rows if keyboard is not None and row.isAncestorOf(keyboard)), None)
+        if held is None and self.isAncestorOf(self.focusWidget()):
+            held = self._focused
+        focused = None if held is None else held.row.row.path
         scrolled = self.area.verticalScrollBar().value() if stays else 0
         self._focused = None
         self.flush()

@@ -9,7 +9,7 @@ from study_app.protocol.source.document import Path
 from study_app.viewmodels.tones import Tone
 
 UNKNOWN: Final = "–"
-ANEW: Final = "counting anew"
+ANEW: Final = "simulating …"
 Verdict: TypeAlias = tuple[Tone, str, str]
 """Tone, icon and words."""
 Ticks: TypeAlias = tuple[tuple[float, str], ...]
