@@ -170,7 +170,9 @@ def _with(table: Any, **defaults: Any) -> Any:
 
 
 def _languages(document: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(name for _, name in entries(document, "study.languages.*") if name in LANGUAGES) or ("en",)
+    return tuple(
+        name for _, name in entries(document, "study.languages.*") if isinstance(name, str) and name in LANGUAGES
+    ) or ("en",)
 
 
 def _with_density(liquid: Any) -> Any:

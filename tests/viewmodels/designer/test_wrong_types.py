@@ -23,7 +23,7 @@ from study_app.viewmodels.designer.problem_rows import problem_rows
 ITEM = ("questionnaires", "remarks", "items", 0)
 WRONG: tuple[tuple[str, Path, tuple[Any, ...]], ...] = (
     ("viscosity-jnd", ("study",), ("x",)),
-    ("viscosity-jnd", ("study", "languages"), (5, "x")),
+    ("viscosity-jnd", ("study", "languages"), (5, "x", [{}])),
     ("viscosity-jnd", ("blocks",), (None, 5)),
     ("viscosity-jnd", ("sequence",), ("x", [])),
     ("questionnaire-only", (*ITEM, "id"), (5, [], {})),
