@@ -21,7 +21,7 @@ class HandOrders:
 
     Parameters
     ----------
-    state : record with the fields ``hand`` (``hand.HAND``) and ``buttons``, of whoever moves the hand
+    state : record with the fields ``hand`` (``hand.HAND``), ``handle`` (``plant.HANDLE``) and ``buttons``
     workspace_m : half extents of where the hand can be sent [m]; a place outside counts as its border
     """
 
@@ -30,6 +30,21 @@ class HandOrders:
         self.state = state
         self._order = records(ORDER, 1)
         self._motions: list[Any] = []
+
+    @property
+    def held(self) -> bool:
+        """Whether the hand holds the handle."""
+        return bool(self.state.handle.held)
+
+    @held.setter
+    def held(self, held: bool) -> None:
+        self.state.handle.held = int(held)
+
+    @property
+    def force_n(self) -> tuple[float, float, float]:
+        """The force of the motors on the handle [N, hand frame]."""
+        x, y, z = self.state.handle.force_n
+        return float(x), float(y), float(z)
 
     def press(self, buttons: int) -> None:
         """Hold down exactly these buttons: button 1 is bit 0."""

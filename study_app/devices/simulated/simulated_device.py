@@ -80,21 +80,6 @@ class SimulatedDevice(HandOrders, Device):
         """Say the handle's velocity with every sample, as devices with tachometers do."""
         self.state.measures_velocity = 1
 
-    @property
-    def held(self) -> bool:
-        """Whether the hand holds the handle."""
-        return bool(self.state.handle.held)
-
-    @held.setter
-    def held(self, held: bool) -> None:
-        self.state.handle.held = int(held)
-
-    @property
-    def force_n(self) -> tuple[float, float, float]:
-        """The force of the motors on the handle [N]."""
-        x, y, z = self.state.handle.force_n
-        return float(x), float(y), float(z)
-
     def unplug(self) -> None:
         """Answer no more, as a device whose cable was pulled."""
         self.state.unplugged = 1

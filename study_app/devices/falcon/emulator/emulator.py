@@ -263,12 +263,3 @@ class Emulator(HandOrders):
     @weight_n.setter
     def weight_n(self, weight_n: float) -> None:
         self.state.weight_n = weight_n
-
-    @property
-    def held(self) -> bool:
-        """Whether the hand holds the grip."""
-        return bool(self.state.handle.held)
-
-    @held.setter
-    def held(self, held: bool) -> None:
-        self.state.handle.held = int(held)

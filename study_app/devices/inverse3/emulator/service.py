@@ -95,21 +95,6 @@ class Service(HandOrders):
         """What its ``send`` and ``recv`` take."""
         return int(self.memory.ctypes.data)
 
-    @property
-    def force_n(self) -> tuple[float, float, float]:
-        """The force on the handle [N, hand frame]."""
-        x, y, z = self.state.handle.force_n
-        return float(x), float(y), float(z)
-
-    @property
-    def held(self) -> bool:
-        """Whether the hand holds the handle."""
-        return bool(self.state.handle.held)
-
-    @held.setter
-    def held(self, held: bool) -> None:
-        self.state.handle.held = int(held)
-
     def compile(self) -> None:
         """Compile all that answers a client, or load it from the cache: a client waits for seconds only."""
         self.connected()
