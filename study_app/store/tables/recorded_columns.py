@@ -53,7 +53,7 @@ SAMPLES: tuple[Column, ...] = (
         minimum=0,
         maximum=15,
     ),
-    *_vector("device_velocity", "m/s", "mps", "Velocity of the hand, as the device measured it; NaN if not measured"),
+    *_vector("device_velocity", "m/s", "mps", "Velocity of the hand, as the device measured it (NaN if not measured)"),
     *(
         Column(
             f"orientation_{part}",
