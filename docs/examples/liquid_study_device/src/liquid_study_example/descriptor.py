@@ -22,7 +22,7 @@ def _described(way, title):
         kind="felt",
         degrees_of_freedom=3,
         open=open_device,
-        probe=lambda: [Backend(name, "liquid-study-example", READY, "felt, up to 8 N")],
+        probe=lambda: [Backend(name, "liquid-study-example", READY, "force up to 8 N")],
         motion_shows_force=False,
     )
 
