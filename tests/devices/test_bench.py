@@ -42,7 +42,7 @@ def bench(device, ask=None, durations=QUICK):
 
 
 def commanded(device):
-    """Return what the motors were told last: newtons, or a Falcon's motor units."""
+    """Return what the motors were commanded last: newtons, or a Falcon's motor units."""
     return np.array(device.held[1] if device.name == "falcon-emulated" else device.force_n)
 
 
@@ -274,6 +274,17 @@ def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
     assert "the handle was touched" in (tmp_path / "report" / "bench.md").read_text()
     assert "Nothing was kept" in done.output
     assert workstation.load().benches == ()
+
+
+def test_refused_position_does_not_enter_the_noise():
+    from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
+
+    samples = records(SAMPLE, 1000)
+    samples.fresh, samples.time_ns = 1, 1_000_000 * np.arange(1000)
+    samples.position_m = 1e-6 * np.random.default_rng(1).standard_normal((1000, 3))
+    samples[500].position_m = np.nan
+    samples[500].limiters = LIMITER_GLITCH
+    assert measurements.noise(samples).position_um == pytest.approx([1.0] * 3, rel=0.1)
 
 
 def test_gain_is_the_slope_of_readings_over_forces():

@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.haptics.runtime.telemetry import timing
 
 Floats = NDArray[np.float64]
@@ -130,8 +131,8 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
     """Fit F(t − d) = m a + b v + f sgn v + k x + c to the forces that were sent along an axis.
 
     Positions, forces and sgn v are smoothed by the same Gaussian, whose derivatives give v and a; so smoothing favours
-    no term. The delay d is the one of the least residual. Friction and delay are told apart by stretches of different
-    force: the phase that friction causes falls with the speed, that of a delay does not.
+    no term. The delay d is the one of the least residual. Stretches of different force distinguish friction from delay:
+    the phase that friction causes falls with the speed, that of a delay does not.
 
     Parameters
     ----------
@@ -224,8 +225,8 @@ def gain_of(sent_n: Sequence[float], shown_g: Sequence[float]) -> Gain:
 
 
 def _new(samples: Any) -> tuple[Floats, Floats]:
-    """Return times [s] and positions (n, 3) [m] of the new samples."""
-    new = samples[samples.fresh == 1]
+    """Return times [s] and positions (n, 3) [m] of the new samples that the servo accepted."""
+    new = samples[(samples.fresh == 1) & (samples.limiters & LIMITER_GLITCH == 0)]
     return (new.time_ns - samples.time_ns[0]) * 1e-9, np.array(new.position_m)
 
 

@@ -100,7 +100,7 @@ class Found:
 
     @property
     def fits(self) -> bool:
-        """Whether mass, damping and friction explain how the handle moved: nobody touched it, and it met no stop."""
+        """Whether mass, damping and friction explain how the handle moved: it was not touched and met no stop."""
         return all(one.explained >= LEAST_EXPLAINED and one.mass_kg > 0.0 for one in self.motions)
 
 

@@ -17,7 +17,7 @@ from study_app.haptics.runtime.servo import Servo
 
 RATE_HZ: Final = 1000.0
 GREATEST_N: Final = 4.0
-"""No excitation is stronger, whatever the device permits."""
+"""No excitation is stronger, even where the device permits more."""
 _LOOK_S: Final = 0.02
 _ALIVE_NS: Final = 500_000_000
 
