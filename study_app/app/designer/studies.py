@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from study_app.app.designer.open_study import OpenStudy, unsaved_studies
+from study_app.authoring.drafts import drafted_files
 from study_app.authoring.names import Document
 from study_app.authoring.new_study import template
 from study_app.authoring.templates import templates
@@ -24,15 +25,20 @@ from study_app.viewmodels.home import holds_liquids_alone, is_shipped, sources
 
 
 def studies(opened: Path | None) -> tuple[StudyChoice, ...]:
-    """Return what can be opened: the open file, drafts that were never saved, recent files, names at hand."""
+    """Return what can be opened: the open file, drafts that were never saved, recent files, names at hand.
+
+    Studies that ship with the program come last.
+    """
     found = dict.fromkeys([*map(str, unsaved_studies()), *sources()])
     if opened is not None:
         found = {source_of(opened): None, **found}
-    return tuple(
-        StudyChoice(Path(source).stem, source, is_shipped(source))
+    drafted = {file.resolve() for file in drafted_files()}
+    choices = [
+        StudyChoice(Path(source).stem, source, is_shipped(source), bool(drafted) and _resolved(source) in drafted)
         for source in found
         if not (Path(source).suffix == ".toml" and Path(source).exists() and holds_liquids_alone(source))
-    )
+    ]
+    return tuple(sorted(choices, key=lambda choice: choice.shipped))
 
 
 def header_state(
@@ -106,6 +112,11 @@ def time_words(moment: str) -> str:
         return "an unknown time"
     today = kept.date() == datetime.now().astimezone().date()
     return f"today {kept:%H:%M}" if today else f"{kept:%Y-%m-%d %H:%M}"
+
+
+def _resolved(source: str) -> Path | None:
+    file = Path(source) if Path(source).suffix == ".toml" else _file(source)
+    return None if file is None else file.resolve()
 
 
 def _file(source: str) -> Path | None:

@@ -110,6 +110,7 @@ class DesignerPlace(Place):
         header.redo_asked.connect(self._redo)
         header.save_asked.connect(self._save)
         self.nothing.new.clicked.connect(self.new_asked)
+        self.nothing.study_asked.connect(self.study_asked)
         self.banner.asked.connect(self.banner_asked)
         outline.chosen.connect(self._select)
         outline.find_changed.connect(self.find_changed)
@@ -160,6 +161,7 @@ class DesignerPlace(Place):
         self.parts.setVisible(view.form is not None)
         self.banner.show_banner(view.banner)
         if view.form is None:
+            self.nothing.show_studies(view.header.studies)
             return
         elsewhere = before.form is None or before.form.path != view.form.path
         if elsewhere:
@@ -235,7 +237,10 @@ class DesignerPlace(Place):
         """Close a question that is open."""
         if self.prompt is not None:
             closing, self.prompt = self.prompt, None
+            held = closing.isAncestorOf(self.focusWidget())
             take_away(closing)
+            if held:  # else Qt hands the keyboard to the rail
+                self.outline.tree.setFocus()
 
     def flush(self) -> None:
         """Hand on what is being typed."""

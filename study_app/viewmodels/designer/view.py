@@ -18,11 +18,20 @@ BannerAction: TypeAlias = Literal["copy", "keep", "take", "compare", "discard"]
 
 @dataclass(frozen=True, slots=True)
 class StudyChoice:
-    """A study that can be opened: what it is called, what it is opened by, and whether it ships with the program."""
+    """A study that can be opened.
+
+    Attributes
+    ----------
+    title, source : str
+        What it is called, and what it is opened by.
+    shipped, drafted : bool
+        Whether it ships with the program, and whether a draft of it was kept that is not saved.
+    """
 
     title: str
     source: str
     shipped: bool = False
+    drafted: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,11 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QLineEdit
 
+from study_app.app.designer.controller import DesignerController
 from study_app.authoring.templates import templates
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.source.files import shipped
+from study_app.viewmodels.designer.requests import SetValue
 
 
 def button(page: Any, source: str) -> Any:
@@ -123,3 +125,17 @@ def test_the_header_names_a_study_that_was_saved_for_the_first_time(designer: An
     designer.place.save_asked.emit()
     assert designer.editing.opened.file.exists()
     assert designer.place.header.study.currentText() == "mine"
+
+
+def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(SetValue(("liquids", "honey", "density_kg_m3"), 1400))
+    designer.saving.leave()
+    text = designer.text
+    another = DesignerController(designer.results)
+    another.enter()
+    (button,) = another.place.nothing.drafts
+    assert "kitchen" in button.text()
+    button.click()
+    assert another.editing.opened.study.text == text
+    another.place.deleteLater()

@@ -105,6 +105,7 @@ def test_several_selected_elements_move_are_copied_and_deleted_together(qtbot: A
     assert prompt is not None
     assert "2 elements" in prompt.accessibleName()
     prompt.all.click()
+    assert tree.hasFocus()
     assert not {"honey", "syrup"} & set(designer.editing.opened.study.document["liquids"])
     designer.editing.undo()
     assert designer.text == text

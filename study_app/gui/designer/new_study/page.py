@@ -24,6 +24,7 @@ from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.viewmodels.designer.new_study import TemplateChoice
+from study_app.viewmodels.designer.view import StudyChoice
 
 SIDE_PX, SIDE_NARROW_PX, NARROW_BELOW = 400, 330, 1200
 LOW_BELOW = 880
@@ -31,14 +32,29 @@ ACROSS, COPIES_ACROSS = 3, 4
 
 
 class NoStudyCard(Card):
-    """What is shown while no study is open; ``new`` is its button."""
+    """What is shown while no study is open: drafts to continue (``study_asked``), and the button ``new``."""
+
+    study_asked = Signal(str)
 
     def __init__(self) -> None:
         super().__init__("No study is open", padding=28, gap=12)
+        self.drafts: list[ActionButton] = []
         self.column.addWidget(label("Choose a study above, or begin a new one.", "body", "text2"))
         self.new = ActionButton("plus", "New study …", role="primary")
         self.column.addWidget(self.new, 0, Qt.AlignmentFlag.AlignLeft)
         self.column.addStretch()
+
+    def show_studies(self, studies: tuple[StudyChoice, ...]) -> None:
+        """Offer to continue the studies with a draft that is not saved."""
+        for old in self.drafts:
+            take_away(old)
+        self.drafts = []
+        for study in (one for one in studies if one.drafted):
+            made = ActionButton("save", f"Continue {study.title} with its unsaved changes")
+            made.clicked.connect(lambda _on=False, source=study.source: self.study_asked.emit(source))
+            dress(made, self.theme)
+            self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignLeft)
+            self.drafts.append(made)
 
 
 class ChosenCard(Card):
