@@ -260,6 +260,8 @@ def _with_draft(opened: OpenStudy) -> OpenStudy:
     if draft.text != opened.saved:
         opened.draft = draft
         opened.history = opened.history.typed(RESTORE, draft.text)
+        if draft.selected and value_at(opened.study.document, draft.selected) is not None:
+            opened.history = replace(opened.history, selected=draft.selected)
         opened.rebase(draft.base)
     return opened
 

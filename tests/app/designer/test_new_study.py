@@ -129,7 +129,8 @@ def test_the_header_names_a_study_that_was_saved_for_the_first_time(designer: An
 
 def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.editing.ask(SetValue(("liquids", "honey", "density_kg_m3"), 1400))
+    designer.editing.select(("device",))
+    designer.editing.ask(SetValue(("device", "force_limit_n"), 3.0))
     designer.saving.leave()
     text = designer.text
     another = DesignerController(designer.results)
@@ -138,4 +139,5 @@ def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
     assert "kitchen" in button.text()
     button.click()
     assert another.editing.opened.study.text == text
+    assert another.editing.selected == ("device",)
     another.place.deleteLater()
