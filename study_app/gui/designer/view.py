@@ -111,6 +111,7 @@ class DesignerPlace(Place):
         header.save_asked.connect(self._save)
         self.nothing.new.clicked.connect(self.new_asked)
         self.nothing.study_asked.connect(self.study_asked)
+        self.nothing.study_asked.connect(self._focus_form)
         self.banner.asked.connect(self.banner_asked)
         outline.chosen.connect(self._select)
         outline.find_changed.connect(self.find_changed)
