@@ -23,7 +23,6 @@ from study_app.haptics.kernels.passivity import (
 )
 from study_app.haptics.kernels.vector import clear, copy, distance, dot, is_finite, norm, square, square_distance
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
-from study_app.haptics.model.effects.unsteady_drag import LATE_SHARE
 from study_app.haptics.model.layout import (
     LIMITER_ENERGY,
     LIMITER_FADE,
@@ -119,9 +118,8 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
 def limit_slope(model: Any, safety: Record, sample: Record) -> None:
     """Shorten each liquid's damping to F·min(1, B|w|/|F|): the secant of the maximum stable damping.
 
-    Drag that builds up late gets 0.6 of what is left of B, at the greater speed that it belongs to: it grows as the
-    speed to the power of 1.7, so its slope is that much steeper than its secant, and in fast strokes or a steady drift
-    it follows so soon that freed handles of 100 g and less swung at scales of 10 and more.
+    Drag that builds up late gets what is left of B, at the greater speed that it belongs to: in fast strokes it follows
+    so soon that freed handles of 50 g and less swung at scales of 10 and more.
     What a force that grows more steeply than B exceeds it by, ``excess_n``, is removed whole.
     Where the body passes between liquids they share the limit B, so that their sum keeps it.
     """
@@ -143,7 +141,7 @@ def limit_slope(model: Any, safety: Record, sample: Record) -> None:
                 for axis in range(3):
                     sample.device_force_n[axis] -= excess * local.damping_n[axis]
             if local.late_mps > 0.0:
-                most_n = LATE_SHARE * max(most_nspm - local.prompt_nspm, 0.0) * local.late_mps
+                most_n = max(most_nspm - local.prompt_nspm, 0.0) * local.late_mps
                 if square(local.late_n) > most_n * most_n:
                     sample.limiters |= LIMITER_SLOPE
                     excess = 1.0 - most_n / norm(local.late_n)

@@ -254,7 +254,7 @@ LIQUID_STATE = np.dtype(
         ("damping_n", np.float64, (3,)),  # sum of the forces that are held to the slope limit
         ("excess_n", np.float64, (3,)),  # what of the forces grows more steeply than the slope limit
         ("late_n", np.float64, (3,)),  # drag that builds up late, held to what the slope limit leaves
-        ("late_mps", np.float64),  # the speed that it belongs to, |w| or that of the wake; 0 where there is none
+        ("late_mps", np.float64),  # the speed that its limit counts at; 0 where there is none
         ("prompt_nspm", np.float64),  # the slope of the drag that acts at once
         ("inertial", np.int64),  # how many inertial forces are reduced
         ("inertia_n", np.float64, (MOST_INERTIAL, 3)),  # these forces, in the order of their effects

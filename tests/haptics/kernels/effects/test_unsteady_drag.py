@@ -201,7 +201,7 @@ def sent_and_due(name, scale, hand_mps, stop=0):
     most_nspm = hand.model.parameters[0].slope_limit_nspm[delay]
     stokes_nspm = 3 * np.pi * FLUIDS[name][1] * 0.068
     late_n = -stokes_nspm * local.unsteady_drag.excess_mps[0]
-    most_n = 0.6 * max(most_nspm - stokes_nspm, 0.0) * local.late_mps
+    most_n = max(most_nspm - stokes_nspm, 0.0) * local.late_mps
     due_n = -min(stokes_nspm, most_nspm) * local.relative_mps[0] + np.clip(late_n, -most_n, most_n)
     due_n += hand.model.liquids[0].inertia_share[delay] * local.inertia_n[0, 0]
     return sample.device_force_n[0], due_n, late_n, most_n, most_n / local.late_mps * abs(local.relative_mps[0])
