@@ -10,10 +10,10 @@ from study_app import errors
 from study_app.app.designer.play.playable import NotPlayableError
 from study_app.authoring.study import Refused
 from study_app.authoring.versions.contents import ChangedOutsideError
+from study_app.devices.failure_table import DeviceFailure, DeviceFailureNotFound
 from study_app.devices.falcon.boot import BootFailure
 from study_app.devices.falcon.failures import FalconFailure, FalconLost, FalconNotFound, ProgramMissing, UsbFailure
 from study_app.devices.falcon.homing import NotHomed
-from study_app.devices.inverse3.failures import Inverse3Failure, Inverse3Lost, Inverse3NotFound
 from study_app.errors import Problem, ProtocolError, StudyError
 from study_app.workers.messages import Stopped
 
@@ -33,7 +33,7 @@ EXAMPLES = [
     *(kind("busy", "opening it", -6) for kind in (UsbFailure, FalconNotFound, FalconLost)),
     BootFailure("echo", 2, "nothing came back", silent=True),
     NotHomed("limp"),
-    *(kind("silent", "it stopped answering") for kind in (Inverse3Failure, Inverse3Lost, Inverse3NotFound)),
+    *(kind("silent", "it stopped answering") for kind in (DeviceFailure, DeviceFailureNotFound)),
 ]
 
 
