@@ -323,6 +323,7 @@ def see_results_and_dark_theme_by_keys(program: Visitor, person: ByKeyboard, pla
     wait_for(lambda: changed(program, home), "the dark theme")
 
 
+@pytest.mark.nightly
 def test_the_whole_study_by_the_mouse_alone_from_home_to_home(
     program: Visitor, plan: MainController, qtbot: Any
 ) -> None:

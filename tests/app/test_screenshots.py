@@ -17,6 +17,7 @@ from tests.compiled import needs_servo
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.nightly
 @needs_servo
 def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, monkeypatch):
     monkeypatch.setattr(session_pictures, "TRACED_MS", 500)

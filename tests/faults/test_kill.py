@@ -58,7 +58,7 @@ def last_attempts(study: Path) -> list[tuple[str, ...]]:
 @pytest.mark.parametrize(
     ("resume", "count"),
     [
-        ("trial", 35),
+        pytest.param("trial", 35, marks=pytest.mark.nightly),
         ("block", 15),
         pytest.param("trial", 2000, marks=[pytest.mark.nightly, pytest.mark.timeout(4 * 3600)]),
     ],

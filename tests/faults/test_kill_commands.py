@@ -15,7 +15,7 @@ from tests.faults.support.command_killer import COMMANDS
 from tests.faults.support.killer_runs import outcomes_of
 from tests.platforms import needs_fork
 
-pytestmark = [pytest.mark.slow, needs_servo, needs_fork]
+pytestmark = [pytest.mark.nightly, pytest.mark.slow, needs_servo, needs_fork]
 
 
 @pytest.fixture(scope="module")

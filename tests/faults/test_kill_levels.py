@@ -57,6 +57,7 @@ ADAPTIVE = 'kind = "questplus"\ntrials = 8\ntracks = 2'
 CATCH = 'method = "few"\ncatch = { share = 0.25 }'
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "edits",
     [pytest.param({}, id="constant"), pytest.param({CONSTANT: ADAPTIVE, 'method = "few"': CATCH}, id="adaptive")],

@@ -39,6 +39,7 @@ def answers(block_: Block, people: int, alpha: float = 0.05, *, gaps: bool = Fal
     return of_tables(block_, replace(DECIDED, alpha=alpha), names, single)
 
 
+@pytest.mark.nightly
 def test_in_a_large_family_of_many_people_nothing_is_out_of_reach() -> None:
     asked = answers(block(40), MANY + 50, gaps=True)
     omnibus, _ = compared(asked)

@@ -119,6 +119,7 @@ def test_the_caption_of_opened_delays_says_how_late_they_really_were(rek: Result
     assert "by +1.0 ms on average (trials: −2.2 to +4.2 ms)" in captions.caption(study, study.blocks[1])
 
 
+@pytest.mark.nightly
 def test_the_same_results_give_the_same_bytes_in_another_process_too(rek: Results, tmp_path: Path) -> None:
     twelve(rek, people=2)
     first = {path.name: path.read_bytes() for path in plotting.plot(rek.folder, tmp_path / "first")}

@@ -18,7 +18,7 @@ from study_app.store.journals import journal
 from study_app.store.tables.columns import INTERVALS
 from tests.compiled import needs_servo
 
-pytestmark = [pytest.mark.slow, needs_servo]
+pytestmark = [pytest.mark.nightly, pytest.mark.slow, needs_servo]
 SEALED = {column.name for column in INTERVALS if column.sealed}
 PRESENTED = {"standard": "S", "comparison": "C"}
 

@@ -28,7 +28,7 @@ from study_app.store.receipt import read
 from study_app.store.verification.leaks import certain_telltales, presented_numbers
 from tests.compiled import needs_servo
 
-pytestmark = [pytest.mark.slow, needs_servo]
+pytestmark = [pytest.mark.nightly, pytest.mark.slow, needs_servo]
 BLOCKS = ["viscosity", "detect", "rate", "number", "equal", "odd", "pairs"]
 ODD = {"SC": "second", "CS": "first"}
 

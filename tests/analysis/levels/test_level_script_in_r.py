@@ -62,6 +62,7 @@ def test_r_computes_the_same_numbers(reported: Path) -> None:
     assert sum("criterion" in name for name in theirs) == 6
 
 
+@pytest.mark.nightly
 def test_r_reads_a_study_of_every_reply(opened_levels: Path, tmp_path: Path) -> None:
     report(opened_levels, tmp_path)
     done = run_in_r(tmp_path)

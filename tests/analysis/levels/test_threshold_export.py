@@ -26,7 +26,7 @@ from study_app.store.tables.column import header
 from study_app.store.tables.level_columns import THRESHOLDS
 from tests.compiled import needs_servo
 
-pytestmark = [pytest.mark.slow, needs_servo]
+pytestmark = [pytest.mark.nightly, pytest.mark.slow, needs_servo]
 STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(4, 8))
 STEPS = UpDown(tracks=2, trials=24, step_up=2)
 PEOPLE = ("P001", "P002", "P003")

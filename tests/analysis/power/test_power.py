@@ -98,6 +98,7 @@ def test_the_counts_do_not_depend_on_the_executor(counted: tuple[int, Counts], w
     assert same(counts, counted[1])
 
 
+@pytest.mark.nightly
 def test_the_command_writes_the_same_bytes_with_one_worker_two_and_a_cluster(
     worker_options: tuple[tuple[str, str], ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -320,6 +321,7 @@ def test_the_command_ended_by_the_user_writes_what_it_has(
     assert "Ended early: 30 of 1000" in (to / "power.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(sys.platform == "win32", reason="signals to a group of processes are POSIX's")
 def test_an_interrupt_ends_the_workers_too() -> None:
     """Ctrl-C reaches every process of the terminal: what is done is kept, nothing hangs, no traceback of a worker."""

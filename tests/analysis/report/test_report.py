@@ -86,6 +86,7 @@ def test_every_test_is_a_row_with_what_a_reader_needs(of_twelve: Path) -> None:
     assert [float(p) for p in listed_ps] == pytest.approx([one["p_adjusted"] for one in omnibus])
 
 
+@pytest.mark.nightly
 def test_the_same_results_give_the_same_bytes(rek: Results, tmp_path: Path) -> None:
     twelve(rek, people=3).open()
     for name in ("one", "two"):

@@ -53,6 +53,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Results:
     return results
 
 
+@pytest.mark.nightly
 def test_a_test_that_fails_takes_no_other_with_it(opened: Results, monkeypatch: pytest.MonkeyPatch) -> None:
     study = load_study(opened.folder)
     whole = evaluate(study)

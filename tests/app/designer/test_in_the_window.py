@@ -26,7 +26,7 @@ from study_app.authoring.drafts import draft_of
 from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.gui.theme.theme import DARK, LIGHT
 
-KILLS = 5
+KILLS = 2
 MODIFIERS = {"Ctrl": Qt.KeyboardModifier.ControlModifier, "Alt": Qt.KeyboardModifier.AltModifier,
              "Shift": Qt.KeyboardModifier.ShiftModifier}  # fmt: skip
 

@@ -28,7 +28,7 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 
 STUDY = "rek2024"
 HALF_M = (0.05, 0.03, 0.03)

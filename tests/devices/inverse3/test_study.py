@@ -20,7 +20,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
-pytestmark = [needs_servo, pytest.mark.slow]
+pytestmark = [pytest.mark.nightly, needs_servo, pytest.mark.slow]
 
 STUDY = "rek2024"
 COUNT_M = scripted.QUANTUM_M

@@ -138,6 +138,7 @@ def test_centred_velocities_are_those_of_a_parabola():
 # --- How sure --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("following", [0.0, 0.9])
 def test_nineteen_of_twenty_intervals_hold_the_truth(following):
     """Also where the sensor's noise remembers: taken for white, its intervals would hold it in one case of three."""

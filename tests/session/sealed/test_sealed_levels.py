@@ -32,7 +32,7 @@ from tests.compiled import needs_servo
 from tests.protocol.trials.studies import FIVE_POINTS, SHORT, text_of
 from tests.session.sealed.numbers_written import Trials, every_number, told
 
-pytestmark = [pytest.mark.slow, needs_servo]
+pytestmark = [pytest.mark.nightly, pytest.mark.slow, needs_servo]
 
 MORE = """
 [stimuli.delay]

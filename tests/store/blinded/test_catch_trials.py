@@ -23,7 +23,7 @@ from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.protocol.trials.studies import SHORT, text_of
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 
 ADAPTIVE = ('kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 2', 'kind = "updown"\ntrials = 20')
 CATCH = ("method =", "catch = { share = 0.5, wrong_most = 0.2 }\nmethod =")

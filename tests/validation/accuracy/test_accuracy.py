@@ -27,7 +27,7 @@ from study_app.validation.cfd import stored_flows
 from study_app.validation.cfd.solver_truths import solver_truths
 from tests.validation.accuracy.scenes import HONEY, REAL, TANK, compiled, first_seconds
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")

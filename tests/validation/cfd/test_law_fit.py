@@ -60,6 +60,7 @@ def test_planted_constants_are_found_and_a_motion_left_out_is_met():
     assert text.count("gear_oil | ") == len(tables)
 
 
+@pytest.mark.nightly
 def test_the_stored_constants_without_a_motion_are_those_that_a_fit_gives(tmp_path):
     tables = {it.case.name: it for it in (*stored_flows.stored(), *stored_flows.training())}
     stored = stored_flows.left_out()

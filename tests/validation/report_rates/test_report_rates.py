@@ -154,6 +154,7 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
     assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_rates_do_not_depend_on_the_executor(
     rek: Simulated, all_workers: tuple[Workers, ...], monkeypatch: pytest.MonkeyPatch

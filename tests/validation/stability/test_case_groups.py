@@ -33,7 +33,7 @@ from study_app.validation.stability.stability_cases import (
 from study_app.validation.stability.verdict import MISJUDGED_ALLOWANCE_J, judge, windows
 from tests.haptics.scenes import COMPILED
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 

@@ -77,6 +77,7 @@ def test_the_strongest_linear_damper_is_unstable_without_safety_and_stable_with_
     assert parse(str(damped[0])) == damped[0]
 
 
+@pytest.mark.nightly
 @compiled
 def test_verdicts_do_not_depend_on_the_executor(all_workers):
     found = []

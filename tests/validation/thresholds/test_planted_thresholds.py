@@ -126,6 +126,7 @@ def test_slopes_tell_a_constant_jnd_from_webers_law() -> None:
     assert slopes(three, StudyFound(constant, (constant,))) == pytest.approx([0], abs=1e-12)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @needs_servo
 def test_the_whole_program_recovers_it_and_another_observer_is_found(one: Planted) -> None:

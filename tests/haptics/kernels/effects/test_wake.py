@@ -26,6 +26,7 @@ def test_the_wake_equals_its_definition(wake, legs, pace, rate_hz):
     assert difference(felt, walk(legs, pace)) <= 1e-9
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="a million ticks are for compiled code")
 @pytest.mark.parametrize(
