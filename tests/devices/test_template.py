@@ -26,7 +26,6 @@ TEMPLATE = Path(__file__).parents[2] / "docs" / "examples" / "liquid_study_devic
 SOURCES = Path("src", "liquid_study_example")
 COMPILER = shutil.which("cc")
 PATIENCE_S = 10.0
-ATTEMPTS = 3
 
 pytestmark = [
     pytest.mark.slow,
@@ -165,12 +164,10 @@ class TestTemplate:
         assert all(found[name].why == "" for name in ("example-direct", "example-mailbox"))
 
     @needs_servo
+    @pytest.mark.flaky(reruns=4)  # on a busy machine the library's thread may stand still for longer than 50 ms
     @pytest.mark.parametrize(("name", "delays"), [("example-direct", {0}), ("example-mailbox", {1, 2, 3, 4})])
     def test_runs_in_the_servo_and_ends_in_zero_force(self, name: str, delays: set[int]):
-        for _ in range(ATTEMPTS):  # on a busy machine the library's thread may stand still for longer than 50 ms
-            samples, fault, force_n = run_in_servo(name)
-            if fault is None:
-                break
+        samples, fault, force_n = run_in_servo(name)
         assert fault is None
         assert np.abs(force_n).max() > 0.0
         own = samples[(samples.fresh == 1) & (samples.scene == samples.scene[-1])][100:]

@@ -108,14 +108,15 @@ def test_a_servo_that_hangs_in_its_device_says_so_and_has_let_go_when_it_returns
         assert servo.fault is None
         probe.state.hangs = 1
         wait_until(lambda: servo.fault is not None)
+        writes = int(probe.state.writes)
         assert "no tick for 75 ms" in servo.fault
         assert not servo.force_is_on
         with pytest.raises(ServoFault, match="no tick for 75 ms"):
             servo.check()
-        ticks = probe.state.reads
         probe.state.hangs = 0
-        wait_until(lambda: probe.state.reads > ticks + 2)
-        assert servo.loop.safety[0].fade < 0.1
+        wait_until(lambda: probe.state.writes >= writes + 5)
+        after_n = np.linalg.norm(probe.forces_n[writes + 1 : writes + 5], axis=1)  # the first is the tick that hung
+        assert (after_n <= 8 * np.arange(1, 5) / 500).all(), "0.5 s from zero to the whole force, of at most 8 N"
     finally:
         probe.state.hangs = 0
         servo.stop()
