@@ -10,12 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
-
-if TYPE_CHECKING:
-    from study_app.haptics.model.bounds import Extremes
-    from study_app.haptics.model.liquid import Liquid
-    from study_app.haptics.model.scene import Scene, Velocity
+from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 
 Value: TypeAlias = "float | str | None"
 Choices: TypeAlias = tuple[tuple[str, str], ...]
@@ -69,6 +64,81 @@ class Flow(NamedTuple):
     shear_per_s: float
 
 
+class LiquidLike(Protocol):
+    """What descriptors read of a ``liquid.Liquid``, which is made of their tables and so imports them."""
+
+    @property
+    def density_kg_m3(self) -> float: ...  # noqa: D102
+    @property
+    def viscosity_pa_s(self) -> float | None: ...  # noqa: D102
+    @property
+    def region(self) -> Any: ...  # noqa: D102
+    def __getattr__(self, name: str) -> Any: ...  # an effect's table
+
+
+class BodyLike(Protocol):
+    """What descriptors read of a ``scene.Body``."""
+
+    @property
+    def diameter_m(self) -> float: ...  # noqa: D102
+    @property
+    def drag_coefficient(self) -> float: ...  # noqa: D102
+    @property
+    def volume_m3(self) -> float: ...  # noqa: D102
+
+
+class SceneLike(Protocol):
+    """What descriptors read of a ``scene.Scene``."""
+
+    @property
+    def scale(self) -> float: ...  # noqa: D102
+    @property
+    def rate_hz(self) -> float: ...  # noqa: D102
+    @property
+    def body(self) -> BodyLike: ...  # noqa: D102
+    @property
+    def velocity(self) -> Any: ...  # noqa: D102
+    @property
+    def accuracy(self) -> Any: ...  # noqa: D102
+
+
+class ExtremesLike(Protocol):
+    """What descriptors read of the ``bounds.Extremes`` of the motion in one liquid of a scene."""
+
+    @property
+    def scene(self) -> SceneLike: ...  # noqa: D102
+    @property
+    def liquid(self) -> LiquidLike: ...  # noqa: D102
+    @property
+    def has_top(self) -> bool: ...  # noqa: D102
+    @property
+    def depth_m(self) -> tuple[float, float]: ...  # noqa: D102
+    @property
+    def relative_mps(self) -> float: ...  # noqa: D102
+    @property
+    def speed_mps(self) -> float: ...  # noqa: D102
+    @property
+    def acceleration_mps2(self) -> float: ...  # noqa: D102
+    @property
+    def flow(self) -> Flow: ...  # noqa: D102
+    @property
+    def reynolds(self) -> float: ...  # noqa: D102
+    @property
+    def radius_m(self) -> float: ...  # noqa: D102
+    @property
+    def volume_m3(self) -> float: ...  # noqa: D102
+    @property
+    def lift_n(self) -> float: ...  # noqa: D102
+    @property
+    def weight_n(self) -> float: ...  # noqa: D102
+    def drag_by_flow_n(self, flow_mps: float) -> float: ...  # noqa: D102
+    def inertial_n(self, accelerated_n: Callable[[Any, float, float], float]) -> float: ...  # noqa: D102
+    def sheared_n(self) -> float: ...  # noqa: D102
+    def total_n(self, extent: str) -> float: ...  # noqa: D102
+    def submerged(self, depth_m: float) -> float: ...  # noqa: D102
+    def doubtful_shares(self) -> tuple[float, float]: ...  # noqa: D102
+
+
 @dataclass(frozen=True, slots=True)
 class Rows:
     """Rows that an effect owns in arrays of the model, as many and from the same first row in each of ``arrays``.
@@ -79,11 +149,11 @@ class Rows:
 
     words: str
     arrays: Mapping[str, Fields]
-    needed: Callable[[Liquid, float], int]
+    needed: Callable[[LiquidLike, float], int]
     most: Callable[[float], int] | None = None
 
 
-def _nothing_to_fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
+def _nothing_to_fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
     """Fill in nothing: the effect has no parameters of its own."""
 
 
@@ -163,16 +233,16 @@ class Effect:
     name: str
     label: str
     bit: int
-    bound_n: Callable[[Extremes], float | None]
-    exerted_n: Callable[[Extremes], float | None] | None = None
+    bound_n: Callable[[ExtremesLike], float | None]
+    exerted_n: Callable[[ExtremesLike], float | None] | None = None
     extent: Literal["area", "volume", ""] = ""
-    accelerated_n: Callable[[Extremes, float, float], float] | None = None
+    accelerated_n: Callable[[ExtremesLike, float, float], float] | None = None
     flow: Callable[[Any], Flow] | None = None
     format: int = 1
     automatic: bool = True
-    bars: Callable[[Extremes], tuple[tuple[str, ...], str]] | None = None
-    choose: Callable[[Extremes], tuple[Any, str]] | None = None
-    note: Callable[[Liquid], str] | None = None
+    bars: Callable[[ExtremesLike], tuple[tuple[str, ...], str]] | None = None
+    choose: Callable[[ExtremesLike], tuple[Any, str]] | None = None
+    note: Callable[[LiquidLike], str] | None = None
     model: Any = None
     default: Any = None
     missing: str = ""
@@ -182,18 +252,18 @@ class Effect:
     problem: Callable[[Any], str | None] | None = None
     parameters: Fields | None = None
     state: Fields | None = None
-    fill: Callable[[Any, Liquid, Scene, Mapping[str, int]], None] = _nothing_to_fill
+    fill: Callable[[Any, LiquidLike, SceneLike, Mapping[str, int]], None] = _nothing_to_fill
     rows: tuple[Rows, ...] = ()
     damping_nspm: Callable[[Any], float] | None = None
     adjustable: bool = True
     controls: tuple[Parameter, ...] = ()
     with_liquid: bool = False
-    open_values: Mapping[str, Callable[[Scene], float]] = field(default_factory=dict)
+    open_values: Mapping[str, Callable[[SceneLike], float]] = field(default_factory=dict)
     start: Callable[[str, tuple[float, float, float], float], Mapping[str, Any]] | None = None
     thresholds: tuple[str, ...] = ()
 
 
-def smoothing_s(velocity: Velocity, given_s: float | None, usual_s: float) -> float:
+def smoothing_s(velocity: Any, given_s: float | None, usual_s: float) -> float:
     """Return over what time [s] an effect smooths: ``given_s`` by its table, or as suits the velocity estimator.
 
     Velocities that come with the motion are not smoothed; that of "kalman" lags less and may be smoothed for longer

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
-from study_app.haptics.model.effect import FLOAT, Effect, Fields, Parameter, rate_per_s, smoothing_s
+from study_app.haptics.model.effect import (
+    FLOAT,
+    Effect,
+    ExtremesLike,
+    Fields,
+    LiquidLike,
+    Parameter,
+    SceneLike,
+    rate_per_s,
+    smoothing_s,
+)
 from study_app.haptics.model.ranges import Frozen, Smoothing, within
-
-if TYPE_CHECKING:
-    from study_app.haptics.model.bounds import Extremes
-    from study_app.haptics.model.liquid import Liquid
-    from study_app.haptics.model.scene import Scene
 
 BIT = 1 << 6
 
@@ -30,19 +35,19 @@ class AddedMass(Frozen):
     filter_s: Smoothing | None = None
 
 
-def _accelerated_n(extremes: Extremes, acceleration_mps2: float, change_mps: float) -> float:
+def _accelerated_n(extremes: ExtremesLike, acceleration_mps2: float, change_mps: float) -> float:
     """Return C_a ρ V a."""
     liquid = extremes.liquid
     mass_kg = float(liquid.added_mass.coefficient * liquid.density_kg_m3 * extremes.volume_m3)
     return mass_kg * acceleration_mps2
 
 
-def _bound_n(extremes: Extremes) -> float:
+def _bound_n(extremes: ExtremesLike) -> float:
     """Return C_a ρ V (a + s v), s the shear of the current."""
     return extremes.inertial_n(_accelerated_n)
 
 
-def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
     mass = liquid.added_mass
     record.mass_kg = mass.coefficient * liquid.density_kg_m3 * scene.body.volume_m3
     record.filter_per_s = rate_per_s(smoothing_s(scene.velocity, mass.filter_s, SMOOTHING_S))

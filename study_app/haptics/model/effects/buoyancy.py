@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from study_app.haptics.model.effect import FLOAT, GRAVITY_MPS2, Effect, Fields
-
-if TYPE_CHECKING:
-    from study_app.haptics.model.bounds import Extremes
-    from study_app.haptics.model.liquid import Liquid
-    from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.effect import FLOAT, GRAVITY_MPS2, Effect, ExtremesLike, Fields, LiquidLike, SceneLike
 
 BIT = 1 << 4
 
 
-def _bound_n(extremes: Extremes) -> float:
+def _bound_n(extremes: ExtremesLike) -> float:
     """Return g |ρ V_sub − ρ_body V|, at the worse end of the depth range."""
     return max(abs(extremes.lift_n * extremes.submerged(depth) - extremes.weight_n) for depth in extremes.depth_m)
 
 
-def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
     record.lift_n = liquid.density_kg_m3 * scene.body.volume_m3 * GRAVITY_MPS2
 
 

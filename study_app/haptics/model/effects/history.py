@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
-from study_app.haptics.model.effect import FLOAT, INT, Effect, Fields, Parameter, Rows, rate_per_s, smoothing_s
+from study_app.haptics.model.effect import (
+    FLOAT,
+    INT,
+    Effect,
+    ExtremesLike,
+    Fields,
+    LiquidLike,
+    Parameter,
+    Rows,
+    SceneLike,
+    rate_per_s,
+    smoothing_s,
+)
 from study_app.haptics.model.ranges import Frozen, Smoothing, within
-
-if TYPE_CHECKING:
-    from study_app.haptics.model.bounds import Extremes
-    from study_app.haptics.model.liquid import Liquid
-    from study_app.haptics.model.scene import Scene
 
 BIT = 1 << 7
 EXPONENTIALS = 10  # of the kernel's tail
@@ -32,7 +39,7 @@ class History(Frozen):
     smoothing_s: Smoothing | None = None
 
 
-def _accelerated_n(extremes: Extremes, acceleration_mps2: float, change_mps: float) -> float:
+def _accelerated_n(extremes: ExtremesLike, acceleration_mps2: float, change_mps: float) -> float:
     """Return 12 R² √(2π ρ µ a v).
 
     The Basset integral for a body that was carried along at −v and then turned to v at a: no motion in the box makes it
@@ -43,12 +50,12 @@ def _accelerated_n(extremes: Extremes, acceleration_mps2: float, change_mps: flo
     return per_root * math.sqrt(acceleration_mps2 * change_mps)
 
 
-def _bound_n(extremes: Extremes) -> float | None:
+def _bound_n(extremes: ExtremesLike) -> float | None:
     """Return H(a, v) + H(s v, u) with H of `_accelerated_n`, s the shear of the current and u its speed."""
     return None if extremes.liquid.viscosity_pa_s is None else extremes.inertial_n(_accelerated_n)
 
 
-def _problem(liquid: Liquid) -> str | None:
+def _problem(liquid: LiquidLike) -> str | None:
     return 'the effect "history" needs the liquid\'s viscosity_pa_s' if liquid.viscosity_pa_s is None else None
 
 
@@ -57,7 +64,7 @@ def _intervals(window_s: float, rate_hz: float) -> int:
     return math.ceil(window_s * rate_hz) + 4
 
 
-def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
     history = liquid.history
     record.row = first["intervals"]
     record.rows = _intervals(history.window_s, scene.rate_hz)

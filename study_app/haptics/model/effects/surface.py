@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from study_app.haptics.model.effect import FLOAT, Effect, Fields
-
-if TYPE_CHECKING:
-    from study_app.haptics.model.bounds import Extremes
-    from study_app.haptics.model.liquid import Liquid
+from study_app.haptics.model.effect import FLOAT, Effect, ExtremesLike, Fields, LiquidLike
 
 BIT = 1 << 5
 
 
-def _bound_n(extremes: Extremes) -> float | None:
+def _bound_n(extremes: ExtremesLike) -> float | None:
     """Return all of the others where the centre can cross the surface, for without it the ball is in or out."""
     if not extremes.has_top:
         return None
@@ -21,7 +15,7 @@ def _bound_n(extremes: Extremes) -> float | None:
     return area * extremes.total_n("area") + volume * (extremes.total_n("volume") + extremes.lift_n)
 
 
-def _problem(liquid: Liquid) -> str | None:
+def _problem(liquid: LiquidLike) -> str | None:
     if liquid.region.kind == "everywhere":
         return 'the effect "surface" needs a region with a top: a box or a cylinder'
     return None

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, TypeVar
+from typing import Annotated, Any, Literal, Protocol, TypeVar
 
 from pydantic import Field, model_validator
 
-from study_app.haptics.model.effect import FLOAT, INT, TAIL_RATE_HZ, Effect, Fields, Parameter, Rows
+from study_app.haptics.model.effect import (
+    FLOAT,
+    INT,
+    TAIL_RATE_HZ,
+    Effect,
+    ExtremesLike,
+    Fields,
+    LiquidLike,
+    Parameter,
+    Rows,
+    SceneLike,
+)
 from study_app.haptics.model.ranges import Decay, Exponent, Frozen, TailLength, TailScaling, within
-
-if TYPE_CHECKING:
-    from study_app.haptics.model.bounds import Extremes
-    from study_app.haptics.model.liquid import Liquid
-    from study_app.haptics.model.scene import Scene
 
 BIT = 1 << 1
 
@@ -94,7 +100,7 @@ def fill_tail(record: Any, wake: Tail, rate_hz: float, row: int) -> None:
     record.vertical = 1.0 if wake.axes == "xyz" else 0.0
 
 
-def tail_bound_n(extremes: Extremes, wake: Tail | None) -> float | None:
+def tail_bound_n(extremes: ExtremesLike, wake: Tail | None) -> float | None:
     """Return F(v + u) − F(v), u = v (N/S)^y the most that the liquid can follow.
 
     The laws are convex, so this is more than what a following liquid takes away.
@@ -109,7 +115,7 @@ def start_tail(kind: str, centre_m: tuple[float, float, float], reach_m: float) 
     return {"length": 1700, "scaling": 1700.0}
 
 
-def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
     wake = liquid.wake
     fill_tail(record, wake, scene.rate_hz, first["elements"])
     record.breaking_cosine = math.cos(math.radians(wake.breaking_angle_deg))
