@@ -27,6 +27,8 @@ from study_app.viewmodels.designer.requests import (
     SwitchKind,
 )
 
+pytestmark = pytest.mark.slow
+
 MOMENT = "2026-11-21T12:00:00+00:00"
 
 

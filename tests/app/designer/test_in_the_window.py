@@ -26,6 +26,8 @@ from study_app.authoring.drafts import draft_of
 from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.gui.theme.theme import DARK, LIGHT
 
+pytestmark = pytest.mark.slow
+
 KILLS = 2
 MODIFIERS = {"Ctrl": Qt.KeyboardModifier.ControlModifier, "Alt": Qt.KeyboardModifier.AltModifier,
              "Shift": Qt.KeyboardModifier.ShiftModifier}  # fmt: skip
@@ -281,7 +283,6 @@ for count in range(100000):
 """
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="SIGKILL")
 def test_a_kill_while_typing_loses_at_most_the_last_second(designer: Any, tmp_path: Path) -> None:
     before = designer.file.read_bytes()

@@ -14,6 +14,8 @@ from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.source.files import shipped
 from study_app.viewmodels.designer.requests import SetValue
 
+pytestmark = pytest.mark.slow
+
 
 def button(page: Any, source: str) -> Any:
     return next(one for one in page.buttons if one.choice.source == source)

@@ -12,6 +12,8 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.viewmodels.designer.requests import AddElement, MoveTo, RemoveKey, SetText, SetValue
 
+pytestmark = pytest.mark.slow
+
 CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
 LEFT = Qt.MouseButton.LeftButton
 
@@ -73,7 +75,6 @@ def _thing(designer: Any, at: int) -> tuple[str, str]:
     )
 
 
-@pytest.mark.slow
 def test_several_selected_elements_move_are_copied_and_deleted_together(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("rek2024", "mine")
     document, text = designer.editing.opened.study.document, designer.text
@@ -139,7 +140,6 @@ def test_parts_are_numbered_again_where_a_move_would_break_them(designer: Any) -
     assert not [fault for fault in after.faults if fault.path[-1] == "part"]
 
 
-@pytest.mark.slow
 def test_elements_are_copied_with_comments_and_pasted_into_another_study(qtbot: Any, designer: Any) -> None:
     designer.controller.open("rek2024")
     designer.editing.select(("conditions", "delay_0"))
@@ -164,7 +164,6 @@ def test_elements_are_copied_with_comments_and_pasted_into_another_study(qtbot: 
     assert designer.text == before
 
 
-@pytest.mark.slow
 def test_questions_are_pasted_as_toml_or_as_plain_lines(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("rek2024", "mine")
     before = designer.text
@@ -190,7 +189,6 @@ def test_questions_are_pasted_as_toml_or_as_plain_lines(qtbot: Any, designer: An
     assert "select a questionnaire" in designer.place.form.own.text()
 
 
-@pytest.mark.slow
 def test_a_language_is_added_everywhere_filled_in_and_taken_away(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     before = designer.text
@@ -219,7 +217,6 @@ def test_a_language_is_added_everywhere_filled_in_and_taken_away(qtbot: Any, des
     assert designer.text == before
 
 
-@pytest.mark.slow
 def test_a_picker_adds_what_it_names_in_one_step(designer: Any) -> None:
     designer.controller.open("kitchen")
     before = designer.text
@@ -232,7 +229,6 @@ def test_a_picker_adds_what_it_names_in_one_step(designer: Any) -> None:
     assert designer.text == before
 
 
-@pytest.mark.slow
 def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("rek2024", "mine")
     path = ("blocks", "liquids", "conditions")
@@ -286,7 +282,6 @@ def test_numbers_are_counted_by_keys_and_taken_ids_refused_while_typing(qtbot: A
     assert not head.refusal.text()
 
 
-@pytest.mark.slow
 def test_rows_say_what_and_where_they_are_and_contain_the_problems_below_them(designer: Any) -> None:
     designer.controller.open("rek2024")
     rows = designer.place.outline.rows

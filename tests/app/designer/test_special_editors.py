@@ -20,6 +20,8 @@ from study_app.viewmodels.designer.special import FACTS
 from tests.authoring.grown import PROTOCOLS
 from tests.authoring.test_fields import every_row
 
+pytestmark = pytest.mark.slow
+
 QUESTIONNAIRE = ("questionnaires", "liquid")
 ITEMS = (*QUESTIONNAIRE, "items")
 

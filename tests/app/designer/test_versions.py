@@ -28,6 +28,8 @@ from study_app.viewmodels.designer.requests import SetText, SetValue
 from study_app.viewmodels.sessions import SessionFacts
 from tests.app.designer.conftest import Designer
 
+pytestmark = pytest.mark.slow
+
 REPETITIONS = ("blocks", "liquids", "repetitions")
 
 
@@ -365,7 +367,6 @@ else:
 """
 
 
-@pytest.mark.slow
 def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any, qtbot: Any) -> None:
     def other(words: str, then: str) -> None:
         command = [sys.executable, "-c", OTHER, str(designer.results), words, then]

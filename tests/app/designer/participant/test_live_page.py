@@ -20,6 +20,8 @@ from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
 from study_app.viewmodels.designer.requests import RetypeFile, SetText, SetValue
 
+pytestmark = pytest.mark.slow
+
 ITEM = ("questionnaires", "liquid", "items", 1)
 
 
@@ -163,7 +165,6 @@ def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live:
     assert isinstance(live.page_window.page, TextPage)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("screen", [0, 1])
 @pytest.mark.parametrize("path", [ITEM, ("pages", "welcome"), ("questionnaires", "delay"), ("liquids", "thick")])
 def test_at_100_percent_the_page_is_that_of_a_session_pixel_by_pixel(
@@ -222,7 +223,6 @@ assert designer.preview.tab.page.page_window.isVisible()
 """
 
 
-@pytest.mark.slow
 def test_a_program_that_ends_with_a_page_open_ends_without_a_crash(tmp_path: Path) -> None:
     here = {**os.environ, "LIQUID_STUDY_WORKSPACE": str(tmp_path), "QT_QPA_PLATFORM": "offscreen"}
     ended = subprocess.run([sys.executable, "-c", SCRIPT, str(tmp_path)], env=here, capture_output=True, check=False)
