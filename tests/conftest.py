@@ -46,6 +46,12 @@ def pytest_sessionstart() -> None:
         gc.disable()
 
 
+def pytest_collection_finish() -> None:
+    """Do not look at the modules again that collecting the tests imported."""
+    if QT_IS_HERE:
+        gc.freeze()
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_runtest_teardown() -> None:
     """Collect what is due; what a full collection leaves, mostly modules, is not looked at again."""
