@@ -51,6 +51,7 @@ def test_nothing_is_added_to_what_holds_no_elements() -> None:
         added(study, ("device",))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("path", "copy"),
     [

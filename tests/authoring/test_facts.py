@@ -21,6 +21,7 @@ def study_of(name: str, *changes: tuple[str, str]) -> Study:
     return read(text.encode(), PROTOCOLS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
 def test_facts_are_those_of_the_session_and_of_check(name: str) -> None:
     study = study_of(name)

@@ -60,6 +60,7 @@ def every_row(document: Any, path: Path = ()) -> Iterator[Row]:
                 yield from every_row(with_value(document, (*row.path, 0), {}), (*row.path, 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
 def test_every_value_of_a_study_has_a_row_that_shows_it(name: str) -> None:
     document = STUDIES[name]

@@ -30,6 +30,7 @@ def test_the_templates_are_these() -> None:
     assert set(templates()) == WANTED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", templates())
 def test_each_template_passes_check_without_a_warning(name: str) -> None:
     protocol = load(FOLDER / f"{name}.toml")

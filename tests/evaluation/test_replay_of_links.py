@@ -24,7 +24,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.compiled import needs_servo
 
-pytestmark = needs_servo
+pytestmark = [pytest.mark.slow, needs_servo]
 
 STUDY = """\
 format = 2

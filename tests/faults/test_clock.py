@@ -38,6 +38,7 @@ def never_goes_back(lines: Any) -> bool:
     return all(one["t_s"] <= two["t_s"] and one["at"] <= two["at"] for one, two in pairwise(lines))
 
 
+@pytest.mark.slow
 def test_within_a_session_times_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     world = StoredWorld(tmp_path / "study")
     world.start()

@@ -79,6 +79,7 @@ def test_a_disk_that_fills_up_is_waited_for_and_nothing_is_lost_or_doubled(
     assert verify(tmp_path / "two").errors == ()
 
 
+@pytest.mark.slow
 def test_a_session_whose_last_line_meets_a_full_disk_is_finished_when_there_is_room(tmp_path: Path) -> None:
     world = StoredWorld(tmp_path / "study")
     world.start()
@@ -94,6 +95,7 @@ def test_a_session_whose_last_line_meets_a_full_disk_is_finished_when_there_is_r
     assert verify(tmp_path / "study").sound
 
 
+@pytest.mark.slow
 def test_tables_that_cannot_be_written_stop_no_session(tmp_path: Path) -> None:
     world = StoredWorld(tmp_path / "study")
     world.start()
@@ -126,6 +128,7 @@ def test_a_folder_that_becomes_read_only_stops_no_session(tmp_path: Path) -> Non
     assert verify(tmp_path / "study").errors == ()
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_at_the_start_refuses_the_session_and_keeps_its_id_free(tmp_path: Path) -> None:
     with no_file_longer_than(200), pytest.raises(StoreError, match="cannot be written"):
         StoredWorld(tmp_path / "study")

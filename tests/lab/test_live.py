@@ -106,6 +106,7 @@ def test_a_number_set_while_another_scene_waits_goes_with_it() -> None:
     live.close()
 
 
+@pytest.mark.slow
 def test_every_value_of_a_drag_is_presented_within_fifty_ticks_or_a_newer_one_is() -> None:
     live = live_with(scripted())
     sides = bench()

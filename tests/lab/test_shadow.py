@@ -123,6 +123,7 @@ def test_a_side_that_is_not_touched_keeps_its_wake_while_the_other_is_edited() -
     live.close()
 
 
+@pytest.mark.slow
 def test_a_trace_is_the_last_two_and_a_half_seconds() -> None:
     live = live_with(scripted())
     assert live.trace() is None

@@ -148,6 +148,7 @@ def test_a_linear_law_is_a_damper_at_the_hand_at_any_scale(velocity: Velocity) -
     assert fitted(found[2], t_s)[0] == pytest.approx(8.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_nothing_but_numpy_and_itself_is_loaded() -> None:
     program = (
         "import sys, study_app.psychophysics.delivery\n"

@@ -53,6 +53,7 @@ def hidden_after(trial: RunningTrial, servo: FakeServo, seconds: float) -> list[
     return seen
 
 
+@pytest.mark.slow
 def test_a_hidden_ball_is_drawn_during_the_lead_and_not_after_it() -> None:
     trial, servo = begun(SWING, hides_ball=True)
     seen = hidden_after(trial, servo, 5.0)
@@ -62,6 +63,7 @@ def test_a_hidden_ball_is_drawn_during_the_lead_and_not_after_it() -> None:
     assert newest_s == pytest.approx(1.51 - DELAY_S - SETTLED_S, abs=0.0021)  # hidden as late as it is drawn
 
 
+@pytest.mark.slow
 def test_a_ball_that_is_shown_stays() -> None:
     trial, servo = begun(SWING, hides_ball=False)
     assert not any(hidden for _, hidden in hidden_after(trial, servo, 4.5))

@@ -60,6 +60,7 @@ def test_which_errors_are_the_devices() -> None:
     assert broken(1.0, KeyError("x")) == Broke(1.0, "KeyError: 'x'", "program")
 
 
+@pytest.mark.slow
 def test_the_rows_of_the_trial_and_of_its_repetition_say_that_the_device_failed(tmp_path) -> None:
     world = StoredWorld(tmp_path / "small")
     world.start()

@@ -192,6 +192,7 @@ def test_the_protocol_is_found_by_its_hash_then_by_its_study(tmp_path: Path) -> 
         find_protocol({"study": "gone", "protocol_hash": "0"}, ["demo"])
 
 
+@pytest.mark.slow
 def test_a_protocol_at_hand_that_cannot_be_read_is_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     own = tmp_path / "protocols"
     (own / "a_folder.toml").mkdir(parents=True)

@@ -111,6 +111,7 @@ def forces_of_six_seconds(*, frozen: bool) -> Any:
         return samples.device_force_n
 
 
+@pytest.mark.slow
 def test_windows_that_stand_still_for_five_seconds_change_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(small.TABLES["tasks"]["explore"], "max_s", 20)
     frozen, watched = forces_of_six_seconds(frozen=True), forces_of_six_seconds(frozen=False)

@@ -42,6 +42,7 @@ def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
+@pytest.mark.slow
 def test_times_and_places_come_back_to_the_last_bit_and_the_rest_to_its_step(tmp_path: Path, samples_of: Make) -> None:
     samples = samples_of(61_234)
     written = write(tmp_path / "trial-003.parquet", samples)
@@ -140,6 +141,7 @@ def test_any_place_and_time_is_kept(
     assert np.abs(read["force_n"][1] - force).max() <= 2.0**-15
 
 
+@pytest.mark.slow
 def test_the_checks_are_those_of_the_exact_forces_second_by_second(tmp_path: Path, samples_of: Make) -> None:
     samples = samples_of(32_500)
     checks = read_checks(write(tmp_path / "trial-003.parquet", samples).path)

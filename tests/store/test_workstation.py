@@ -130,6 +130,7 @@ def test_the_participants_screen_is_found_by_its_name_and_else_the_last(settings
     assert settings.screen_among(names) == number
 
 
+@pytest.mark.slow
 @given(
     distance=st.floats(200, 3000),
     width=st.floats(80, 5000),

@@ -120,6 +120,7 @@ def test_figure_7_a_coarser_resolution_fills_more_slowly():
     assert [round(abs(run.table.fx_n[3000]) / INITIAL_N, 1) for run in runs] == [0.2, 0.5, 0.7]
 
 
+@pytest.mark.slow
 def test_figure_8_the_wake_fills_as_the_power_of_the_share_that_is_filled():
     runs = thesis_motions.figure_8().runs
     fill = np.arange(LENGTH + 1) / LENGTH

@@ -131,6 +131,7 @@ def test_an_order_is_given_up_when_that_is_asked_for_or_another_comes(start: Cal
     assert answers_until(worker, following, is_last)[-1] == "next"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(("order", "exit_code", "words"), [("die", -9, "signal 9"), ("mistake", 1, "exit code 1")])
 def test_a_process_that_ends_answers_every_order_once_with_how_it_ended(

@@ -21,6 +21,8 @@ from study_app.analysis.tables.study import Study, load_study
 from study_app.analysis.tables.tracks import TRACK, answers_of, tracks
 from study_app.psychophysics.families import success
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def study(opened_catch: Path) -> Study:

@@ -89,6 +89,7 @@ def test_the_report_states_errors_reasons_estimator_and_the_rule(opened: pd.Data
     assert "Catch trials" not in page
 
 
+@pytest.mark.slow
 def test_a_study_with_catch_trials_has_them_in_its_results(opened_catch: Path) -> None:
     study = load_study(opened_catch)
     staircase = next(found for found in levels_found(study) if found.block == "staircase")

@@ -55,11 +55,13 @@ def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
     assert HASH in text
 
 
+@pytest.mark.slow
 def test_without_a_preregistration_nothing_is_said(answered: Results) -> None:
     assert deviations(load_study(answered.folder)) is None
     assert list(section(load_study(answered.folder))) == []
 
 
+@pytest.mark.slow
 def test_fewer_participants_and_another_number_than_the_protocols_are_deviations(answered: Results) -> None:
     committed(answered, 12)
     assert found_in(answered) == ("fewer participants: 3 are analysed, 12 were planned",)
@@ -79,6 +81,7 @@ def test_sessions_under_another_protocol_are_named(answered: Results) -> None:
     assert line.endswith("P001/1")
 
 
+@pytest.mark.slow
 def test_exclusions_by_other_rules_are_listed_and_those_by_its_own_are_not(answered: Results) -> None:
     committed(answered)
     answered.exclude("P001", trial=2, reason="sneezed")

@@ -48,6 +48,7 @@ def test_every_shipped_study_has_all_sections_and_its_hash(name: str, tmp_path: 
     assert (read.study, read.protocol_hash) == (load(name).study.name, digest)
 
 
+@pytest.mark.slow
 def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> None:
     text = preregistration(load("viscosityjnd"), "0" * 64)
     assert "Weber fraction of damping at the hand at 4, 8, 16 and 32 N·s/m?" in text

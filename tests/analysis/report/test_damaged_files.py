@@ -126,6 +126,7 @@ def test_the_commands_say_nothing_where_there_is_nothing_to_say(
     assert (finished.exit_code, finished.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_one_file_that_was_changed_brings_all_of_its_session_under_suspicion(copy: StudyFolder) -> None:
     """The other tables are then compared with the journal, and not only with their checksums."""
     session = copy.sessions()[0]
@@ -139,6 +140,7 @@ def test_one_file_that_was_changed_brings_all_of_its_session_under_suspicion(cop
     assert {line.split()[0] for line in told(copy)} == {str(trials), str(table)}
 
 
+@pytest.mark.slow
 def test_a_session_that_was_never_begun_stops_no_analysis(copy: StudyFolder, tmp_path: Path) -> None:
     copy.session("P099", 1).path.mkdir(parents=True)
     assert len(load_study(copy.path).participants) == 3

@@ -74,6 +74,7 @@ def test_published_matching_of_five_people() -> None:
     assert best.p == best.smallest_p
 
 
+@pytest.mark.slow
 @given(st.lists(st.lists(st.integers(-2, 3), min_size=3, max_size=3), min_size=1, max_size=3))
 @settings(max_examples=40, deadline=None)
 def test_the_exact_p_is_that_of_all_exchanges_of_answered_settings(names: list[list[int]]) -> None:

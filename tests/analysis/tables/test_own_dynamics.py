@@ -35,6 +35,7 @@ def change(study: StudyFolder, session: int, **facts: Any) -> None:
     path.write_text(json.dumps(receipt), encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_they_are_means_over_the_sessions_that_know_them(sample: StudyFolder) -> None:
     assert load_study(sample.path).own_dynamics is None
     record(sample, 0, BENCH)
@@ -50,6 +51,7 @@ def test_a_bench_that_lacks_a_value_is_refused_with_the_receipt(sample: StudyFol
         load_study(sample.path)
 
 
+@pytest.mark.slow
 def test_the_estimator_is_the_device_where_it_measured_its_velocity(sample: StudyFolder) -> None:
     assert load_study(sample.path).estimator == "ewma"
     change(sample, 0, estimator="device")

@@ -38,6 +38,7 @@ def test_a_receipt_that_does_not_say_it_is_refused() -> None:
         planned_analysis.read([{"alpha": 0.05}])
 
 
+@pytest.mark.slow
 def test_the_key_holds_which_statement_is_right_for_which_liquid(rek: Results) -> None:
     twelve(rek, people=1)
     study = load_study(rek.folder)

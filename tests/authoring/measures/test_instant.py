@@ -105,6 +105,7 @@ def test_numbers_continue_while_a_text_is_missing() -> None:
     assert after.missing == {"nl": 1}
 
 
+@pytest.mark.slow
 def test_numbers_that_depend_on_a_broken_element_are_not_known() -> None:
     study = study_of("rek2024")
     before = facts(study)

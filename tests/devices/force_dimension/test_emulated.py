@@ -142,6 +142,7 @@ class TestDoctor:
             doctor_of("force-dimension").examine("force-dimension", options={}, faults=["nan"], progress=str)
 
 
+@pytest.mark.slow
 @needs_servo
 def test_the_same_handle_through_the_falcons_own_driver_has_the_same_force() -> None:
     """Emulated halves: the Falcon's own driver with its kinematics and motors, and the maker-library driver."""

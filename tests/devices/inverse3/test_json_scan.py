@@ -108,6 +108,7 @@ def depth(value: Any) -> int:
     return 0 if inner is None else 1 + max(map(depth, inner), default=0)
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(st.dictionaries(st.text(max_size=8), VALUES, max_size=4))
 def test_scan_takes_every_object_that_the_standard_library_writes(value: dict[str, Any]) -> None:
@@ -115,6 +116,7 @@ def test_scan_takes_every_object_that_the_standard_library_writes(value: dict[st
     assert said == (NO_DEVICE if depth(value) < 15 else NOT_JSON)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(st.data())
 def test_scan_refuses_a_changed_byte_wherever_the_standard_library_does(data: st.DataObject) -> None:
@@ -129,6 +131,7 @@ def test_scan_refuses_a_changed_byte_wherever_the_standard_library_does(data: st
     assert (said == NOT_JSON) == (not valid)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(st.floats(-1e6, 1e6))
 def test_scan_reads_numbers_as_the_standard_library_does(number: float) -> None:

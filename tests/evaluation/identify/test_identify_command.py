@@ -61,6 +61,7 @@ def test_the_preset_is_the_fitted_scene(scene, tmp_path):
         assert (told.exit_code, f"{liquid.id}: effects named" in told.output) == (0, True)
 
 
+@pytest.mark.slow
 def test_the_preset_says_how_sure_its_numbers_are(fitted):
     found, path = fitted
     lines = preset.preset(found, path).splitlines()

@@ -100,6 +100,7 @@ def test_the_four_names_do_not_touch(card: ForceCard, height: int) -> None:
     assert all(upper.bottom() <= lower.top() + 2 for upper, lower in pairwise(places))
 
 
+@pytest.mark.slow
 def test_the_wake_has_a_line_above_zero_at_every_speed(card: ForceCard) -> None:
     for speed in (0.0, 0.05, 0.28, 0.49, 1.3, 6.0):
         show(card, pushed(1.0, speed))

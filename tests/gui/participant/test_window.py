@@ -231,6 +231,7 @@ def test_who_goes_on_before_the_limit_is_asked_at_once(opened: Opened) -> None:
     assert isinstance(opened.window.widget, QuestionnaireWidget)
 
 
+@pytest.mark.slow
 def test_pause_while_time_is_up_is_told_stays(opened: Opened, qtbot: Any) -> None:
     opened.window.time_up.setInterval(1)
     timed_out(opened.window)

@@ -26,6 +26,7 @@ def test_numbers_are_read_as_people_write_them(text: str, value: float | None) -
     assert read_number(text) == value
 
 
+@pytest.mark.slow
 @given(st.floats(-1e6, 1e6).filter(lambda value: abs(value) > 1e-3), st.integers(3, 6))
 def test_what_is_written_can_be_read(value: float, decimals: int) -> None:
     assert read_number(write_number(value, decimals)) == pytest.approx(value, abs=0.51 * 10**-decimals, rel=0.01)

@@ -84,6 +84,7 @@ def test_turning_everything_about_the_vertical_turns_the_force(places, kind, ang
     assert felt(angle) == pytest.approx(turned(straight, angle), abs=1e-12 * max(abs(straight).max(), 1))
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(60), deadline=None)
 @given(
     velocity=st.tuples(*[st.sampled_from([0.0, 5e-324, 1e-310, 1e-160, 1e-9, -1.0, 100.0])] * 3),

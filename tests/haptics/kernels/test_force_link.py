@@ -56,6 +56,7 @@ def test_the_force_of_a_tick_is_sent_so_many_ticks_later(delay):
     assert np.abs(prompt.device_force_n).max() > 0.02
 
 
+@pytest.mark.slow
 def test_a_link_that_does_nothing_leaves_every_bit_and_needs_no_memory():
     for felt in EVERYTHING.values():
         idle = felt.model_copy(update={"link": ForceLink(seed=5)})
@@ -65,6 +66,7 @@ def test_a_link_that_does_nothing_leaves_every_bit_and_needs_no_memory():
     assert len(pack(damper()).forces_n) == 0
 
 
+@pytest.mark.slow
 def test_jitter_is_uniform_and_no_older_force_follows_a_newer_one():
     seen = arrivals(20_000, delay_s=0.02, jitter_s=0.05, seed=3)
     ages = np.arange(len(seen)) - seen
@@ -79,6 +81,7 @@ def test_jitter_is_uniform_and_no_older_force_follows_a_newer_one():
     assert ((counts - 20_000 / 51) ** 2 / (20_000 / 51)).sum() < 90  # chi-squared of 50 degrees of freedom, p 0.0005
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", [0.1, 0.5])
 def test_a_lost_force_is_replaced_by_the_last_one(loss):
     seen = arrivals(20_000, loss=loss, seed=9)
@@ -89,6 +92,7 @@ def test_a_lost_force_is_replaced_by_the_last_one(loss):
     assert after == pytest.approx(loss, abs=5 * np.sqrt(loss * (1 - loss) / held.sum()))
 
 
+@pytest.mark.slow
 def test_seeds_differ_and_the_same_seed_repeats():
     link = {"delay_s": 0.01, "jitter_s": 0.02, "loss": 0.2}
     np.testing.assert_array_equal(arrivals(seed=7, **link), arrivals(seed=7, **link))
@@ -136,6 +140,7 @@ def test_no_force_is_not_a_number_and_a_fault_stops_at_once():
     assert sent[-1].status == STATUS_NON_FINITE
 
 
+@pytest.mark.slow
 def test_a_body_that_bobs_through_a_surface_gets_no_energy_from_late_buoyancy():
     """Buoyancy near the surface is a spring; a late spring drives the hand, and the observer must see that."""
     pool = Liquid(
@@ -170,6 +175,7 @@ def balance(hand, places):
     return lowest_j, strongest_n, longest_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("link", [{"delay_s": 0.1}, {"delay_s": 0.2, "jitter_s": 0.05, "loss": 0.3}])
 def test_a_late_force_gives_no_more_than_the_allowance_however_long_it_lasts(link):
     """A debt of 1 mJ that is forgiven at 1 mW would grow by 15 mJ."""
@@ -180,6 +186,7 @@ def test_a_late_force_gives_no_more_than_the_allowance_however_long_it_lasts(lin
     assert -1e-3 - 2 * strongest_n * longest_m <= lowest_j < -0.5e-3
 
 
+@pytest.mark.slow
 def test_the_gain_comes_back_with_the_next_scene_alone():
     t_s = np.arange(3000) / 1000
     hand = Hand(damper(8.0, delay_s=0.1))

@@ -222,6 +222,7 @@ def test_what_is_left_is_not_spent_within_10_ms():
     assert sent_n == pytest.approx(left_j / (0.02 * passivity(hand).velocity_mps[0]), rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_a_swinging_loop_keeps_a_low_gain_for_seconds():
     hand = Hand(HONEY)

@@ -109,6 +109,7 @@ def test_coulomb_friction_stops_it_where_its_energy_is_spent():
     assert handle.position_m == pytest.approx(stopped_m * np.array([0.6, 0, 0.8]), rel=1e-3)
 
 
+@pytest.mark.slow
 @settings(deadline=None)  # the first example compiles
 @given(st.lists(st.floats(1e-4, 5e-3), min_size=1, max_size=30))
 def test_how_time_is_cut_does_not_matter(cuts):
@@ -123,6 +124,7 @@ def test_how_time_is_cut_does_not_matter(cuts):
     assert moved(cuts) == pytest.approx(whole, rel=2e-2, abs=1e-7)
 
 
+@pytest.mark.slow
 @settings(deadline=None)  # the first example compiles
 @given(
     st.floats(0.01, 1.0),

@@ -169,6 +169,7 @@ scenes = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(scene=scenes)
 def test_the_sum_of_what_is_left_out_stays_within_the_target_and_nothing_more_would(scene):
     verdicts = calls_for(scene)
@@ -190,6 +191,7 @@ def test_what_is_resolved_is_named_valid_and_final(scene):
     assert resolve(named) is named
 
 
+@pytest.mark.slow
 @given(scene=scenes)
 def test_the_law_is_the_cheapest_within_the_target_at_every_speed(scene):
     liquid = scene.liquids[0]

@@ -121,6 +121,7 @@ def test_before_the_first_sample_there_is_none():
     assert moment == 0
 
 
+@pytest.mark.slow
 @settings(deadline=None)  # the first example compiles
 @given(st.integers(40, 99), st.floats(0, 1, exclude_max=True))
 def test_even_motion_is_interpolated_exactly(before, share):

@@ -84,6 +84,7 @@ def test_check_prints_the_intervals_of_one_participant_and_of_the_group():
     assert "over all standards (95 % intervals)" in said
 
 
+@pytest.mark.slow
 def test_check_prints_units_where_levels_are_not_spaced_by_logarithms():
     text = TEXT.replace("levels = [0.02, 0.6]", 'level = "difference", levels = [1, 8], spacing = "linear"')
     protocol = parse(
@@ -109,6 +110,7 @@ def test_too_few_trials_for_the_planned_precision_are_a_warning():
     assert not list(imprecise(enough, enough.blocks["thicker"]))
 
 
+@pytest.mark.slow
 def test_a_precision_that_no_trials_reach_asks_for_participants_alone():
     short = study('kind = "questplus", trials = 20', "analysis = { participants = 4, precision = 0.05 }\n")
     (sentence,) = imprecise(short, short.blocks["thicker"])

@@ -95,6 +95,7 @@ def test_streams_are_pinned():
     ]
 
 
+@pytest.mark.slow
 @given(seeds, participants)
 def test_each_condition_comes_once(seed: int, participant: str):
     schedule = build_schedule(REK, participant, seed)
@@ -104,6 +105,7 @@ def test_each_condition_comes_once(seed: int, participant: str):
     assert codes(schedule, "baseline") == ["baseline"]
 
 
+@pytest.mark.slow
 @given(seeds, participants)
 def test_each_condition_comes_once_in_each_repetition(seed: int, participant: str):
     order = codes(build_schedule(SMALL, participant, seed), "feel")
@@ -139,6 +141,7 @@ def test_orders_of_many_participants_are_even():
     assert sum((count - 100) ** 2 / 100 for count in counts.values()) < 20.5
 
 
+@pytest.mark.slow
 def test_orders_of_the_parts_are_independent():
     """First liquid (3) and first delay (7) of 2100 participants, a 3 × 7 table: χ², 12 degrees of freedom, p 0.001."""
     table: Counter[tuple[str, str]] = Counter()
@@ -202,6 +205,7 @@ def test_every_key_is_drawn():
     assert sum((count - 100) ** 2 / 100 for count in keys.values()) < 20.5
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(), max_size=20), seeds)
 def test_a_shuffle_keeps_what_it_shuffles(items: list[int], seed: int):
     assert Counter(shuffle(items, stream(seed, "any").random)) == Counter(items)
@@ -280,6 +284,7 @@ def test_constrained_orders_keep_their_constraint_over_all_repetitions(seed: int
     assert Constraint(min_distance=4).holds(order)
 
 
+@pytest.mark.slow
 def test_constrained_orders_differ_between_participants_and_seeds():
     protocol = of_six("constrained", "repetitions = 3\nmin_distance = 4")
     orders = {tuple(codes(build_schedule(protocol, f"P{n}", seed), "feel")) for n in range(10) for seed in range(10)}
@@ -330,6 +335,7 @@ def test_a_page_of_breaks_can_stand_in_the_sequence_too():
     assert build_schedule(protocol, "P001", 1).steps.count(PageStep("pause")) == 2
 
 
+@pytest.mark.slow
 @given(seeds, participants)
 def test_a_schedule_needs_no_more_than_its_orders(seed: int, participant: str):
     for protocol in (REK, SMALL):

@@ -241,6 +241,7 @@ def test_check_warns_of_a_ratio_that_converges_for_small_steps_alone_and_of_a_si
     assert not [one for one in level_warnings(adaptive('kind = "updown"\ntracks = 2')) if "methods." in one]
 
 
+@pytest.mark.slow
 def test_check_says_at_what_percentage_a_method_aims() -> None:
     assert "(updown: converges to 80.4 % correct), 120 trials" not in describe(adaptive('kind = "updown"'))
     assert "(updown: converges to 80.4 % correct), 60 trials per standard" in describe(adaptive('kind = "updown"'))

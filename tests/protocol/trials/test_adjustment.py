@@ -45,6 +45,7 @@ def test_settings_start_alternately_near_either_end_and_the_secret_draws_which_i
     assert len({round(u, 6) for u in levels}) == 20
 
 
+@pytest.mark.slow
 def test_both_ends_are_first_about_equally_often_and_no_start_is_an_end() -> None:
     firsts = [starts(bytes([n] * 32))[0] for n in range(60)]
     assert 15 < sum(one > 6 for one in firsts) < 45

@@ -41,6 +41,7 @@ def test_every_stretch_has_one_and_no_track_begins_with_one(participant: str) ->
         assert {level for catch, level, _ in slots if catch} == {0.8}
 
 
+@pytest.mark.slow
 def test_positions_differ_between_tracks_and_stretches() -> None:
     places = {
         index % 11

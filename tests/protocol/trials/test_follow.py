@@ -33,6 +33,7 @@ def test_the_velocity_is_the_slope_of_the_place(amplitude: float, frequency: flo
     assert abs(task.target_m(t_s)[0]) <= task.amplitude_m
 
 
+@pytest.mark.slow
 @given(amplitude=amplitudes, frequency=frequencies, lead=leads)
 def test_the_pace_is_the_rms_speed_after_the_lead(amplitude: float, frequency: float, lead: float) -> None:
     task = Follow(kind="follow", amplitude_mm=amplitude, frequency_hz=frequency, lead_s=lead)

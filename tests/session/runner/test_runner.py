@@ -222,6 +222,7 @@ def test_the_first_button_goes_on_neither_from_a_consent_nor_from_a_task(world: 
     assert world.state.phase is Phase.TASK  # the least time is over, but a squeeze is not a key
 
 
+@pytest.mark.slow
 def test_a_button_held_down_is_one_press(world: World) -> None:
     world = at_block("seeing")
     for _ in range(30):

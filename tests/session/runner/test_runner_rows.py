@@ -10,6 +10,7 @@ from study_app.session.trial import SETTLED_S
 from tests.session.fakes import LEFT, RIGHT, World, at_block, step
 
 
+@pytest.mark.slow
 def test_a_sample_that_was_refused_at_the_door_changes_nothing_but_its_own_count() -> None:
     worlds = at_block("seeing"), at_block("seeing")
     for world, position_m, limiters in zip(worlds, (LEFT, (1.0, 1.0, 1.0)), (0, LIMITER_GLITCH), strict=True):

@@ -28,7 +28,7 @@ LESS, MORE = ANSWERS
 STILL_N = 1e-9
 
 
-@pytest.fixture(params=["scripted", "falcon-emulated"])
+@pytest.fixture(params=["scripted", pytest.param("falcon-emulated", marks=pytest.mark.slow)])
 def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
     settings = study_settings(matching(), stream(1, "hand"))
     with open_rig(request.param, settings, clock=VirtualClock()) as opened:

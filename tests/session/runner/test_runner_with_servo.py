@@ -262,6 +262,7 @@ class Judged:
             self.row = next(row for row in trials(opened(store.lines, store.key)) if row["outcome"] == "complete")
 
 
+@pytest.mark.slow
 def test_a_trial_without_incidents_is_valid(tmp_path: Path) -> None:
     row = Judged(tmp_path / "study").row
     assert row["valid"] is True

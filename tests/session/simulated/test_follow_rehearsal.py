@@ -19,7 +19,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.recording_files import read_samples
 from tests.compiled import needs_servo
 
-pytestmark = needs_servo
+pytestmark = [pytest.mark.slow, needs_servo]
 
 STUDY = """\
 format = 2
@@ -70,7 +70,6 @@ def results(study_file: Path) -> Path:
     return rehearse(study_file, participants=2, seed=1, results=study_file.parent / "results")
 
 
-@pytest.mark.slow
 def test_every_trial_is_followed_to_its_end_and_valid(results: Path) -> None:
     trials = [
         row
@@ -110,7 +109,6 @@ def test_replay_finds_no_difference(results: Path) -> None:
     assert {(one.differences, one.uncompared, one.recordings) for one in found} == {((), (), 4)}
 
 
-@pytest.mark.slow
 def test_the_report_is_written(results: Path, tmp_path: Path) -> None:
     assert report(results, tmp_path / "report")[0].name == "report.html"
 

@@ -41,6 +41,7 @@ from tests.session import small
 HALF_M = (0.05, 0.03, 0.03)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32), st.floats(1, 60))
 def test_an_exploration_stays_in_the_tank_moves_without_jumps_and_lasts(seed: int, duration_s: float) -> None:
@@ -158,6 +159,7 @@ def test_a_hand_reaches_for_what_is_seen_lit_and_no_sooner_than_a_person_could()
     assert len(orders) == 3
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32), st.lists(st.integers(1, 7), min_size=1, max_size=9))
 def test_the_last_choice_for_an_item_is_its_answer_and_every_choice_is_on_the_scale(
     seed: int, values: list[int]
@@ -192,6 +194,7 @@ def test_the_folder_of_another_study_is_named_before_an_id_that_is_used_in_it(tm
         rehearsal.rehearse("demo", participants=1, seed=1, results=folder.path)
 
 
+@pytest.mark.slow
 @needs_servo
 def test_a_disk_that_fails_ends_the_rehearsal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(self: SessionStore, event: str, **fields: Any) -> None:

@@ -21,7 +21,7 @@ from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.store.forging import change, cut
 
-pytestmark = needs_servo
+pytestmark = [pytest.mark.slow, needs_servo]
 
 STUDY = """\
 format = 2
@@ -97,7 +97,6 @@ def answers(lines: list[dict[str, Any]]) -> list[tuple[int, Any]]:
     return [(line["trial"], line["items"][0]["value"]) for line in lines if line["event"] == "responses"]
 
 
-@pytest.mark.slow
 def test_clipped_intervals_are_invalid_and_their_trials_come_again_and_are_not_asked_about(session: Path) -> None:
     lines = lines_of(session)
     started, ended = by_trial(lines, "trial_started"), by_trial(lines, "trial_ended")
@@ -145,7 +144,6 @@ def test_journal_recordings_and_answers_agree(study: Path) -> None:
     assert (checked.errors, checked.warnings) == ((), ())
 
 
-@pytest.mark.slow
 def test_a_delivered_value_that_is_not_the_recordings_is_found(session: Path) -> None:
     def edit(lines: list[dict[str, Any]]) -> None:
         next(line for line in lines if line["event"] == "interval_ended")["value_delivered"] += 1e-6
@@ -154,7 +152,6 @@ def test_a_delivered_value_that_is_not_the_recordings_is_found(session: Path) ->
     assert any("value_delivered differs" in one for one in replay(session).differences)
 
 
-@pytest.mark.slow
 def test_a_session_ended_between_two_attempts_goes_on_to_the_same_answers(session: Path, protocol: Path) -> None:
     whole = lines_of(session)
     invalid = [index for index, line in enumerate(whole) if line.get("outcome") == "invalid"]

@@ -77,6 +77,7 @@ def test_a_participant_keeps_the_group_in_session_2(tmp_path: Path) -> None:
     assert len(claims(study)) == 2
 
 
+@pytest.mark.slow
 def test_no_file_names_a_group_of_a_participant(tmp_path: Path) -> None:
     """Of two folders that differ in the secret alone, everything readable is the same for other groups."""
     readable: dict[str, str] = {}

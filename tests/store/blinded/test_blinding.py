@@ -134,6 +134,7 @@ def test_a_real_key_comes_from_the_systems_randomness(
     assert keys[0].drawn == "system"
 
 
+@pytest.mark.slow
 def test_real_keys_give_each_condition_to_each_code_equally_often(tmp_path: Path, protocol: Protocol) -> None:
     given: Counter[str] = Counter()
     for number in range(200):

@@ -71,6 +71,7 @@ def test_a_sealed_study_holds_no_column_that_tells_a_condition(tmp_path: Path, s
     assert sound(folder)
 
 
+@pytest.mark.slow
 def test_unblinding_gives_what_an_open_study_would_have_held(
     tmp_path: Path, protocol: Protocol, start: Start, attend: Attend
 ) -> None:
@@ -103,6 +104,7 @@ def test_unblinding_gives_what_an_open_study_would_have_held(
     assert not list(folders[1].rglob(REBUILT)), "unblinding makes no proof again"
 
 
+@pytest.mark.slow
 def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
     tmp_path: Path, start: Start, attend: Attend, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -225,6 +227,7 @@ def in_clear(store: SessionStore, study: StudyHead) -> None:
     store.place.study_folder.description.write_bytes(description_bytes(study, sealed=False))
 
 
+@pytest.mark.slow
 def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
     tmp_path: Path, protocol: Protocol, start: Start, attend: Attend
 ) -> None:

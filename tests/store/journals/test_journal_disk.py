@@ -170,6 +170,7 @@ def test_a_close_that_cannot_flush_the_last_lines_says_so(disk: Disk, monkeypatc
     journal.close()
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(lines=st.lists(st.tuples(st.booleans(), st.booleans()), max_size=12), cut=st.integers(0, 400))
 def test_a_power_cut_takes_no_answer_and_leaves_no_hole(

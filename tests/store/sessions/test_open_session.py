@@ -93,6 +93,7 @@ def rows_of(store: SessionStore, table: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text, newline="")))
 
 
+@pytest.mark.slow
 def test_recordings_are_kept_beside_the_journal_and_linked_from_the_trials_row(
     start: Callable[..., SessionStore], samples_of: Callable[..., Any], summary: dict[str, Any]
 ) -> None:

@@ -149,6 +149,7 @@ def test_the_receipt_tells_what_it_goes_on_with(start: Callable[..., SessionStor
     assert after["resumed"][1]["clock"] == {"origin_ns": resumed.clock.origin_ns, "origin_at": resumed.clock.at(0)}
 
 
+@pytest.mark.slow
 def test_a_resumed_session_gives_the_tables_of_one_that_was_never_interrupted(
     tmp_path: Path, protocol: Protocol, start: Callable[..., SessionStore], again: Again, summary: dict[str, Any]
 ) -> None:

@@ -9,7 +9,7 @@ from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.verification.reproduction import reproduced
 from tests.compiled import needs_servo
 
-pytestmark = needs_servo
+pytestmark = [pytest.mark.slow, needs_servo]
 
 
 @pytest.fixture(scope="module")
@@ -19,12 +19,10 @@ def session(tmp_path_factory):
     )
 
 
-@pytest.mark.slow
 def test_a_rehearsed_session_is_reproduced(session) -> None:
     assert reproduced(session).differences == []
 
 
-@pytest.mark.slow
 def test_another_seed_in_the_receipt_is_seen(session) -> None:
     receipt = session / "receipt.json"
     kept = receipt.read_bytes()

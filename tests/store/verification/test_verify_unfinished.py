@@ -50,6 +50,7 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Callable[..., Ses
     assert told(findings) == ""
 
 
+@pytest.mark.slow
 def test_the_trace_of_a_crash_is_told_and_an_empty_one_is_not(study: Path) -> None:
     trace = study / SESSION / "crash.txt"
     trace.touch()
@@ -60,6 +61,7 @@ def test_the_trace_of_a_crash_is_told_and_an_empty_one_is_not(study: Path) -> No
     assert "sub-P007/ses-01/crash.txt: shows where the program crashed" in warned(findings)
 
 
+@pytest.mark.slow
 def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(
     study: Path, start: Callable[..., SessionStore]
 ) -> None:
@@ -82,6 +84,7 @@ def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(
     assert "recordings: trial 1, attempt 1 has none, and the journal gives no reason" in left
 
 
+@pytest.mark.slow
 def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     study: Path, start: Callable[..., SessionStore], summary: dict[str, Any]
 ) -> None:
@@ -123,6 +126,7 @@ def test_a_table_of_a_session_that_has_not_ended_tells_nothing_else_than_its_jou
     assert f"{path.relative_to(study).as_posix()}: differs from the journal" in told(verify(study))
 
 
+@pytest.mark.slow
 def test_a_trial_without_its_recording_is_known_at_the_end(study: Path, start: Callable[..., SessionStore]) -> None:
     store = start("P009", recordings=True)
     told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}

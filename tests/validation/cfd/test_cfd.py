@@ -107,6 +107,7 @@ def test_moments_cover_the_motion_in_steps_that_start_and_stop_short():
     assert STOPPING.near_steps(times).sum() == 2 * (0.4 / 0.005) + 2
 
 
+@pytest.mark.slow
 def test_a_study_of_the_workspace_does_not_change_what_is_solved(tmp_path, monkeypatch):
     shipped = shipped_file(cases.PROTOCOL).read_text("utf-8")
     (tmp_path / "protocols").mkdir()
@@ -207,6 +208,7 @@ def test_a_table_that_was_damaged_is_named(tmp_path):
 # --- The fits ---
 
 
+@pytest.mark.slow
 @COMPILED
 def test_the_stored_fits_have_the_errors_they_say(fits):
     rows = model_comparison.fits_csv(fits).decode().splitlines()

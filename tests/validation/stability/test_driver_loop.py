@@ -49,6 +49,7 @@ def test_force_acts_a_tick_after_it_is_sent():
         assert min(sizes[0], sizes[2]) > 2 * sizes[1]
 
 
+@pytest.mark.slow
 def test_grip_that_is_let_go_moves_by_the_motors_alone():
     case = dataclasses.replace(RELEASE, viscous_nspm=0.0)
     falcon, _ = traces(case)

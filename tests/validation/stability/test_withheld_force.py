@@ -31,6 +31,7 @@ def played(case, path_m, *, rigid):
     return trace
 
 
+@pytest.mark.slow
 @compiled
 def test_slow_strokes_lose_nothing_and_shares_lie_between_0_and_1():
     shares = measure(["syrup"])

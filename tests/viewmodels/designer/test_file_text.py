@@ -14,6 +14,7 @@ LINES = st.lists(st.sampled_from(["a", "b = 1", "# é😀\u00a0", "", "\t"]), ma
 ENDS = st.sampled_from(["\n", "\r\n"])
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.sampled_from(["a", "b = 1", "# é😀\u00a0", ""]), ENDS), max_size=8), st.data())
 def test_typing_changes_no_end_of_line_elsewhere(lines: list[tuple[str, str]], data: st.DataObject) -> None:
     text = "".join(line + end for line, end in lines)

@@ -58,6 +58,7 @@ def test_angles_are_those_of_the_law_of_cosines(name, place):
     assert arms_of(name, place).angle_rad == pytest.approx(closed_form(name, place), abs=1e-12)
 
 
+@pytest.mark.slow
 @given(geometries, places, places)
 def test_where_it_searched_from_does_not_matter(name, place, before):
     arms = arms_of(name, before)

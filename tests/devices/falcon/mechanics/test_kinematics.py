@@ -133,6 +133,7 @@ def test_a_calibrated_offset_turns_every_arm():
 
 @every_geometry
 class TestForces:
+    @pytest.mark.slow
     @given(position_m=inside)
     def test_jacobian_is_the_slope_of_the_angles(self, mechanism, position_m):
         step_m = 1e-6

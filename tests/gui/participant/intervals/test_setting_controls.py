@@ -55,6 +55,7 @@ def wheel(widget: QWidget, eighths: int) -> QWheelEvent:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_controls_are_shown_where_a_level_is_set_and_nowhere_else(opened: Opened) -> None:
     opened.window.show_page(page(adjusts=False))
     controls = opened.window.widget.controls

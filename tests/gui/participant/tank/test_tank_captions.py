@@ -47,6 +47,7 @@ def test_every_language_says_that_time_is_up(language: str) -> None:
     assert hint(COUNTING, 60.0, language) == words(language).time_is_up
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["en", "ar"])
 @pytest.mark.parametrize("size", [(1024, 640), (1366, 768)])
 def test_the_bars_of_settings_leave_room_to_the_marks_of_intervals(language: str, size: tuple[int, int]) -> None:

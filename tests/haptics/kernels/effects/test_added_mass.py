@@ -23,6 +23,7 @@ def speeding_up(acceleration, ticks=50, interval_s=1e-3):
     return moving(np.outer(np.arange(ticks) * interval_s, acceleration), interval_s)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(60), deadline=None)
 @given(
     density=st.floats(1, 20_000),

@@ -32,6 +32,7 @@ def flow(felt, places_m):
     return np.divide(force, np.sqrt(size * WATER_FACTOR), out=np.zeros_like(force), where=size > 0)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(50), deadline=None)
 @given(velocity=velocities, current=velocities)
 def test_drag_is_against_the_motion_through_the_moving_liquid(velocity, current):
@@ -49,6 +50,7 @@ def test_a_hand_that_drifts_with_the_river_feels_nothing_and_leaves_no_wake():
     assert not vectors(felt, "wake").any()
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(30), deadline=None)
 @given(through=st.tuples(components, st.just(0.0), components), current=velocities)
 def test_in_its_own_frame_a_river_is_a_pond(through, current):

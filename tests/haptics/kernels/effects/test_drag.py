@@ -20,6 +20,7 @@ def test_water_at_one_metre_a_second_resists_with_the_drag_equation():
     assert (table.fy_n[0], table.fz_n[0]) == (0.0, 0.0)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(100), deadline=None)
 @given(vx=speeds, vy=speeds, vz=speeds, density=st.floats(1, 20_000), diameter=st.floats(0.001, 1), cd=st.floats(0, 10))
 def test_drag_is_half_rho_cd_a_v_squared_against_the_motion(vx, vy, vz, density, diameter, cd):
@@ -35,6 +36,7 @@ def test_no_motion_is_no_force():
     assert not vectors(table, "force").any()
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(50), deadline=None)
 @given(angle=st.floats(0, 2 * np.pi), vx=speeds, vy=speeds, vz=speeds)
 def test_turning_the_motion_about_the_vertical_turns_the_force(angle, vx, vy, vz):

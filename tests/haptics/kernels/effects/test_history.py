@@ -79,6 +79,7 @@ def test_a_sudden_start_is_felt_long_after(fluid, factors):
     assert -felt[at] / stokes == pytest.approx(factors, rel=0.006)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(30), deadline=None)
 @given(
     legs=st.lists(st.floats(-2, 2), min_size=1, max_size=8),

@@ -138,6 +138,7 @@ def test_it_fades_with_the_distance_from_its_place(distance):
     assert felt[10:] == pytest.approx(near[10:] * np.exp(-0.5 * (distance / 0.1) ** 2), rel=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(30), deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1), current=st.tuples(*[st.floats(-2, 2)] * 3), exponent=st.sampled_from([0.5, 1, 2])

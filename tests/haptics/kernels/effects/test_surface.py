@@ -57,6 +57,7 @@ def test_the_cap_of_a_ball(depth, volume, upright, level, region):
     assert shares(depth, region) == pytest.approx((volume, upright, level), abs=5e-5)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(100), deadline=None)
 @given(depth=st.floats(-0.1, 1.1))
 def test_shares_are_areas_and_volumes_by_quadrature(depth):

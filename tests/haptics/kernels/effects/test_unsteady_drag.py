@@ -175,6 +175,7 @@ def test_a_body_that_moves_already_meets_steady_drag_at_once():
     assert felt == pytest.approx(np.tile(steady, (200, 1)), rel=1e-9)
 
 
+@pytest.mark.slow
 @compiled
 def test_after_a_stop_the_wake_pushes_on_and_what_is_remembered_ends_as_zero():
     velocity = np.zeros((60_000, 3))

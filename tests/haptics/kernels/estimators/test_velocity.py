@@ -103,6 +103,7 @@ def test_the_knee_lowers_speeds_above_its_threshold(law, speed, expected):
     assert lowered(v, knee) == pytest.approx(v * expected / speed)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(100), deadline=None)
 @given(a=st.floats(0, 100), b=st.floats(0, 100), threshold=st.floats(0.1, 20))
 def test_the_square_root_knee_keeps_the_order_of_speeds_and_never_raises_one(a, b, threshold):

@@ -173,6 +173,7 @@ def test_hazard_17_towing_for_ten_seconds_is_never_a_push(name, speed_mps):
     assert (towed.device_fx_n <= 1e-12).all()
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(50), deadline=None)
 @given(wake=wakes(), speed=st.floats(0.01, 10))
 def test_hazard_17_whatever_the_wake_steady_motion_is_never_pushed_on(wake, speed):
@@ -187,6 +188,7 @@ def test_hazard_19_a_ring_of_seven_wraps_without_a_slip(wake, legs):
     assert difference(scene(liquid(wake=wake), knee=UNBENT), walk(legs)) <= 1e-9
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(20), deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), span_m=st.sampled_from([0.0, 0.01]))
 def test_hazard_19_every_element_held_is_counted_in_one_segment(seed, span_m):
