@@ -12,10 +12,12 @@ from study_app.app.workstation import WorkstationController
 from study_app.devices.backends import backends
 from study_app.devices.descriptor import Backend
 from study_app.devices.registry import descriptor_of
+from study_app.gui.application import open_here
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.theme.theme import Theme
 from study_app.store.workstation import MachineSettings
+from study_app.viewmodels.device_bench import benches_shown
 from study_app.viewmodels.device_list import DeviceShown, device_named, devices_shown
 
 PATIENCE_S = 5.0
@@ -65,6 +67,7 @@ class DevicesController(QObject):
         place.chosen.connect(lambda name: self._desk.change({"device": name}))
         place.option_chosen.connect(lambda name, path: self._desk.change({name: path}))
         place.diagnose_asked.connect(self.diagnose)
+        place.report_asked.connect(open_here)
         place.left.connect(self.end_diagnosis)
         self._show()
         return place
@@ -126,6 +129,7 @@ class DevicesController(QObject):
     def _show(self) -> None:
         if self.place is not None:
             self.place.show_devices(self.shown, self._desk.settings.device)
+            self.place.show_benches(benches_shown(self._desk.settings.benches))
             self.place.show_options(self._desk.settings.device_options)
 
 

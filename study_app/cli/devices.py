@@ -191,9 +191,10 @@ def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
     if not found.fits:
         click.echo("Nothing was kept for receipts: mass, damping and friction do not explain how the handle moved.")
         click.get_current_context().exit(EXIT_FOUND)
-    bench = workstation.DeviceBench.model_validate(kept(found, day))
+    report = str((folder / "bench.md").resolve())
+    bench = workstation.DeviceBench.model_validate({**kept(found, day), "report": report})
     workstation.save(workstation.load_or_default()[0].with_bench(bench))
-    click.echo("Kept in this machine's settings: receipts of its sessions record it.")
+    click.echo("Kept in this machine's settings: receipts of its sessions record it, and the place Devices shows it.")
 
 
 def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:

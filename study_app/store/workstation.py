@@ -61,7 +61,7 @@ class DeviceBench(_Strict):
 
     ``mass_kg``, ``damping_nspm`` and ``friction_n`` are the device's own, ``stable_nspm`` the greatest stable damping,
     ``delay_ms`` how late a force acts, ``gain`` newtons on a scale for each newton sent (None without a scale). A
-    device is known by ``name`` and ``serial``, "" where it has none.
+    device is known by ``name`` and ``serial``, "" where it has none. ``report`` is the path of bench.md.
     """
 
     name: Annotated[str, Field(pattern=rf"^{NAME_PATTERN}$")]
@@ -73,11 +73,12 @@ class DeviceBench(_Strict):
     delay_ms: OfAxes
     stable_nspm: OfAxes
     gain: float | None = None
+    report: Place | None = None
 
     @property
     def entry(self) -> dict[str, Any]:
         """What a receipt records of it."""
-        return self.model_dump(mode="json", exclude={"name", "serial"})
+        return self.model_dump(mode="json", exclude={"name", "serial", "report"})
 
 
 class MachineSettings(_Strict):

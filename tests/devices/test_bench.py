@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -274,6 +275,21 @@ def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
     assert "the handle was touched" in (tmp_path / "report" / "bench.md").read_text()
     assert "Nothing was kept" in done.output
     assert workstation.load().benches == ()
+
+
+def test_bench_of_a_real_device_is_kept_with_the_path_of_its_report(tmp_path, monkeypatch):
+    from study_app.devices.registry import descriptor_of
+
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
+    monkeypatch.setattr(procedure, "Durations", lambda: QUICK)
+    real = replace(descriptor_of("scripted"), kind="felt")
+    monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)
+    monkeypatch.chdir(tmp_path)
+    done = liquid_study("devices", "bench", "scripted")
+    assert done.exit_code == 0, done.output
+    (own,) = workstation.load().benches
+    assert own.report == str(tmp_path / "bench-scripted" / "bench.md")
+    assert Path(own.report).is_file()
 
 
 def test_refused_position_does_not_enter_the_noise():

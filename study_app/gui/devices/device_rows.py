@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from collections.abc import Mapping
+from pathlib import Path
+
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card, Chip, Rule
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.labels import label, set_ink
+from study_app.viewmodels.device_bench import BenchShown
 from study_app.viewmodels.device_list import DeviceShown
 
 LEAST_WORDS = 280  # narrower, wrapped words would ask for room that they do not need
@@ -16,9 +20,10 @@ INSET = 30  # behind a radio's mark
 
 
 class DeviceRow(QWidget):
-    """One device; ``diagnose_asked`` carries its name."""
+    """One device; ``diagnose_asked`` carries its name, ``report_asked`` the path of the report of its last bench."""
 
     diagnose_asked = Signal(str)
+    report_asked = Signal(Path)
 
     def __init__(self, shown: DeviceShown) -> None:
         super().__init__()
@@ -33,6 +38,11 @@ class DeviceRow(QWidget):
         self.diagnose.setAccessibleName(f"Diagnose {shown.title}")
         self.diagnose.setVisible(shown.diagnosable)
         self.diagnose.clicked.connect(lambda: self.diagnose_asked.emit(self.name))
+        self.bench = _words("text2")
+        self.report = ActionButton("file", "Bench report", height=36)
+        self.report.setAccessibleName(f"Bench report of {shown.title}")
+        self.report.clicked.connect(lambda: self.report_asked.emit(self._report))
+        self._report: Path | None = None
         head = QHBoxLayout()
         head.setSpacing(10)
         if not shown.choosable:
@@ -42,20 +52,26 @@ class DeviceRow(QWidget):
         head.addWidget(self.chip)
         words = QVBoxLayout()
         words.setSpacing(4)
-        for line in (self.can, self.why, self.by):
+        for line in (self.can, self.why, self.by, self.bench):
             words.addWidget(line)
         words.addStretch()
         below = QHBoxLayout()
         below.setContentsMargins(INSET, 0, 0, 0)
         below.setSpacing(16)
         below.addLayout(words, 1)
-        below.addWidget(self.diagnose, 0, Qt.AlignmentFlag.AlignTop)
+        buttons = QVBoxLayout()
+        buttons.setSpacing(8)
+        buttons.addWidget(self.diagnose)
+        buttons.addWidget(self.report)
+        buttons.addStretch()
+        below.addLayout(buttons)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 6, 0, 6)
         column.setSpacing(2)
         column.addLayout(head)
         column.addLayout(below)
         self.show_device(shown)
+        self.show_bench(None)
 
     def show_device(self, shown: DeviceShown) -> None:
         """Show a device as it was found."""
@@ -71,12 +87,20 @@ class DeviceRow(QWidget):
         set_ink(self.why, "warn" if shown.tone == "warn" else "text2")
         self.title.setAccessibleName(f"{shown.title}. {shown.word}. {shown.can} {shown.why}".strip())
 
+    def show_bench(self, bench: BenchShown | None) -> None:
+        """Show the last bench of the device; None: it was not measured."""
+        self._report = None if bench is None else bench.report
+        self.bench.setText("" if bench is None else bench.words)
+        self.bench.setVisible(bench is not None)
+        self.report.setVisible(self._report is not None)
+
 
 class DeviceList(Card):
     """Devices under each other; ``chosen`` carries the name of the one to begin with: one of all in the ``group``."""
 
     chosen = Signal(str)
     diagnose_asked = Signal(str)
+    report_asked = Signal(Path)
 
     def __init__(self, title: str, group: QButtonGroup) -> None:
         super().__init__(title, gap=6)
@@ -91,6 +115,11 @@ class DeviceList(Card):
             else:
                 self._add(device)
 
+    def show_benches(self, benches: Mapping[str, BenchShown]) -> None:
+        """Show the last bench of each device, by its name."""
+        for name, row in self.rows.items():
+            row.show_bench(benches.get(name.partition(":")[0]))
+
     def mark(self, kind: str) -> None:
         """Mark the device that sessions begin with."""
         for name, row in self.rows.items():
@@ -104,6 +133,7 @@ class DeviceList(Card):
         self.rows[device.name] = row
         self.column.addWidget(row)
         row.diagnose_asked.connect(self.diagnose_asked)
+        row.report_asked.connect(self.report_asked)
         if isinstance(row.title, Radio):
             self._group.addButton(row.title)
             row.title.clicked.connect(lambda: self.chosen.emit(device.name))

@@ -21,6 +21,7 @@ from study_app.gui.widgets.cards import SHADOW, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
+from study_app.viewmodels.device_bench import BenchShown
 from study_app.viewmodels.device_list import DeviceShown, remembered_options
 
 STACKED_BELOW = 1000
@@ -75,6 +76,7 @@ class HelpCard(Card):
             "Connect the USB cable and the power adapter, then press “Refresh”.",
             "“Diagnose …” finds, opens, loads, homes and tests the device without force, and says what is wrong.",
             "“liquid-study devices calibrate” measures its force with a known weight.",
+            "“liquid-study devices bench” measures any device with force in ten minutes; the result is shown here.",
         ):
             line = label(words, "label", "text2", wraps=True)
             line.setFont(font("label", weight=400))
@@ -86,14 +88,15 @@ class DevicesPlace(Place):
     """Every device with its state.
 
     ``look_asked`` where the machine is to be looked at again; ``chosen`` carries the name of the device that sessions
-    begin with; ``option_chosen`` an option's name, and a path or None; ``diagnose_asked`` a device's name; ``left``
-    comes with `leave`.
+    begin with; ``option_chosen`` an option's name, and a path or None; ``diagnose_asked`` a device's name;
+    ``report_asked`` the path of a bench report; ``left`` comes with `leave`.
     """
 
     look_asked = Signal()
     chosen = Signal(str)
     option_chosen = Signal(str, object)
     diagnose_asked = Signal(str)
+    report_asked = Signal(Path)
     left = Signal()
 
     def __init__(self) -> None:
@@ -108,6 +111,7 @@ class DevicesPlace(Place):
         for part in (self.people, self.simulated):
             part.chosen.connect(self.chosen)
             part.diagnose_asked.connect(self.diagnose_asked)
+            part.report_asked.connect(self.report_asked)
         for name, card in self.options.items():
             card.chosen.connect(partial(self.option_chosen.emit, name))
         self._lay_out()
@@ -168,6 +172,11 @@ class DevicesPlace(Place):
             part.mark(preferred.partition(":")[0])
             dress(part, self.theme)
         self._group.setExclusive(True)
+
+    def show_benches(self, benches: Mapping[str, BenchShown]) -> None:
+        """Show the last bench of each device, by its name."""
+        for part in (self.people, self.simulated):
+            part.show_benches(benches)
 
     def show_options(self, values: Mapping[str, Path]) -> None:
         """Show which files are chosen, by the option's name."""

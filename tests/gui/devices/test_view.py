@@ -12,6 +12,7 @@ from study_app.devices.descriptor import NONE, NOT_AVAILABLE, READY, Backend
 from study_app.gui.devices.view import NO_FILE, DevicesPlace
 from study_app.gui.theme.theme import DARK
 from study_app.gui.theme.themed import wear
+from study_app.viewmodels.device_bench import BenchShown
 from study_app.viewmodels.device_list import devices_shown
 
 FOUND = [
@@ -116,3 +117,21 @@ def test_no_word_is_cut_at_any_size(place, qtbot, size):
                 assert 0 <= one.mapTo(place, QPoint()).x() <= size.width() - one.width()
 
     qtbot.waitUntil(whole)
+
+
+def test_the_last_bench_is_shown_and_its_report_is_asked_for(place, qtbot, tmp_path):
+    report = tmp_path / "bench.md"
+    place.show_benches({"falcon": BenchShown("Measured 2026-11-21: mass 0.20 kg.", report)})
+    falcon, mouse = rows(place)["falcon"], rows(place)["mouse"]
+    assert (falcon.bench.text(), falcon.bench.isVisible()) == ("Measured 2026-11-21: mass 0.20 kg.", True)
+    assert not mouse.bench.isVisible()
+    assert not mouse.report.isVisible()
+    with qtbot.waitSignal(place.report_asked) as asked:
+        qtbot.mouseClick(falcon.report, Qt.MouseButton.LeftButton)
+    assert asked.args == [report]
+    place.show_devices(devices_shown(FOUND), "mouse")
+    assert falcon.bench.isVisible()
+    place.show_benches({"falcon": BenchShown("Measured. The report is missing: /gone.", None)})
+    assert (falcon.bench.isVisible(), falcon.report.isVisible()) == (True, False)
+    place.show_benches({})
+    assert not falcon.bench.isVisible()
