@@ -30,8 +30,11 @@ class Device(Driver, Protocol):
         """Return what a receipt should record of it: names and numbers, nothing of this machine's folders."""
         ...
 
-    def __enter__(self) -> Self: ...
+    def __enter__(self) -> Self:
+        self.open()
+        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
+    ) -> None:
+        self.close()

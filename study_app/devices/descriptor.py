@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from pkgutil import resolve_name
 from random import Random
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, TypeVar, get_args
 
@@ -106,6 +107,20 @@ class Doctor:
 
     findings: Callable[[], tuple[Finding, ...]]
     examine: Callable[..., Report]
+
+
+def doctor_at(findings: str, examine: str) -> Doctor:
+    """Return the doctor of two functions, each ``package.module:name``: a module is loaded by the call."""
+
+    def load_findings() -> tuple[Finding, ...]:
+        found: tuple[Finding, ...] = resolve_name(findings)()
+        return found
+
+    def load_and_examine(name: str, **request: Any) -> Report:
+        report: Report = resolve_name(examine)(name, **request)
+        return report
+
+    return Doctor(findings=load_findings, examine=load_and_examine)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,13 +1,16 @@
-"""A device run at rest by its servo, as its doctor does: without force, in the time of its clock."""
+"""A device opened and run at rest by its servo, as its doctor does: without force, in the time of its clock."""
 
 from __future__ import annotations
 
 import time
-from typing import Any, Final
+from collections.abc import Callable
+from typing import Any, Final, Protocol, TypeVar
 
 import numpy as np
 
 from study_app.devices.base import Device
+from study_app.devices.doctor_report import Report
+from study_app.devices.failure_table import DeviceFailure, FailureTable
 from study_app.devices.simulated.hand_commands import hand_of
 from study_app.errors import DeviceLost, ServoFault
 from study_app.haptics.runtime.clocks.clock import VirtualClock
@@ -17,6 +20,53 @@ SECONDS: Final = 3.0
 LEAST_HZ: Final = 900.0
 MOVE: Final = "Hold the handle and move it about a little …"
 _CHUNK_S = 0.25
+
+
+class Examined(Device, Protocol):
+    """A device that names its modes of failure."""
+
+    @property
+    def failure_mode(self) -> str | None:
+        """The id of what ended it in its table; None: nothing did."""
+        ...
+
+
+D = TypeVar("D", bound=Examined)
+
+
+def examine_by_table(
+    device: D,
+    table: FailureTable,
+    in_words: Callable[[D, float], tuple[str, ...]],
+    *,
+    running: str,
+    progress: Callable[[str], object],
+    seconds: float,
+) -> Report:
+    """Open a device, run it at rest, and return which of the failures of its table appeared.
+
+    Parameters
+    ----------
+    device : closed
+    table : whose last mode is "rate"
+    in_words : returns what is worth reading of the device and its new positions per second
+    running : the first mode that appears only while it runs
+    progress : is given what to do, a line at a time
+    seconds : how long it is run
+    """
+    try:
+        device.open()
+    except DeviceFailure as failed:
+        return Report((), table.findings(failed.mode, table.before(failed.mode)), str(failed))
+    with device:
+        progress(MOVE)
+        samples, fault = run_at_rest(device, seconds)
+        mode, fresh_hz = device.failure_mode, fresh_rate_hz(samples)
+        words = in_words(device, fresh_hz)
+    if mode is None and fresh_hz < LEAST_HZ:
+        mode = "rate"
+    passed = {one.id for one in table.modes} if fault is None else table.before(running)
+    return Report(words, table.findings(mode, passed - {mode}), fault)
 
 
 def run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:

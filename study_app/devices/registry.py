@@ -117,7 +117,13 @@ def open_device(name: str, **request: Any) -> Device:
     device = descriptor_of(name)
     asked = OpenRequest(**request)
     check_options(name, asked.options)
-    return device.open(replace(asked, argument=name.partition(":")[2]))
+    found = device.open(replace(asked, argument=name.partition(":")[2]))
+    if not hasattr(found, "failure"):  # of another package, made for an earlier version
+        found.close()
+        raise DeviceError(
+            f"device '{name}' has no 'failure': let {type(found).__name__} inherit study_app.devices.base.Device"
+        )
+    return found
 
 
 def doctor_of(name: str) -> Doctor:

@@ -1,6 +1,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numba
 import pytest
@@ -8,8 +9,9 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
+from study_app.devices import registry
 from study_app.devices.registry import descriptor_of, list_devices, open_device
-from study_app.errors import DeviceNotFound
+from study_app.errors import DeviceError, DeviceNotFound
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
 from study_app.haptics.model.layout import new_reading
 from tests.devices.contract import write
@@ -41,6 +43,20 @@ class Readings:
 
 def test_the_mouse_is_the_default():
     assert list_devices()[0] == "mouse"
+
+
+def test_a_device_without_failure_is_closed_and_named(monkeypatch):
+    class Bare:
+        closed = False
+
+        def close(self):
+            self.closed = True
+
+    bare = Bare()
+    monkeypatch.setattr(registry, "descriptor_of", lambda _: replace(descriptor_of("mouse"), open=lambda _: bare))
+    with pytest.raises(DeviceError, match="device 'mouse' has no 'failure': let Bare inherit"):
+        open_device("mouse")
+    assert bare.closed
 
 
 @pytest.mark.parametrize("name", ["mouse", "scripted"])

@@ -101,6 +101,7 @@ class Probe:
 
     name = "probe"
     force_limit_n = 8.0
+    failure = None
     read = c_function(READ, _read)
     write = c_function(WRITE, _write)
 

@@ -151,8 +151,7 @@ class BenchDriver:
     @property
     def failure(self) -> str | None:
         """Why the device behind it ended, if it says so."""
-        failure: str | None = getattr(self._inner, "failure", None)
-        return failure
+        return self._inner.failure
 
     def excite(self, what: Excitation) -> None:
         """Let this act from the next reading on; a spring begins where the handle is, and keeps what it holds up."""

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from study_app.devices.descriptor import (
@@ -14,14 +12,13 @@ from study_app.devices.descriptor import (
     Backend,
     DeviceDescriptor,
     DeviceOption,
-    Doctor,
     OpenRequest,
+    doctor_at,
     opened,
 )
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
-    from study_app.devices.doctor_report import Finding, Report
 
 FIRMWARE: Final = DeviceOption(
     name="firmware",
@@ -87,28 +84,10 @@ def _probe_socket() -> list[Backend]:
     return [Backend("falcon-socket:PATH", "a Unix socket", NOT_AVAILABLE if missing else READY, can, missing)]
 
 
-def _findings() -> tuple[Finding, ...]:
-    from study_app.devices.falcon.doctor.failure_report import findings_of  # noqa: PLC0415 - only where it is examined
-    from study_app.devices.falcon.facts import Facts  # noqa: PLC0415 - likewise
-
-    return findings_of(Facts())
-
-
-def _examine(
-    name: str,
-    *,
-    options: Mapping[str, str | Path],
-    faults: Sequence[str] = (),
-    progress: Callable[[str], object],
-) -> Report:
-    from study_app.devices.falcon.doctor.examine import examine  # noqa: PLC0415 - the compiler
-    from study_app.devices.falcon.doctor.failure_report import report  # noqa: PLC0415 - only where it is examined
-
-    firmware = options.get("firmware")
-    return report(examine(name, firmware=None if firmware is None else Path(firmware), faults=faults, tell=progress))
-
-
-_DOCTOR: Final = Doctor(findings=_findings, examine=_examine)
+_DOCTOR: Final = doctor_at(
+    "study_app.devices.falcon.doctor.failure_report:findings_of",
+    "study_app.devices.falcon.doctor.examine:examine_device",
+)
 
 DEVICES: Final = (
     DeviceDescriptor(

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, DeviceOption, Doctor, OpenRequest, opened
+from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, DeviceOption, OpenRequest, doctor_at, opened
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from study_app.devices.base import Device
-    from study_app.devices.doctor_report import Finding, Report
 
 _LIBRARY: Final = DeviceOption(
     name="dhd-library",
@@ -49,25 +44,9 @@ def _probe_emulated() -> list[Backend]:
     return [Backend("force-dimension-emulated", "the program", READY, can)]
 
 
-def _findings() -> tuple[Finding, ...]:
-    from study_app.devices.force_dimension.failures import FAILURES  # noqa: PLC0415 - only where it is examined
-
-    return FAILURES.findings()
-
-
-def _examine(
-    name: str,
-    *,
-    options: Mapping[str, str | Path],
-    faults: Sequence[str] = (),
-    progress: Callable[[str], object],
-) -> Report:
-    from study_app.devices.force_dimension.doctor import examine  # noqa: PLC0415 - the compiler
-
-    return examine(name, options=options, faults=faults, progress=progress)
-
-
-_DOCTOR: Final = Doctor(findings=_findings, examine=_examine)
+_DOCTOR: Final = doctor_at(
+    "study_app.devices.force_dimension.failures:FAILURES.findings", "study_app.devices.force_dimension.doctor:examine"
+)
 
 DEVICES: Final = (
     DeviceDescriptor(

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import numpy as np
 
 from study_app.devices.base import Device
+from study_app.devices.call_gate import FINISHED, RUNS, check_left, let_go
 from study_app.devices.falcon import boot
-from study_app.devices.falcon.exchange import COUNTERS, LEAST_MASS_KG, exchange_functions, new_exchange
+from study_app.devices.falcon.exchange import BRIDGE_LOST, COUNTERS, LEAST_MASS_KG, exchange_functions, new_exchange
 from study_app.devices.falcon.facts import OPEN, Facts
 from study_app.devices.falcon.failure_modes import sentence
 from study_app.devices.falcon.failures import ProgramMissing, usb_failure
@@ -33,8 +32,6 @@ FORCE_LIMIT_N: Final = 8.0
 
 _FARTHEST = 1700  # counts, a little more than is known to be used
 _CLOSED = BulkCalls(0, 0)
-_LEAVE_S = 0.5  # a read or a write takes a few milliseconds at most
-_BETWEEN_S = 0.001
 
 
 class FalconDevice(Device):
@@ -89,7 +86,7 @@ class FalconDevice(Device):
         self._check_reach(mechanism)
         self.memory = new_exchange(_CLOSED, mechanism, self._geometry)
         self.falcon = self.memory[0]
-        self.falcon.lost = 1  # while it is not open
+        self.falcon.ended = FINISHED
         self.context = int(self.memory.ctypes.data)
         self.read, self.write = exchange_functions()
 
@@ -102,7 +99,10 @@ class FalconDevice(Device):
             It is not there, cannot be opened, needs its program, or was not homed.
         """
         if self.transport is not None:
-            return
+            if self.falcon.ended == RUNS:
+                return
+            self.close()
+        check_left(self.falcon, self.name)
         transport = self._open_bridge()
         self._guard_died = False
         try:
@@ -128,11 +128,9 @@ class FalconDevice(Device):
         While a servo's loop hangs in its bridge it stays open and guarded, so that the loop ends the force when it
         returns, and calls nothing that is gone; a call after that closes it.
         """
-        used, gone = bool(self.falcon.handle), bool(self.falcon.lost)
-        self.falcon.lost = 1
-        if not self._is_left():
-            self.falcon.lost = int(gone)
+        if not let_go(self.falcon):
             return
+        used, gone = bool(self.falcon.handle), self.falcon.ended == BRIDGE_LOST
         transport, self.transport = self.transport, None
         guard, self.guard = self.guard, None
         pushing = gone and bool(self.falcon.units.any())
@@ -187,13 +185,6 @@ class FalconDevice(Device):
             "delay_ticks": int(self.falcon.delay),
             **self._found,
         }
-
-    def _is_left(self) -> bool:
-        """Wait a moment for whoever reads or writes in another thread; return whether none is left."""
-        patience = time.monotonic() + _LEAVE_S
-        while self.falcon.inside and time.monotonic() < patience:
-            time.sleep(_BETWEEN_S)
-        return not self.falcon.inside
 
     def _open_bridge(self) -> Transport:
         return open_transport(self.bridge)
@@ -281,20 +272,11 @@ class FalconDevice(Device):
         self.read.ctypes(self.context, now_ns, int(self.reading.ctypes.data))
         self.write.ctypes(self.context, int(self._command.ctypes.data))
         self.check()
-        if self.falcon.lost:
+        if self.falcon.ended != RUNS:
             raise usb_failure(ERROR_NO_DEVICE, "homing it")
         if self._cancelled is not None and self._cancelled():
             raise DeviceError("homing the Falcon was given up")
         transport.pause(0.001)
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _say_nothing(_line: str) -> None:

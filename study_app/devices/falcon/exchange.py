@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from study_app.devices.call_gate import FIRST_CAUSE, GATE, RUNS, enter, leave, outlasted
 from study_app.devices.falcon.mechanics.geometry import OUT_STROKE_M, Geometry
 from study_app.devices.falcon.mechanics.kinematics import MECHANISM, REACHED, START_M, angles, forward
 from study_app.devices.falcon.sending import may_wait, push
@@ -40,12 +41,10 @@ from study_app.haptics.kernels.c_functions import (
     WRITE,
     c_function,
     call_at,
-    fence,
-    full_fence,
     record_at,
 )
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.vector import copy
+from study_app.haptics.kernels.vector import clear, copy
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import COMMAND, READING, records
 from study_app.haptics.model.limits import SLEW_S, slew_limit_n
@@ -56,6 +55,7 @@ Nobody published a measured value; the limits of the loop are held for 30 to 250
 RAMP_S: Final = 0.5
 SMOOTHING_S: Final = 2e-3
 """Time constant of the grip's velocity, which separates a braking force from a driving one."""
+BRIDGE_LOST: Final = FIRST_CAUSE
 LONGEST_GAP_NS: Final = 20_000_000
 """A reply that waited longer for the loop to look is too old to be given."""
 _BEYOND = 2  # so many positions in a row show an out-stroke: one may be of a packet whose homed bits were garbled
@@ -71,8 +71,7 @@ FALCON = np.dtype(
         ("mechanism", MECHANISM),
         ("centre_m", np.float64),  # z of the hand's origin in the Falcon's frame
         ("started", np.int64),  # 1 after the first tick
-        ("lost", np.int64),  # 1: the bridge is gone, or not open
-        ("inside", np.int64),  # 1 while a read or write runs, which may call the bridge
+        *GATE,  # its force: as the grip was at the last command
         # the stream
         ("data", np.uint8, (_DATA,)),
         ("packet", np.uint8, (PACKET,)),
@@ -91,7 +90,6 @@ FALCON = np.dtype(
         ("slew_n_per_s", np.float64),  # how fast a force grows that does not brake the grip
         ("force_n", np.float64, (3,)),  # as it passed the gate
         ("held_n", np.float64, (3,)),  # force of the motors by the command before
-        ("sent_n", np.float64, (3,)),  # and by the last command, where the grip was then
         ("torque_nm", np.float64, (3,)),
         ("units", np.int64, (3,)),  # the last torque command
         # the motion of the arms, to tell garbled encoders
@@ -191,51 +189,44 @@ def exchange_functions() -> tuple[Any, Any]:
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     falcon = _falcon_at(context)
-    if not _enter(falcon):
-        return READ_LOST
-    answer = _take_reply(falcon, context, now_ns, reading)
-    _leave(falcon)
+    answer = READ_LOST
+    if enter(falcon):
+        answer = _take_reply(falcon, context, now_ns, _reading_at(reading))
+        if outlasted(falcon):
+            finish(falcon, context)
+        leave(falcon)
     return answer
 
 
 def _write(context: int, command: int) -> int:
     falcon, asked = _falcon_at(context), _command_at(command)
     answer = READ_LOST
-    if _enter(falcon):
-        copy(asked.force_n, falcon.force_n)
-        answer = _send_force(falcon, context)
-        _leave(falcon)
+    if enter(falcon):
+        answer = _send_force(falcon, context, asked.force_n)
+        if outlasted(falcon):
+            finish(falcon, context)
+        leave(falcon)
     copy(falcon.sent_n, asked.sent_n)
     return answer
 
 
 @kernel
-def _enter(falcon: Any) -> bool:
-    """Return whether the bridge may be called until `_leave`; who closes it sets ``lost``, then reads ``inside``."""
-    falcon.inside = 1
-    full_fence()
-    if falcon.lost != 0:
-        falcon.inside = 0
-        return False
-    return True
+def finish(falcon: Any, context: int) -> None:
+    """Send zero torque."""
+    clear(falcon.force_n)
+    _send_packet(falcon, context)
 
 
 @kernel
-def _leave(falcon: Any) -> None:
-    fence()
-    falcon.inside = 0
-
-
-@kernel
-def _take_reply(falcon: Any, context: int, now_ns: int, reading: int) -> int:
-    """Receive what the Falcon answered; put a new position into the record at ``reading``."""
+def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
+    """Receive what the Falcon answered; put a new position into the reading ``out``."""
     elapsed_ns = now_ns - falcon.now_ns
     falcon.now_ns = now_ns
     falcon.tick_s = elapsed_ns * 1e-9
     falcon.ticks += 1
     falcon.apart += 1
     packets = _receive(falcon, context)
-    if falcon.lost != 0 or falcon.unguarded != 0:
+    if falcon.ended != RUNS or falcon.unguarded != 0:
         return READ_LOST
     gap = falcon.started == 0 or elapsed_ns <= 0 or elapsed_ns > LONGEST_GAP_NS
     falcon.started = 1
@@ -253,7 +244,6 @@ def _take_reply(falcon: Any, context: int, now_ns: int, reading: int) -> int:
         return READ_NOTHING_NEW
     _follow(falcon)
     _open_gate(falcon, elapsed_ns * 1e-9)
-    out = _reading_at(reading)
     for axis in range(3):
         out.position_m[axis] = falcon.position_m[axis]
     out.position_m[2] -= falcon.centre_m
@@ -265,7 +255,14 @@ def _take_reply(falcon: Any, context: int, now_ns: int, reading: int) -> int:
 
 
 @kernel
-def _send_force(falcon: Any, context: int) -> int:
+def _send_force(falcon: Any, context: int, force_n: Any) -> int:
+    copy(force_n, falcon.force_n)
+    _send_packet(falcon, context)
+    return READ_LOST if falcon.ended != RUNS else 0
+
+
+@kernel
+def _send_packet(falcon: Any, context: int) -> None:
     """Send ``force_n`` or, to measure the delay, leave the motors as they are; ``sent_n`` is then what they got."""
     before = falcon.units[0], falcon.units[1], falcon.units[2]
     push(falcon)
@@ -276,7 +273,6 @@ def _send_force(falcon: Any, context: int) -> int:
     if waits or not _send(falcon, context):
         falcon.units[0], falcon.units[1], falcon.units[2] = before
         copy(falcon.held_n, falcon.sent_n)
-    return READ_LOST if falcon.lost != 0 else 0
 
 
 @kernel
@@ -303,7 +299,7 @@ def _receive(falcon: Any, context: int) -> Any:
             np.uint32(_TIMEOUT_MS),
         )
         if code == ERROR_NO_DEVICE:
-            falcon.lost = 1
+            falcon.ended = BRIDGE_LOST
             return 0
         if code not in (SUCCESS, ERROR_TIMEOUT):
             falcon.read_errors += 1
@@ -367,7 +363,7 @@ def _send(falcon: Any, context: int) -> bool:
     )
     sent: bool = code in (SUCCESS, ERROR_TIMEOUT) and falcon.transferred == PACKET
     if code == ERROR_NO_DEVICE:
-        falcon.lost = 1
+        falcon.ended = BRIDGE_LOST
     elif not sent:
         falcon.write_errors += 1
     else:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Final, Protocol, Self
+from typing import Any, Final, Protocol
 
 from study_app.devices.base import Device
+from study_app.devices.call_gate import LET_GO, RUNS, let_go
 from study_app.devices.force_dimension import exchange
 from study_app.devices.force_dimension.exchange import COUNTERS, FUNCTIONS, exchange_functions, finish, new_exchange
 from study_app.devices.force_dimension.failures import CAUSES, FAILURES
@@ -17,7 +16,6 @@ from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 
 WORKSPACE_M: Final = (0.05, 0.05, 0.05)
 FORCE_LIMIT_N: Final = 8.0
-_LEAVE_S: Final = 0.5  # a call takes less than a millisecond
 _SILENT_NS: Final = 40_000_000  # after 50 ms without a new position the servo ends the force
 _ENDED: Final = {
     exchange.ERROR: "error",
@@ -96,7 +94,7 @@ class ForceDimensionDevice(Device):
             There is no library or device, or it cannot be used.
         """
         if self._functions is not None:
-            if self.exchange.ended == exchange.RUNS:
+            if self.exchange.ended == RUNS:
                 return
             self.close()
         if self.exchange.inside:
@@ -116,7 +114,7 @@ class ForceDimensionDevice(Device):
         self.exchange.wrist = found["wrist"]
         self.exchange.gripper = found["gripper"]
         self.exchange.active = found["active_wrist"] or found["active_gripper"]
-        self.exchange.ended = exchange.RUNS
+        self.exchange.ended = RUNS
 
     def close(self) -> None:
         """Send zero force, take the current off the motors, and close the device; a second call does nothing.
@@ -125,20 +123,12 @@ class ForceDimensionDevice(Device):
         device's watchdog is what ends the force.
         """
         functions = self._functions
-        if functions is None:
-            return
-        ran = self.exchange.ended == exchange.RUNS
-        if ran:
-            self.exchange.ended = exchange.LET_GO
-        patience = time.monotonic() + _LEAVE_S
-        while self.exchange.inside and time.monotonic() < patience:
-            time.sleep(0.001)
-        if self.exchange.inside:
+        if functions is None or not let_go(self.exchange):
             return
         self._functions = None
         try:
-            if ran:
-                finish(self.exchange)
+            if self.exchange.ended == LET_GO:
+                finish(self.exchange, self.context)
         finally:
             functions.close(int(self.exchange.id))
 
@@ -157,7 +147,7 @@ class ForceDimensionDevice(Device):
         """The id of what ended the exchange in ``failures.FAILURES``; None while nothing did."""
         state = self.exchange
         silent = state.ticks and state.now_ns - state.fresh_ns > _SILENT_NS
-        return "rate" if state.ended == exchange.RUNS and silent else _ENDED.get(int(state.ended))
+        return "rate" if state.ended == RUNS and silent else _ENDED.get(int(state.ended))
 
     @property
     def failure(self) -> str | None:
@@ -179,12 +169,3 @@ class ForceDimensionDevice(Device):
 
     def _load(self) -> Functions:
         return Library(self._path)
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

@@ -7,18 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
 
 from study_app.devices.doctor_report import Report
-from study_app.devices.doctor_run import LEAST_HZ, MOVE, SECONDS, fresh_rate_hz, run_at_rest
-from study_app.devices.failure_table import DeviceFailure
+from study_app.devices.doctor_run import SECONDS, examine_by_table
 from study_app.devices.force_dimension.device import ForceDimensionDevice
 from study_app.devices.force_dimension.emulated import EmulatedForceDimension
 from study_app.devices.force_dimension.failures import FAILURES, OPTION
 from study_app.errors import DeviceError
 
 _FAULT_AFTER = 1000  # readings
-_RUNNING: Final = "error"  # modes from here on appear while it runs
 
 
 def examine(
@@ -45,19 +42,7 @@ def examine(
         It cannot have faults.
     """
     device = _device(name, options or {}, faults)
-    try:
-        device.open()
-    except DeviceFailure as failed:
-        return Report((), FAILURES.findings(failed.mode, FAILURES.before(failed.mode)), str(failed))
-    with device:
-        progress(MOVE)
-        samples, fault = run_at_rest(device, seconds)
-        mode, counters, found = device.failure_mode, device.counters, device.describe()
-    fresh_hz = fresh_rate_hz(samples)
-    if mode is None and fresh_hz < LEAST_HZ:
-        mode = "rate"
-    passed = {one.id for one in FAILURES.modes} - {mode} if fault is None else FAILURES.before(_RUNNING) - {mode}
-    return Report(_words(found, counters, fresh_hz), FAILURES.findings(mode, passed), fault)
+    return examine_by_table(device, FAILURES, _words, running="error", progress=progress, seconds=seconds)
 
 
 def _device(name: str, options: Mapping[str, str | Path], faults: Sequence[str]) -> ForceDimensionDevice:
@@ -71,8 +56,9 @@ def _device(name: str, options: Mapping[str, str | Path], faults: Sequence[str])
     return device
 
 
-def _words(found: Mapping[str, Any], counters: Mapping[str, int], fresh_hz: float) -> tuple[str, ...]:
+def _words(device: ForceDimensionDevice, fresh_hz: float) -> tuple[str, ...]:
     """Return what is worth reading of what was seen."""
+    found, counters = device.describe(), device.counters
     watchdog_s = found.get("watchdog_s")
     return (
         f"opened: {found['system']}, serial number {found.get('serial')}, SDK {found['sdk']}",

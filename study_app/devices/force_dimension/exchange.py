@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numba import types
 
+from study_app.devices.call_gate import FINISHED, FIRST_CAUSE, GATE, enter, leave, outlasted
 from study_app.devices.force_dimension.library import FORCE, FORCE_OFF_CAUSE, STATUS_WORDS
 from study_app.haptics.kernels.c_functions import (
     READ,
@@ -26,11 +27,10 @@ from study_app.haptics.kernels.c_functions import (
     WRITE,
     c_function,
     call_at,
-    fence,
-    full_fence,
     record_at,
 )
 from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.vector import clear, copy, is_finite
 from study_app.haptics.model.layout import (
     COMMAND,
     MEASURED_GRIPPER,
@@ -60,7 +60,7 @@ STATUS_TICKS: Final = 32
 """The status is read once in so many ticks."""
 _NORM_SLACK = 1.001
 
-RUNS, ERROR, BAD_NUMBER, FORCE_OFF, LET_GO = range(5)  # why the exchange ended; LET_GO: by the program itself
+ERROR, BAD_NUMBER, FORCE_OFF = range(FIRST_CAUSE, FIRST_CAUSE + 3)  # why the exchange ended
 
 FORCE_DIMENSION = np.dtype(
     [
@@ -78,9 +78,8 @@ FORCE_DIMENSION = np.dtype(
         ("wrist", np.int64),  # 1 where it measures orientation
         ("gripper", np.int64),  # 1 where it has a gripper
         ("active", np.int64),  # 1 where wrist or gripper have motors, whose torque and force are kept at 0
-        ("ended", np.int64),  # RUNS or why it ended
+        *GATE,
         ("off_cause", np.int64),  # what the device stated where its force is off
-        ("inside", np.int64),  # 1 while a read or write runs
         ("force_limit_n", np.float64),
         # what the library fills in
         ("position_m", np.float64, (3,)),
@@ -125,7 +124,7 @@ _POSITION, _VELOCITY, _ROTATION, _GAP, _STATUS = (
 def new_exchange(force_limit_n: float) -> Any:
     """Return the memory of an exchange, shape (1,), without a device: its address is the device's ``context``."""
     memory = records(FORCE_DIMENSION, 1)
-    memory[0].ended = LET_GO
+    memory[0].ended = FINISHED
     memory[0].force_limit_n = force_limit_n
     return memory
 
@@ -139,47 +138,32 @@ def exchange_functions() -> tuple[Any, Any]:
 def _read(context: int, now_ns: int, reading: int) -> int:
     device = _device_at(context)
     answer = READ_LOST
-    if _enter(device):
+    if enter(device):
         answer = _take_sample(device, context, now_ns, _reading_at(reading))
-        _leave(device)
+        if outlasted(device):
+            finish(device, context)
+        leave(device)
     return answer
 
 
 def _write(context: int, command: int) -> int:
     device, asked = _device_at(context), _command_at(command)
-    for axis in range(3):
-        asked.sent_n[axis] = 0.0
     answer = READ_LOST
-    if _enter(device):
-        answer = _send_force(device, asked)
-        _leave(device)
+    if enter(device):
+        answer = _send_force(device, context, asked.force_n)
+        if outlasted(device):
+            finish(device, context)
+        leave(device)
+    copy(device.sent_n, asked.sent_n)
     return answer
 
 
 @kernel
-def _enter(device: Any) -> bool:
-    """Return whether the library may be called until `_leave`; who closes sets ``ended``, then reads ``inside``."""
-    device.inside = 1
-    full_fence()
-    if device.ended != RUNS:
-        device.inside = 0
-        return False
-    return True
-
-
-@kernel
-def _leave(device: Any) -> None:
-    if device.ended == LET_GO:  # closed meanwhile: the call before had not returned
-        finish(device)
-    fence()
-    device.inside = 0
-
-
-@kernel
-def finish(device: Any) -> None:
+def finish(device: Any, _context: int) -> None:
     """Send zero force, and take the current off the motors."""
     _push(device, 0.0, 0.0, 0.0)
     _call_stop(device.stop, device.id)
+    clear(device.sent_n)
 
 
 @kernel
@@ -188,25 +172,25 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
     device.ticks += 1
     if device.ticks % STATUS_TICKS == 0:
         if np.int32(_call_fill(device.get_status, context + _STATUS, device.id)) < 0:
-            return _end(device, ERROR)
+            return _end(device, context, ERROR)
         if device.status[FORCE] == 0:
             device.off_cause = device.status[FORCE_OFF_CAUSE]
-            return _end(device, FORCE_OFF)
+            return _end(device, context, FORCE_OFF)
     at = context + _POSITION
     got = np.int32(_call_vector(device.get_position, at, at + 8, at + 16, device.id))
     if got < 0:
-        return _end(device, ERROR)
+        return _end(device, context, ERROR)
     if got == TIMEGUARD:
         device.guarded += 1
         return READ_NOTHING_NEW
-    if not _finite(device.position_m):
-        return _end(device, BAD_NUMBER)
+    if not is_finite(device.position_m):
+        return _end(device, context, BAD_NUMBER)
     device.fresh += 1
     device.fresh_ns = now_ns
     _from_maker(device.position_m, out.position_m)
     out.buttons = np.int64(np.uint32(_call_buttons(device.get_buttons, device.id)))
     at = context + _VELOCITY
-    if np.int32(_call_vector(device.get_velocity, at, at + 8, at + 16, device.id)) >= 0 and _finite(
+    if np.int32(_call_vector(device.get_velocity, at, at + 8, at + 16, device.id)) >= 0 and is_finite(
         device.velocity_mps
     ):
         _from_maker(device.velocity_mps, out.velocity_mps)
@@ -225,11 +209,6 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
         out.gripper_m = device.gap_m
         out.measured |= MEASURED_GRIPPER
     return READ_NEW
-
-
-@kernel
-def _finite(vector: Any) -> bool:
-    return math.isfinite(vector[0]) and math.isfinite(vector[1]) and math.isfinite(vector[2])
 
 
 @kernel
@@ -270,19 +249,19 @@ def _put_quaternion(rotation: Any, out: Any) -> bool:
 
 
 @kernel
-def _send_force(device: Any, asked: Any) -> int:
-    """Send a force [N, hand frame], and say in the record which one was sent."""
-    x_n, y_n, z_n = asked.force_n[0], asked.force_n[1], asked.force_n[2]
+def _send_force(device: Any, context: int, force_n: Any) -> int:
+    """Send a force [N, hand frame]."""
+    x_n, y_n, z_n = force_n[0], force_n[1], force_n[2]
     square = x_n * x_n + y_n * y_n + z_n * z_n
     most_n = _NORM_SLACK * device.force_limit_n
     if not square <= most_n * most_n:  # nor NaN: the servo sends neither
         x_n = y_n = z_n = 0.0
     got = _push(device, x_n, y_n, z_n)
     if got < 0:
-        return _end(device, ERROR)
+        return _end(device, context, ERROR)
     if got == MOTOR_SATURATED:
         device.saturated += 1
-    asked.sent_n[0], asked.sent_n[1], asked.sent_n[2] = x_n, y_n, z_n
+    device.sent_n[0], device.sent_n[1], device.sent_n[2] = x_n, y_n, z_n
     return 0
 
 
@@ -295,8 +274,8 @@ def _push(device: Any, x_n: float, y_n: float, z_n: float) -> Any:
 
 
 @kernel
-def _end(device: Any, why: int) -> int:
+def _end(device: Any, context: int, why: int) -> int:
     """End the exchange with zero force."""
-    finish(device)
+    finish(device, context)
     device.ended = why
     return READ_LOST

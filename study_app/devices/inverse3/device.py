@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import secrets
-import time
 from collections.abc import Callable
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import numpy as np
 
 from study_app.devices.base import Device
+from study_app.devices.call_gate import LET_GO, RUNS, check_left, let_go
 from study_app.devices.inverse3 import exchange
 from study_app.devices.inverse3.exchange import COUNTERS, exchange_functions, finish, new_exchange
 from study_app.devices.inverse3.failures import FAILURES
@@ -26,7 +25,6 @@ REACH_M: Final = 0.10
 """Radius of the workspace about its middle: docs.haply.co 3.5.x, tutorial 05 (Inverse3; a Minverse reaches 0.04 m)."""
 WORKSPACE_M: Final = (0.05, 0.05, 0.05)
 FORCE_LIMIT_N: Final = 8.0
-_LEAVE_S: Final = 0.5  # a read or a write takes some microseconds
 _SILENT_NS: Final = 40_000_000
 _ENDED: Final = {
     exchange.CLOSED: "closed",
@@ -89,7 +87,10 @@ class Inverse3Device(Device):
             There is no service or device, it cannot be used, or its settings are not neutral.
         """
         if self._link is not None:
-            return
+            if self.exchange.ended == RUNS:
+                return
+            self.close()
+        check_left(self.exchange, self.name)
         link = self._connect()
         try:
             messages = Messages(link)
@@ -107,24 +108,21 @@ class Inverse3Device(Device):
             link.close()
             raise
         self._link = link
-        self.exchange.ended = exchange.RUNS
+        self.exchange.ended = RUNS
         if not self._found["service_settings"]["confirmed"] and self._progress is not None:
             self._progress("The service did not confirm its settings: compare them in Haply Hub.")
 
     def close(self) -> None:
-        """Send zero force and a close frame, and close the connection; a second call does nothing."""
+        """Send zero force and a close frame, and close the connection; a second call does nothing.
+
+        A call of the servo that does not return does the first two once it does; closing again closes the connection.
+        """
         link = self._link
-        if link is None:
+        if link is None or not let_go(self.exchange):
             return
-        ran = self.exchange.ended == exchange.RUNS
-        if ran:
-            self.exchange.ended = exchange.LET_GO
-        patience = time.monotonic() + _LEAVE_S
-        while self.exchange.inside and time.monotonic() < patience:
-            time.sleep(0.001)
         self._link = None
         try:
-            if ran and not self.exchange.inside:
+            if self.exchange.ended == LET_GO:
                 finish(self.exchange, self.context)
         finally:
             link.close()
@@ -151,7 +149,7 @@ class Inverse3Device(Device):
         if state.ended in _ENDED:
             return _ENDED[int(state.ended)]
         silent = state.now_ns - state.fresh_ns > _SILENT_NS
-        return "no-reply" if state.ended == exchange.RUNS and state.ticks and silent else None
+        return "no-reply" if state.ended == RUNS and state.ticks and silent else None
 
     @property
     def failure(self) -> str | None:
@@ -187,15 +185,6 @@ class Inverse3Device(Device):
 
     def _force_scale(self) -> float | None:
         return force_scale(self._host, (self._port, *PORTS))
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def address(where: str) -> tuple[str, int, str]:

@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numba import types
 
+from study_app.devices.call_gate import FINISHED, FIRST_CAUSE, GATE, RUNS, enter, leave, outlasted
 from study_app.devices.inverse3.frames import (
     CLOSE,
     INCOMPLETE,
@@ -52,11 +53,10 @@ from study_app.haptics.kernels.c_functions import (
     WRITE,
     c_function,
     call_at,
-    fence,
-    full_fence,
     record_at,
 )
 from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.vector import clear, copy
 from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, records
 
 TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
@@ -72,11 +72,9 @@ _LOG = 64  # commands whose time is kept
 _RECEIVES = 8  # a tick asks the socket at most so often
 _NORM_SLACK = 1.001
 
-# Why the stream ended, in INVERSE3.ended.
-RUNS, CLOSED, BROKE_PROTOCOL, NOT_A_STATE, DEVICE_GONE, NO_POSITION, BAD_NUMBER, NOT_READY, UNCALIBRATED, TOO_LONG = (
-    range(10)
+CLOSED, BROKE_PROTOCOL, NOT_A_STATE, DEVICE_GONE, NO_POSITION, BAD_NUMBER, NOT_READY, UNCALIBRATED, TOO_LONG = range(
+    FIRST_CAUSE, FIRST_CAUSE + 9
 )
-LET_GO: Final = 10  # by the program itself
 
 INVERSE3 = np.dtype(
     [
@@ -84,8 +82,7 @@ INVERSE3 = np.dtype(
         ("handle", np.intp),  # of the connection, and
         ("send", np.intp),  # addresses of its functions (``TRANSFER``)
         ("receive", np.intp),
-        ("ended", np.int64),  # RUNS or why the stream ended
-        ("inside", np.int64),  # 1 while a read or write runs, which may use the connection
+        *GATE,
         ("force_limit_n", np.float64),
         # what comes
         ("inbox", np.uint8, (INBOX,)),
@@ -100,7 +97,6 @@ INVERSE3 = np.dtype(
         ("out_size", np.int64),  # of the frame in it
         ("out_sent", np.int64),  # how much of that went
         ("key", np.uint64, (1,)),  # of the masking keys' generator
-        ("held_n", np.float64, (3,)),  # force of the last command sent, hand frame
         # who owes whom
         ("sent", np.int64),  # commands
         ("answered", np.int64),  # replies
@@ -138,7 +134,7 @@ def new_exchange(device_id: str, force_limit_n: float, seed: int) -> Any:
     """Return the memory of an exchange, shape (1,), not connected yet: its address is the device's ``context``."""
     memory = records(INVERSE3, 1)
     device = memory[0]
-    device.ended = LET_GO
+    device.ended = FINISHED
     device.force_limit_n = force_limit_n
     device.key[0] = seed | 1
     prefix = f'{{"inverse3":[{{"device_id":"{device_id}","commands":{{"set_cursor_force":{{"vector":{{"x":'.encode()
@@ -155,48 +151,30 @@ def exchange_functions() -> tuple[Any, Any]:
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     device = _device_at(context)
-    if not _enter(device):
-        return READ_LOST
-    answer = _take_replies(device, context, now_ns, reading)
-    _leave(device)
+    answer = READ_LOST
+    if enter(device):
+        answer = _take_replies(device, context, now_ns, _reading_at(reading))
+        if outlasted(device):
+            finish(device, context)
+        leave(device)
     return answer
 
 
 def _write(context: int, command: int) -> int:
     device, asked = _device_at(context), _command_at(command)
     answer = READ_LOST
-    if _enter(device):
-        _send_force(device, context, asked.force_n[0], asked.force_n[1], asked.force_n[2])
-        for axis in range(3):
-            asked.sent_n[axis] = device.held_n[axis]
-        answer = 0
-        _leave(device)
-    else:
-        for axis in range(3):
-            asked.sent_n[axis] = 0.0
+    if enter(device):
+        answer = _send_force(device, context, asked.force_n)
+        if outlasted(device):
+            finish(device, context)
+        leave(device)
+    copy(device.sent_n, asked.sent_n)
     return answer
 
 
 @kernel
-def _enter(device: Any) -> bool:
-    """Return whether the connection may be used until `_leave`; who closes it sets ``ended``, then reads ``inside``."""
-    device.inside = 1
-    full_fence()
-    if device.ended != RUNS:
-        device.inside = 0
-        return False
-    return True
-
-
-@kernel
-def _leave(device: Any) -> None:
-    fence()
-    device.inside = 0
-
-
-@kernel
-def _take_replies(device: Any, context: int, now_ns: int, reading: int) -> int:
-    """Receive what came; put the newest position into the record at ``reading``."""
+def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
+    """Receive what came; put the newest position into the reading ``out``."""
     device.now_ns = now_ns
     device.ticks += 1
     answered = device.answered
@@ -225,7 +203,7 @@ def _take_replies(device: Any, context: int, now_ns: int, reading: int) -> int:
         return READ_NOTHING_NEW
     device.fresh += 1
     device.fresh_ns = now_ns
-    out, value = _reading_at(reading), device.scan.value
+    value = device.scan.value
     _put_vector(value, POSITION, out.position_m)
     if device.scan.known & _VELOCITY_BITS == _VELOCITY_BITS:
         _put_vector(value, VELOCITY, out.velocity_mps)
@@ -310,13 +288,19 @@ def _denied(found: Any, place: int) -> bool:
 
 
 @kernel
-def _send_force(device: Any, context: int, x_n: float, y_n: float, z_n: float) -> None:
-    """Send a force [N, hand frame]; where it cannot go, the last one stays in force and in ``held_n``."""
+def _send_force(device: Any, context: int, force_n: Any) -> int:
+    """Send a force [N, hand frame]; where it cannot go, the last one stays in force and in ``sent_n``."""
+    _command(device, context, force_n[0], force_n[1], force_n[2])
+    return 0
+
+
+@kernel
+def _command(device: Any, context: int, x_n: float, y_n: float, z_n: float) -> None:
     square = x_n * x_n + y_n * y_n + z_n * z_n
     most_n = _NORM_SLACK * device.force_limit_n
     if not square <= most_n * most_n:  # nor NaN: the servo sends neither
         x_n = y_n = z_n = square = 0.0
-    held = device.held_n[0] != 0.0 or device.held_n[1] != 0.0 or device.held_n[2] != 0.0
+    held = device.sent_n[0] != 0.0 or device.sent_n[1] != 0.0 or device.sent_n[2] != 0.0
     ends_force = square == 0.0 and held
     if device.sent - device.answered >= MOST_UNANSWERED and not ends_force:
         device.skipped += 1
@@ -338,7 +322,7 @@ def _send_force(device: Any, context: int, x_n: float, y_n: float, z_n: float) -
     device.sent_ns[row] = device.now_ns
     device.sent_tick[row] = device.ticks
     device.sent += 1
-    device.held_n[0], device.held_n[1], device.held_n[2] = x_n, y_n, z_n
+    device.sent_n[0], device.sent_n[1], device.sent_n[2] = x_n, y_n, z_n
     _flush(device, context)
 
 
@@ -383,6 +367,7 @@ def _end(device: Any, context: int, why: int) -> int:
     """End the stream: zero force, a close frame, and silence."""
     if why != CLOSED:
         finish(device, context)
+    clear(device.sent_n)  # silence ends a force that could not be taken back
     device.ended = why
     return READ_LOST
 
@@ -390,6 +375,6 @@ def _end(device: Any, context: int, why: int) -> int:
 @kernel
 def finish(device: Any, context: int) -> None:
     """Send zero force and a close frame (RFC 6455 §5.5.1, status 1000)."""
-    _send_force(device, context, 0.0, 0.0, 0.0)
+    _command(device, context, 0.0, 0.0, 0.0)
     device.text[0], device.text[1] = np.uint8(1000 >> 8), np.uint8(1000 & 0xFF)
     _send_control(device, context, CLOSE, 2)

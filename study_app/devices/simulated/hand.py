@@ -17,10 +17,12 @@ import numpy as np
 
 from study_app.haptics.kernels.c_functions import fence, record_at
 from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.plant import move
 
 STAY, POINT, HOLD, REACH, FOLLOW = range(5)
 
 WAVES = 3  # tremor: so many waves an axis
+LONGEST_STEP_S = 0.05  # a loop that stood still for longer must not spend longer still on catching up
 
 ORDER = np.dtype(
     [
@@ -94,6 +96,14 @@ def move_hand(hand: Any, now_ns: int, elapsed_s: float) -> None:
     for i in range(3):
         hand.was_m[i] = hand.place_m[i]
         hand.place_m[i] = hand.aim_m[i] + tremor(hand, i, now_ns * 1e-9)
+
+
+@kernel
+def move_held_handle(simulated: Any, now_ns: int, elapsed_s: float) -> None:
+    """Bring ``simulated.hand`` and the ``simulated.handle`` in it to ``now_ns``, ``elapsed_s`` after the last time."""
+    elapsed_s = min(max(elapsed_s, 0.0), LONGEST_STEP_S)
+    move_hand(simulated.hand, now_ns, elapsed_s)
+    move(simulated.handle, simulated.hand.was_m, simulated.hand.place_m, elapsed_s)
 
 
 @kernel

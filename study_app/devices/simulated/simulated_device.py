@@ -6,13 +6,12 @@ Its read steps hand and handle to the time given, inside the servo's loop; its w
 from __future__ import annotations
 
 from functools import cache
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from study_app.devices.base import Device
-from study_app.devices.simulated.hand import HAND, move_hand
+from study_app.devices.simulated.hand import HAND, move_held_handle
 from study_app.devices.simulated.hand_commands import HandOrders
 from study_app.haptics.kernels.c_functions import (
     READ,
@@ -23,7 +22,7 @@ from study_app.haptics.kernels.c_functions import (
     c_function,
     record_at,
 )
-from study_app.haptics.kernels.plant import HANDLE, let_go, measure, move, push
+from study_app.haptics.kernels.plant import HANDLE, let_go, measure, push
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, records
 
@@ -43,8 +42,6 @@ SIMULATED = np.dtype(
 _simulated_at = record_at(SIMULATED)
 _reading_at = record_at(READING)
 _command_at = record_at(COMMAND)
-
-_LONGEST_STEP_S = 0.05  # a loop that stood still for longer must not spend longer still on catching up
 
 
 class SimulatedDevice(HandOrders, Device):
@@ -108,15 +105,6 @@ class SimulatedDevice(HandOrders, Device):
             "dynamics": self.dynamics.describe(),
         }
 
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
 
 @cache
 def _functions() -> tuple[Any, Any]:
@@ -132,11 +120,10 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     if device.started != 0:
         if now_ns <= device.last_ns:
             return READ_NOTHING_NEW
-        elapsed_s = min((now_ns - device.last_ns) * 1e-9, _LONGEST_STEP_S)
+        elapsed_s = (now_ns - device.last_ns) * 1e-9
     device.started = 1
     device.last_ns = now_ns
-    move_hand(device.hand, now_ns, elapsed_s)
-    move(device.handle, device.hand.was_m, device.hand.place_m, elapsed_s)
+    move_held_handle(device, now_ns, elapsed_s)
     out = _reading_at(reading)
     measure(device.handle, out.position_m)
     out.buttons = device.buttons

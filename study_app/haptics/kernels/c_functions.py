@@ -58,6 +58,11 @@ class Driver(Protocol):
         """What it measured of itself when it was opened."""
         ...
 
+    @property
+    def failure(self) -> str | None:
+        """Symptom, cause and cure of what ended the device itself, in a sentence; None: it knows of nothing."""
+        return None
+
 
 _alloca_once: Any = cgutils.alloca_once
 _unpack_tuple: Any = cgutils.unpack_tuple

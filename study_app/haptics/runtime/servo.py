@@ -179,7 +179,7 @@ class Servo:
         status = int(self.loop.control[0].status)
         reason = _STUCK if status == STATUS_OK and self.loop.stuck else _FAULTS.get(status)
         if status in {STATUS_DEVICE_LOST, STATUS_STALE_FAULT}:
-            own = getattr(self._device, "failure", None)
+            own = self._device.failure
             reason = reason if own is None else f"stopped: {own}"
         return None if reason is None else f"the device '{self._device.name}' {reason}"
 

@@ -101,6 +101,11 @@ class FaultyDevice:
         self.context = int(self._memory.ctypes.data)
         self.read, self.write = _functions()
 
+    @property
+    def failure(self) -> str | None:
+        """Why the device behind it ended, if it says so."""
+        return self._kept[0].failure
+
     def allow(self, faults: dict[int, tuple[float, int, int]], gap: tuple[int, int]) -> None:
         """Let these kinds of faults happen from the next one on: share of all, fewest and most readings of each.
 

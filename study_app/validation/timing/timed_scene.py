@@ -52,6 +52,7 @@ class PlayedHand:
     name = "played"
     force_limit_n = 8.0
     dynamics = UNKNOWN
+    failure = None
 
     def __init__(self) -> None:
         self._places_m = np.ascontiguousarray(hand(), np.float64)

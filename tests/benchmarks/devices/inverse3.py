@@ -192,6 +192,7 @@ class Logged:
 
     def __init__(self, driver: Any, read: Any = _read_logged, write: Any = _write_logged, context: int = 0) -> None:
         self.name, self.force_limit_n, self.dynamics = driver.name, driver.force_limit_n, driver.dynamics
+        self.failure = None
         self.memory = records(LOGGED, 1)
         self.log = self.memory[0]
         self.log.context = context or driver.context

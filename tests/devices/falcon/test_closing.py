@@ -9,7 +9,7 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices.falcon import device as driver
+from study_app.devices import call_gate
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.wire.constants import ENDPOINT_IN, ERROR_TIMEOUT
@@ -45,7 +45,7 @@ class HangingBridge:
 
 def test_a_loop_that_hangs_finds_its_bridge_as_it_was_and_ends_the_force(monkeypatch):
     monkeypatch.setattr(thread, "_PATIENCE_S", 0.2)
-    monkeypatch.setattr(driver, "_LEAVE_S", 0.05)
+    monkeypatch.setattr(call_gate, "LEAVE_S", 0.05)
     device, bridge = EmulatedFalcon(emulator=Emulator(running=True, tremor_m=0.0)), HangingBridge()
     device.open()
     servo = Servo(device)

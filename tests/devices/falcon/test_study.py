@@ -1,6 +1,5 @@
 """Studies on an emulated Falcon, through everything but its USB: the same sessions as on the scripted hand."""
 
-import csv
 import json
 from random import Random
 
@@ -24,76 +23,36 @@ from study_app.protocol.load import load
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.exploration import exploration
 from study_app.session.simulated.rehearsed_session import RehearsedSession
-from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify
+from tests.devices.rehearsed import (
+    MAY_DIFFER,
+    POSITION,
+    STUDY,
+    assert_every_trial_is_valid_and_simulated,
+    assert_mean_forces_agree,
+    recordings_of,
+    rehearse_on_both,
+    rows_of,
+    table,
+    tie_hand,
+)
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 
-STUDY = "rek2024"
 HALF_M = (0.05, 0.03, 0.03)
-POSITION = [f"position_{axis}_m" for axis in "xyz"]
 FORCE = [f"device_force_{axis}_n" for axis in "xyz"]
-MAY_DIFFER = {
-    "device",
-    "answered_at",
-    "trial_started_at",
-    "session_started_at",
-    "session_ended_at",
-    # what encoders of another count say of the same motion, and the forces that follow from it
-    "response",
-    "path_length_m",
-    "mean_speed_mps",
-    "force_mean_n",
-    "withheld_share",
-    "loop_delay_ticks",
-    "force_peak_n",
-    "limiter_slope",
-    "limiter_energy",
-    "limiter_norm",
-    "limiter_slew",
-}
-
-
-def table(file):
-    with file.open(newline="", encoding="utf-8") as lines:
-        return list(csv.DictReader(lines))
 
 
 @pytest.fixture(scope="module")
 def tied(tmp_path_factory):
-    """Return the thesis study on either device with the same seed, a hand that nothing moves off its path at the grip.
-
-    The scripted hand's encoders are exact then: its recordings hold the path itself.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path_factory.mktemp("settings")))
-        patch.setattr(scripted, "STIFFNESS_NPM", 1e6)
-        patch.setattr(scripted, "DAMPING_NSPM", 2e3)
-        patch.setitem(scripted.ScriptedDevice.__init__.__kwdefaults__, "quantum_m", 0.0)
-        folders = []
-        for device in ("scripted", "falcon-emulated"):
-            folder = tmp_path_factory.mktemp("results") / device
-            rehearsal.rehearse(STUDY, participants=1, seed=3, device=device, results=folder)
-            unblind(folder, "AB", "to compare what was measured")
-            folders.append(StudyFolder(folder))
-    return folders
-
-
-def recordings_of(tied):
-    """Yield both recordings of each trial: rows on scripted, rows on the Falcon."""
-    by_script, by_falcon = (folder.sessions()[0] for folder in tied)
-    rows = table(by_script.table(STUDY, "trials"))
-    assert len(rows) == 12
-    for row in rows:
-        files = (session.path / row["recording"] for session in (by_script, by_falcon))
-        yield tuple(pyarrow.parquet.read_table(file).to_pandas() for file in files)
+    return rehearse_on_both(tmp_path_factory, "falcon-emulated")
 
 
 class TestTheThesisStudy:
     @pytest.mark.parametrize("name", ["trials", "responses"])
     def test_has_the_same_rows_and_columns_as_on_the_scripted_hand(self, tied, name):
-        by_script, by_falcon = (table(folder.sessions()[0].table(STUDY, name)) for folder in tied)
+        by_script, by_falcon = (table(folder, name) for folder in tied)
         assert len(by_script) == len(by_falcon) > 10
         for one, other in zip(by_script, by_falcon, strict=True):
             assert list(one) == list(other)
@@ -104,8 +63,7 @@ class TestTheThesisStudy:
 
     def test_every_trial_is_valid_and_says_that_it_is_simulated(self, tied):
         for folder in tied:
-            rows = table(folder.sessions()[0].table(STUDY, "trials"))
-            assert {(row["valid"], row["simulated"], row["outcome"]) for row in rows} == {("true", "true", "complete")}
+            assert_every_trial_is_valid_and_simulated(folder)
 
     def test_verifies_and_names_its_device(self, tied):
         falcon = tied[1]
@@ -126,10 +84,8 @@ class TestTheThesisStudy:
             assert (~fresh).sum() <= 2 * len(leaps) <= 4
 
     def test_forces_are_those_of_the_path(self, tied):
-        """Trial by trial in the mean; a single tick differs as much as encoders of a finite count make it."""
-        for row, other in zip(*(table(folder.sessions()[0].table(STUDY, "trials")) for folder in tied), strict=True):
-            force_n = float(row["force_mean_n"])
-            assert float(other["force_mean_n"]) == pytest.approx(force_n, abs=max(0.05 * force_n, 0.05))
+        """In the mean of a trial; a single tick differs as much as encoders of a finite count make it."""
+        assert_mean_forces_agree(tied)
 
 
 def felt(device, scene, lasting_s):
@@ -151,8 +107,7 @@ def felt(device, scene, lasting_s):
 
 def test_in_a_thick_liquid_the_force_is_that_of_the_path_all_along(monkeypatch):
     """Averaged over 10 ms, which no hand tells apart, within 5 % or 0.05 N of what the exact path is felt as."""
-    monkeypatch.setattr(scripted, "STIFFNESS_NPM", 1e6)
-    monkeypatch.setattr(scripted, "DAMPING_NSPM", 2e3)
+    tie_hand(monkeypatch)
     scene = load(STUDY).scene_for("honey")
     exact = felt(scripted.ScriptedDevice(quantum_m=0.0, tremor_m=0.0, workspace_m=HALF_M), scene, 20.0)
     with EmulatedFalcon(emulator=Emulator(running=True, tremor_m=0.0, workspace_m=HALF_M)) as device:
@@ -215,10 +170,10 @@ def test_a_cable_pulled_in_a_trial_keeps_the_data_marks_the_trial_and_lets_it_go
         with pytest.raises(SessionError, match="'falcon-emulated' stopped responding"):
             rehearsal.rehearse("demo", participants=1, seed=1, device="falcon-emulated", results=folder.path)
     (session,) = folder.sessions()
-    rows = table(session.table("demo", "trials"))
+    rows = rows_of(session.table("demo", "trials"))
     assert [(row["trial"], row["outcome"]) for row in rows] == [("1", "complete"), ("2", "interrupted")]
     rehearsal.resume(session.path)  # a new Falcon is opened, and homed
-    rows = table(session.table("demo", "trials"))
+    rows = rows_of(session.table("demo", "trials"))
     assert [(row["trial"], row["attempt"], row["outcome"]) for row in rows[:3]] == [
         ("1", "1", "complete"),
         ("2", "1", "interrupted"),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
+import threading
 from typing import Any
 
 import numpy as np
 import pytest
 
+from study_app.devices import call_gate
 from study_app.devices.inverse3 import settings
 from study_app.devices.inverse3.device import Inverse3Device, address
 from study_app.devices.inverse3.doctor import examine
@@ -26,6 +29,8 @@ from tests.compiled import needs_servo
 from tests.devices.contract import write
 
 pytestmark = needs_servo
+
+RECEIVE = ctypes.CFUNCTYPE(ctypes.c_ssize_t, ctypes.c_ssize_t, ctypes.c_ssize_t, ctypes.c_size_t, ctypes.c_int32)
 
 
 class Ticks:
@@ -321,3 +326,35 @@ def test_a_handle_that_the_hand_lets_go_follows_the_force() -> None:
         assert not service.held
         assert ticks.reading[0].position_m[0] > 0.005
         ticks.take()
+
+
+def test_a_call_that_outlasts_closing_ends_the_force_when_it_returns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(call_gate, "LEAVE_S", 0.05)
+    service, entered, release = Service(), threading.Event(), threading.Event()
+
+    def receive(*_arguments: int) -> int:
+        entered.set()
+        release.wait(30.0)
+        return -1  # nothing came
+
+    hanging = RECEIVE(receive)
+    device = EmulatedInverse3(service=service)
+    device.open()
+    Ticks(device).take((2.0, 0.0, 0.0))
+    device.exchange.receive = ctypes.cast(hanging, ctypes.c_void_p).value
+    reading = new_reading()
+    call = threading.Thread(target=device.read.ctypes, args=(device.context, 1, reading.ctypes.data))
+    call.start()
+    assert entered.wait(30.0)
+    device.close()
+    assert service.state.ended == 0  # what the call uses is still there
+    with pytest.raises(DeviceError, match="a call to the device 'inverse3-emulated' does not return"):
+        device.open()
+    assert service.force_n[0] == 2.0
+    release.set()
+    call.join(30.0)
+    assert service.force_n == (0.0, 0.0, 0.0)
+    assert service.state.close_frames == 1
+    device.close()
+    with device:
+        assert Ticks(device).take((1.0, 0.0, 0.0))[1][0] == 1.0

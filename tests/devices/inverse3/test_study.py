@@ -2,50 +2,30 @@
 
 from __future__ import annotations
 
-import csv
 import json
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet
 import pytest
 
 from study_app.devices import scripted
 from study_app.devices.simulated.hand_commands import HandOrders
-from study_app.session.simulated import rehearsal
-from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.devices.rehearsed import (
+    MAY_DIFFER,
+    POSITION,
+    assert_every_trial_is_valid_and_simulated,
+    assert_mean_forces_agree,
+    recordings_of,
+    rehearse_on_both,
+    table,
+)
 
 pytestmark = [pytest.mark.nightly, needs_servo, pytest.mark.slow]
 
-STUDY = "rek2024"
 COUNT_M = scripted.QUANTUM_M
-POSITION = [f"position_{axis}_m" for axis in "xyz"]
-MAY_DIFFER = {
-    "device",
-    "answered_at",
-    "trial_started_at",
-    "session_started_at",
-    "session_ended_at",
-    # what follows from a position that is a tick older, and whole counts
-    "response",
-    "path_length_m",
-    "mean_speed_mps",
-    "force_mean_n",
-    "withheld_share",
-    "loop_delay_ticks",
-    "force_peak_n",
-    "limiter_slope",
-    "limiter_energy",
-    "limiter_norm",
-    "limiter_slew",
-}
-
-
 LEAD_S = 0.5
 LOOK_S = 0.1
 """How often the simulated participant looks: a target reached within a count of its edge may be seen a look later."""
@@ -63,40 +43,9 @@ def follow_from_here(hand: HandOrders, t_s: Any, position_m: Any) -> None:
 FOLLOW = HandOrders.follow
 
 
-def table(file: Path) -> list[dict[str, str]]:
-    with file.open(newline="", encoding="utf-8") as lines:
-        return list(csv.DictReader(lines))
-
-
 @pytest.fixture(scope="module")
 def tied(tmp_path_factory: pytest.TempPathFactory) -> list[StudyFolder]:
-    """Return the study on either device with the same seed, a hand that no force moves off its path at the handle.
-
-    The scripted hand's encoders are exact then: its recordings hold the path itself.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path_factory.mktemp("settings")))
-        patch.setattr(scripted, "STIFFNESS_NPM", 1e6)
-        patch.setattr(scripted, "DAMPING_NSPM", 2e3)
-        patch.setattr(HandOrders, "follow", follow_from_here)
-        patch.setitem(scripted.ScriptedDevice.__init__.__kwdefaults__, "quantum_m", 0.0)
-        folders = []
-        for device in ("scripted", "inverse3-emulated"):
-            folder = tmp_path_factory.mktemp("results") / device
-            rehearsal.rehearse(STUDY, participants=1, seed=3, device=device, results=folder)
-            unblind(folder, "AB", "to compare what was measured")
-            folders.append(StudyFolder(folder))
-    return folders
-
-
-def recordings_of(tied: list[StudyFolder]) -> Iterator[tuple[Any, Any]]:
-    """Yield both recordings of each trial: rows on scripted, rows on the Inverse3."""
-    sessions = [folder.sessions()[0] for folder in tied]
-    rows = table(sessions[0].table(STUDY, "trials"))
-    assert len(rows) == 12
-    for row in rows:
-        one, other = (pyarrow.parquet.read_table(session.path / row["recording"]).to_pandas() for session in sessions)
-        yield one, other
+    return rehearse_on_both(tmp_path_factory, "inverse3-emulated", follow=follow_from_here)
 
 
 def same(column: str, one: str, other: str) -> bool:
@@ -110,7 +59,7 @@ def same(column: str, one: str, other: str) -> bool:
 
 @pytest.mark.parametrize("name", ["trials", "responses"])
 def test_the_study_has_the_same_rows_as_on_the_scripted_hand(tied: list[StudyFolder], name: str) -> None:
-    by_script, by_inverse3 = (table(folder.sessions()[0].table(STUDY, name)) for folder in tied)
+    by_script, by_inverse3 = (table(folder, name) for folder in tied)
     assert len(by_script) == len(by_inverse3) > 10
     for one, other in zip(by_script, by_inverse3, strict=True):
         assert list(one) == list(other)
@@ -126,8 +75,7 @@ def test_the_study_verifies_and_its_receipt_has_the_settings(tied: list[StudyFol
     receipt = json.loads(folder.sessions()[0].receipt.read_text())["device"]
     assert receipt["name"] == "inverse3-emulated"
     assert receipt["service_settings"]["in_force"]["filters"]["force_gate"] == {"gain": 0.0}
-    rows = table(folder.sessions()[0].table(STUDY, "trials"))
-    assert {(row["valid"], row["simulated"], row["outcome"]) for row in rows} == {("true", "true", "complete")}
+    assert_every_trial_is_valid_and_simulated(folder)
 
 
 def test_positions_are_those_of_the_path_a_tick_before_within_a_count(tied: list[StudyFolder]) -> None:
@@ -144,6 +92,4 @@ def test_positions_are_those_of_the_path_a_tick_before_within_a_count(tied: list
 
 
 def test_forces_are_those_of_the_path_trial_by_trial(tied: list[StudyFolder]) -> None:
-    for row, other in zip(*(table(folder.sessions()[0].table(STUDY, "trials")) for folder in tied), strict=True):
-        force_n = float(row["force_mean_n"])
-        assert float(other["force_mean_n"]) == pytest.approx(force_n, abs=max(0.05 * force_n, 0.05))
+    assert_mean_forces_agree(tied)

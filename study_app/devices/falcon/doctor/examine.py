@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from study_app.devices.doctor_report import Report
 from study_app.devices.falcon.device import FalconDevice
+from study_app.devices.falcon.doctor.failure_report import report
 from study_app.devices.falcon.emulated import EmulatedFalcon, new_emulator
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.facts import ALL_HOMED, OPEN, Facts
@@ -43,6 +45,14 @@ class Examined:
     facts: Facts
     failure: str | None
     seen: tuple[str, ...]
+
+
+def examine_device(
+    name: str, *, options: Mapping[str, str | Path], faults: Sequence[str] = (), progress: Callable[[str], object]
+) -> Report:
+    """Look a Falcon over as its `Doctor` does; see `examine`."""
+    firmware = options.get("firmware")
+    return report(examine(name, firmware=None if firmware is None else Path(firmware), faults=faults, tell=progress))
 
 
 def examine(

@@ -5,15 +5,16 @@ Loads neither the compiler nor a driver, and goes from one process to another as
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from study_app.devices.falcon.facts import Mode
+from study_app.devices.doctor_report import Finding, Report
+from study_app.devices.falcon.facts import Facts, Mode
 from study_app.devices.falcon.failure_modes import MODES
 
 if TYPE_CHECKING:
     from study_app.devices.falcon.doctor.examine import Examined
-    from study_app.devices.falcon.facts import Facts
-from study_app.devices.doctor_report import Finding, Report
+
+_NOTHING_SEEN: Final = Facts()
 
 
 def report(examined: Examined) -> Report:
@@ -21,7 +22,7 @@ def report(examined: Examined) -> Report:
     return Report(examined.seen, findings_of(examined.facts), examined.failure)
 
 
-def findings_of(facts: Facts) -> tuple[Finding, ...]:
+def findings_of(facts: Facts = _NOTHING_SEEN) -> tuple[Finding, ...]:
     """Return every mode in its order, as facts show it."""
     return tuple(_finding(number, mode, facts) for number, mode in enumerate(MODES, start=1))
 

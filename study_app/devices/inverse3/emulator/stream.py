@@ -13,10 +13,10 @@ from typing import Any, Final
 import numpy as np
 from numba import types
 
-from study_app.devices.simulated.hand import HAND, move_hand
+from study_app.devices.simulated.hand import HAND, move_held_handle
 from study_app.haptics.kernels.c_functions import c_function, record_at
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.plant import HANDLE, let_go, move, push
+from study_app.haptics.kernels.plant import HANDLE, let_go, measure, push
 
 SOCKET_CALL = types.intp(types.intp, types.intp, types.uintp, types.int32)
 IDLE_NS: Final = 100_000_000
@@ -26,7 +26,6 @@ OUTBOX: Final = 1 << 17
 TEXT: Final = 1 << 12
 FAULTY: Final = 1 << 12
 _QUEUE = 256
-_LONGEST_STEP_S = 0.05
 _OWN_STEP_NS = 1_000_000
 _SLOTS = 9
 _WIDTH = 14
@@ -40,6 +39,7 @@ SERVICE = np.dtype(
         ("started", np.int64),
         ("hand", HAND),
         ("handle", HANDLE),
+        ("counted_m", np.float64, (3,)),  # what its encoders say
         ("buttons", np.int64),
         ("inbox", np.uint8, (INBOX,)),
         ("in_size", np.int64),
@@ -247,9 +247,7 @@ def go_on(service: Any) -> None:
         rest(service)
     service.started = 1
     service.last_ns = service.now_ns
-    elapsed_s = min(max(elapsed_ns, 0) * 1e-9, _LONGEST_STEP_S)
-    move_hand(service.hand, service.now_ns, elapsed_s)
-    move(service.handle, service.hand.was_m, service.hand.place_m, elapsed_s)
+    move_held_handle(service, service.now_ns, elapsed_ns * 1e-9)
 
 
 @kernel
@@ -289,22 +287,17 @@ def reply(service: Any) -> None:
 def fill(service: Any, text: Any, slots: Any) -> None:
     """Write position, velocity and force into a state's text, where it has them (axes of the service)."""
     handle = service.handle
+    measure(handle, service.counted_m)
     for name in range(3):
         for axis in range(3):
             own = 0 if axis == 0 else 3 - axis
             sign = -1.0 if axis == 1 else 1.0
             if name == 0:
-                value = _counted(handle, own)
+                value = service.counted_m[own]
             else:
                 value = handle.velocity_mps[own] if name == 1 else handle.force_n[own]
             if slots[3 * name + axis] >= 0:
                 _write(text, slots[3 * name + axis], sign * value)
-
-
-@kernel
-def _counted(handle: Any, axis: int) -> float:
-    quantum = handle.quantum_m
-    return float(round(handle.position_m[axis] / quantum) * quantum if quantum > 0.0 else handle.position_m[axis])
 
 
 @kernel

@@ -5,6 +5,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from study_app.devices.base import Device
 from study_app.errors import DeviceNotFound
 from study_app.haptics.model.device_dynamics import Dynamics
 
@@ -33,7 +34,7 @@ def library():
     return loaded
 
 
-class ExampleDevice:
+class ExampleDevice(Device):
     """The device, called directly or through a mailbox.
 
     Parameters
@@ -88,10 +89,3 @@ class ExampleDevice:
             "force_limit_n": self.force_limit_n,
             "dynamics": self.dynamics.describe(),
         }
-
-    def __enter__(self):
-        self.open()
-        return self
-
-    def __exit__(self, kind, error, trace):
-        self.close()
