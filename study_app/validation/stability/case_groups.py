@@ -15,7 +15,9 @@ from typing import Any, Final, NamedTuple
 from study_app.validation.stability.stability_cases import (
     CIRCLES,
     DAMPER,
+    DEVICE,
     FALCON,
+    FILTERS,
     FIRST,
     GRIPS,
     LETS_GO,
@@ -70,6 +72,19 @@ LINKS: Final[Mapping[str, tuple[Any, ...]]] = {
 """How a study delays forces; a link that does nothing is one of 48."""
 LATE_CASES: Final = 1000
 """Loops with a force link."""
+DEVICE_CASES: Final = 500
+"""Loops whose device measures the velocity."""
+
+MEASURED: Final[Mapping[str, tuple[Any, ...]]] = {
+    "estimator": (DEVICE,),
+    "motion": (REACHES, CIRCLES, SINE),
+    "release_s": (0.6, 0.7, 0.8),
+    "velocity_lag": (0.0, 0.5, 1.0, 2.0, 4.0, 7.5),
+    "velocity_filter": FILTERS,
+    "velocity_noise_mmps": (0.0, 2.0, 10.0),
+    "velocity_count_mmps": (0.0, 1.0, 5.0),
+}
+"""How devices measure it: the noise of ``line`` with 2 to 15 samples at a count of 38 um lies between."""
 
 FALCONS: Final[Mapping[str, tuple[Any, ...]]] = {
     **DRAWN,
@@ -129,8 +144,9 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     found += _of_liquids("non-Newtonian liquids", materials, seed, light, count)
     found += _of_liquids("liquids of physical2", of_physical2, seed, light, count)
     found.append(_late_forces(seed, light, count))
+    own = _by_device(seed, light, count)
     fewer = min(KALMAN_CASES, count or KALMAN_CASES)
-    return (*found, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
+    return (*found, own, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
 
 
 def _of_liquids(
@@ -157,6 +173,14 @@ def _late_forces(seed: str, choices: Mapping[str, tuple[Any, ...]], count: int |
     whole = tuple(_grid(GRIPS, PLANTS, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
     cases = some(whole, min(LATE_CASES, count or LATE_CASES))
     return Group(name, tuple(_drawn(f"{seed} {name}", cases, {**choices, **LINKS})))
+
+
+def _by_device(seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None) -> Group:
+    """Return loops whose device measures the velocity, in half of them the strongest damper."""
+    name = "velocity measured by the device"
+    whole = tuple(_grid(GRIPS, PLANTS, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
+    cases = some(whole, min(DEVICE_CASES, count or DEVICE_CASES))
+    return Group(name, tuple(_drawn(f"{seed} {name}", cases, {**choices, **MEASURED})))
 
 
 def _with_kalman(group: Group, count: int) -> Group:

@@ -23,7 +23,9 @@ from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
 from study_app.haptics.kernels.tick import step_model, tick, write_sample
 from study_app.haptics.kernels.tick_schedule import next_tick, random
 from study_app.haptics.kernels.vector import clear, copy, is_finite
+from study_app.haptics.model.layout import MEASURED_VELOCITY
 from study_app.validation.stability.arm_plant import ARM, advance, write_force
+from study_app.validation.stability.measured_velocity import MEASURED, NONE, measure_velocity
 
 REACHES, CIRCLES, STROKE, SINE = range(4)
 
@@ -61,6 +63,7 @@ LOOP = np.dtype(
         ("measured", np.int64),  # 1 where it is of this tick
         ("seen_m", np.float64, (3,)),  # the last sample
         ("arm", ARM),  # the second plant, where it is used
+        ("velocity", MEASURED),  # what the device measures itself
     ],
     align=True,
 )
@@ -228,13 +231,14 @@ def play(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any
     """Let the tick answer a motion (rows, 3) at the times of ``trace``, and write its force over ``sent_n`` there.
 
     Samples are lost and repeated in the same ticks as in the trace. An estimator that uses the force receives what
-    ``sent_n`` held before: the force that belongs to the motion. No work is done on anything, so the passivity
-    controller stays out of it.
+    ``sent_n`` held before: the force that belongs to the motion; a device that measures the velocity, what
+    ``velocity_mps`` holds. No work is done on anything, so the passivity controller stays out of it.
     """
     for k in range(trace.shape[0]):
         loop.now_s = trace[k].t_s
         for axis in range(3):
             handle.position_m[axis] = places_m[k, axis]
+            handle.velocity_mps[axis] = trace[k].velocity_mps[axis]
         sample.fresh, loop.measured = trace[k].fresh, trace[k].measured
         _read(sample, handle, pace, loop)
         _settle_passivity(safety.passivity)
@@ -265,8 +269,12 @@ def _see(sample: Any, handle: Any, pace: Any, loop: Any) -> None:
 
 @kernel
 def _read(sample: Any, handle: Any, pace: Any, loop: Any) -> None:
-    """Take the position that the encoder shows now, or keep that of the sample before."""
+    """Take position and velocity that the device shows now, or keep those of the sample before."""
     sample.time_ns = round(loop.now_s * 1e9)
+    if loop.velocity.filter != NONE:
+        measure_velocity(loop.velocity, handle.velocity_mps, loop.measured, pace)
+        copy(loop.velocity.seen_mps, sample.device_velocity_mps)
+        sample.measured = MEASURED_VELOCITY
     if loop.measured:
         measure(handle, loop.seen_m)
         if loop.noise_m > 0.0:

@@ -16,7 +16,17 @@ from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.pack import Model, pack
 from study_app.validation.stability.arm_plant import ARMS, new_arm
 from study_app.validation.stability.closed_loop import LOOP, TRACE, begin, run
-from study_app.validation.stability.stability_cases import GRIPS, LETS_GO, MOTIONS, SECOND, THROWN, Case, scene_of
+from study_app.validation.stability.stability_cases import (
+    DEVICE,
+    FILTERS,
+    GRIPS,
+    LETS_GO,
+    MOTIONS,
+    SECOND,
+    THROWN,
+    Case,
+    scene_of,
+)
 
 MOVING_S: Final = 1.2
 LASTS_S: Final = 1.8
@@ -84,6 +94,11 @@ def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None, sc
     loop.lost, loop.duplicated, loop.burst_s = case.lost, case.duplicated, case.burst_ms * 1e-3
     loop.slows_to = case.slows_to
     loop.mass_kg, loop.other_kg = case.mass_kg, case.other_kg
+    if case.estimator == DEVICE:
+        loop.velocity.filter = 1 + FILTERS.index(case.velocity_filter)
+        loop.velocity.lag = case.velocity_lag
+        loop.velocity.noise_mps = case.velocity_noise_mmps * 1e-3
+        loop.velocity.count_mps = case.velocity_count_mmps * 1e-3
     if case.plant == SECOND:
         loop.arm = new_arm(ARMS[case.hand], handle_kg=case.mass_kg, **_device(case))
     grip = GRIPS[case.hand]
@@ -101,9 +116,10 @@ def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None, sc
 
 
 def _dynamics(case: Case) -> Dynamics:
-    """Return what the device states: its least mass and its delay, as they are believed."""
+    """Return what the device states: its least mass and its delay, as they are believed, and its velocity's lag."""
     least_kg = case.believed_kg or (min(case.mass_kg, case.other_kg) if case.other_kg else case.mass_kg)
-    return Dynamics(case.believed_delay / case.rate_hz, case.quantum_um * 1e-6, least_kg)
+    lag_s = case.velocity_lag / case.rate_hz if case.estimator == DEVICE else None
+    return Dynamics(case.believed_delay / case.rate_hz, case.quantum_um * 1e-6, least_kg, lag_s)
 
 
 def _device(case: Case) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any, Final
 from study_app.errors import StudyError
 from study_app.haptics.model.effects.drag import DAMPING_NSPM, Drag
 from study_app.haptics.model.estimators import ESTIMATORS as KINDS
+from study_app.haptics.model.estimators.device import MOST_LAG_TICKS
 from study_app.haptics.model.force_link import MOST_DELAY_MS, MOST_JITTER_MS, MOST_LOSS, ForceLink, too_long
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.protocol.load import load
@@ -33,6 +34,16 @@ DAMPER: Final = "damper"
 
 THROWN: Final = "thrown"
 LETS_GO: Final = "lets-go"
+
+DEVICE: Final = "device"
+"""The estimator of cases whose device measures the velocity itself."""
+AVERAGE: Final = "average"
+FIRST_ORDER: Final = "first-order"
+LATE: Final = "late"
+FILTERS: Final = (AVERAGE, FIRST_ORDER, LATE)
+"""Why the velocity of such a device lags: a mean over twice the lag, a filter of first order, or delay alone."""
+OF_DEVICE: Final = ("velocity_lag", "velocity_filter", "velocity_noise_mmps", "velocity_count_mmps")
+"""Fields of cases with such a device, which the line of any other leaves out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +87,9 @@ RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "force_delay_ms": (0.0, float(MOST_DELAY_MS)),
     "force_jitter_ms": (0.0, float(MOST_JITTER_MS)),
     "force_loss": (0.0, MOST_LOSS),
+    "velocity_lag": (0.0, MOST_LAG_TICKS),
+    "velocity_noise_mmps": (0.0, 1000.0),
+    "velocity_count_mmps": (0.0, 1000.0),
 }
 """What a case may be made of; the sweep's own choices lie within."""
 
@@ -97,6 +111,9 @@ class Case:
     ``burst_ms`` of every 300 ms there is no new sample. ``believed_kg`` is the least mass that the device states
     (0: the true one), ``other_kg`` the mass of the handle in every second stretch of 150 ms (0: the same).
     ``force_delay_ms``, ``force_jitter_ms`` and ``force_loss`` are the study's own force link.
+
+    With ``estimator`` "device" the device measures the velocity: ``velocity_lag`` [ticks] is the mean lag, which it
+    states, of its ``velocity_filter``; noise from peak to peak and counts come on top of it.
     """
 
     liquid: str = "water"
@@ -127,6 +144,10 @@ class Case:
     force_delay_ms: float = 0.0
     force_jitter_ms: float = 0.0
     force_loss: float = 0.0
+    velocity_lag: float = 0.0
+    velocity_filter: str = AVERAGE
+    velocity_noise_mmps: float = 0.0
+    velocity_count_mmps: float = 0.0
 
     @property
     def believed_delay(self) -> int:
@@ -139,7 +160,8 @@ class Case:
         return self.believed_delay != self.delay or self.slows_to > self.delay
 
     def __str__(self) -> str:
-        return " ".join(f"{field.name}={_word(getattr(self, field.name))}" for field in fields(self))
+        names = [field.name for field in fields(self) if self.estimator == DEVICE or field.name not in OF_DEVICE]
+        return " ".join(f"{name}={_word(getattr(self, name))}" for name in names)
 
 
 def parse(line: str) -> Case:
@@ -175,7 +197,8 @@ def parse(line: str) -> Case:
         ("liquid", scenes()),
         ("hand", GRIPS),
         ("motion", MOTIONS),
-        ("estimator", ESTIMATORS),
+        ("estimator", (*ESTIMATORS, DEVICE)),
+        ("velocity_filter", FILTERS),
         ("plant", (*PLANTS, FALCON)),
     ):
         if getattr(case, name) not in permitted:
@@ -226,7 +249,8 @@ def of_physical2() -> tuple[str, ...]:
 
 def scene_of(case: Case) -> Scene:
     """Return what the case presents."""
-    velocity, link = ESTIMATORS[case.estimator], _link_of(case)
+    velocity = ESTIMATORS["ewma" if case.estimator == DEVICE else case.estimator]  # a device's own takes its place
+    link = _link_of(case)
     changed = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": velocity, "link": link}
     return Scene.model_validate(scenes()[case.liquid].model_copy(update=changed).model_dump())
 

@@ -157,6 +157,7 @@ def _restlessness(
     """Return the force's fast part, and that of the same motion without feedback, where they differ most."""
     calm_m, calm_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
     smooth(trace, SPREAD_S, calm_m, calm_n)
+    calm_mps = np.gradient(calm_m, trace.t_s, axis=0)
     undecided_m = case.quantum_um * 1e-6 * (np.random.default_rng(1).random(calm_m.shape) - 0.5)
     passive = _passive(case, bool(before[0][1].loop.safe), limits)
     found = []
@@ -167,6 +168,7 @@ def _restlessness(
             again, answer = bench.copy(), trace.copy()
             answer.sent_n[:first] = 0.0
             answer.sent_n[first:] = calm_n[first:]
+            answer.velocity_mps[:] = calm_mps
             play(
                 again.model,
                 again.safety[0],
