@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.options import Target
+from study_app.cli.options import EXIT_FOUND, Target, exclude_each_other
 from study_app.cli.progress import progress
 from study_app.errors import DisplayError, StudyError
 
@@ -42,15 +42,29 @@ LOAD = click.Choice(("none", "gui", "gui+cpu"))
     "--spin", "spin_us", type=float, metavar="US", help="Poll the clock for this time before a deadline [µs]."
 )
 @click.option("--delays", "of_delays", is_flag=True, help="Measure the delay of the participant's picture instead.")
+@click.option(
+    "--devices", "of_devices", is_flag=True, help="Compare each emulated device with the scripted hand instead."
+)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure.")
-def timing(seconds: float, load: LoadName, spin_us: float | None, of_delays: bool, to: Path | None) -> None:
+def timing(
+    seconds: float, load: LoadName, spin_us: float | None, of_delays: bool, of_devices: bool, to: Path | None
+) -> None:
     """Measure the lateness of the servo, a bare compiled loop, a Python thread and a Qt timer.
 
     They run alternately for a quarter second each, in each priority class that the system grants. Ctrl+C ends it.
 
     With --delays a session shows the delays of the thesis' study on screens of 60 and 144 Hz, with and without
     load, and the error of every frame's delay is computed from its recordings. No display is needed.
+
+    With --devices the servo ticks on each emulated device and on the scripted hand, alternately. Ends with 3 if the
+    99th percentile of the lateness on one of them exceeds 1.5 times that on the scripted hand.
     """
+    exclude_each_other(delays=of_delays, devices=of_devices)
+    if of_devices:
+        if spin_us is not None:
+            raise StudyError("--spin applies to the servo's loops: omit it with --devices")
+        compare_devices(seconds, load, to)
+        return
     if of_delays:
         if spin_us is not None:
             raise StudyError("--spin applies to the servo's loops: omit it with --delays")
@@ -85,6 +99,29 @@ def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
     click.echo(text(found), nl=False)
     for written in write(found, to) if to is not None else ():
         click.echo(written)
+
+
+def compare_devices(seconds: float, load: LoadName, to: Path | None) -> None:
+    """Print how late ticks begin with each emulated device; end with 3 where the limit is missed."""
+    from study_app.store.atomic import write_file
+    from study_app.store.output_files import make_folder
+    from study_app.validation.timing.device_lateness import emulated_devices, text, time_devices
+    from study_app.validation.timing.machine_load import under_load
+
+    if to is not None:
+        make_folder(to)
+    with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
+        found = under_load(
+            load,
+            windows_thread(load) if load != "none" else None,
+            lambda: time_devices(seconds, emulated_devices(), ending=ending, tell=show),
+        )
+    click.echo(text(found), nl=False)
+    if to is not None:
+        write_file(to / "devices.txt", text(found).encode())
+        click.echo(to / "devices.txt")
+    if any(one.missed for one in found):
+        click.get_current_context().exit(EXIT_FOUND)
 
 
 def windows_thread(load: LoadName) -> WindowsThread | None:

@@ -14,7 +14,7 @@ from typing import Any, Final, Literal, NamedTuple, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.haptics.kernels.c_functions import SLEEP, call_at
+from study_app.haptics.kernels.c_functions import SLEEP, Driver, call_at
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.runtime.clocks.clock import Clock, SystemClock, VirtualClock, raise_priority
 from study_app.haptics.runtime.clocks.grants import Grant
@@ -64,14 +64,15 @@ class Loop(Protocol):
 
 
 class ServoLoop:
-    """The product: the servo with a full scene, in a thread of its own."""
+    """The product: the servo with a full scene, in a thread of its own; on ``device``, None: one that costs nothing."""
 
     kind: Kind = "servo"
 
-    def __init__(self, grant: Grant, *, real_time: bool, spin_us: float | None) -> None:
+    def __init__(self, grant: Grant, *, real_time: bool, spin_us: float | None, device: Driver | None = None) -> None:
         self.grant = grant
         self.clock = SystemClock(spin_us)
-        self.servo = Servo(PlayedHand(), clock=self.clock, elements=elements_needed(FULL), real_time=real_time)
+        driver = PlayedHand() if device is None else device
+        self.servo = Servo(driver, clock=self.clock, elements=elements_needed(FULL), real_time=real_time)
         self.servo.prepare()
 
     def run(self, ticks: int) -> Taken:
