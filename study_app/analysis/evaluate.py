@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Final, TypeAlias
+from typing import Final
 
 from study_app.analysis.designs.block_tests import SEALED, Asked, asked, facts, untested
 from study_app.analysis.designs.levels import levels_found
@@ -14,23 +14,16 @@ from study_app.analysis.findings import all_findings
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.conduct import delivered, orders
 from study_app.analysis.results.not_tested import NotTested
-from study_app.analysis.results.section_failures import Ended, Failure, Failures
+from study_app.analysis.results.section_failures import Ended, Failure, Failures, Progress, silent
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.performance import Performance, performance
 from study_app.analysis.tables.study import Study
-
-Progress: TypeAlias = Callable[[str, float], object]
-"""Receives what is being done, and which share of all is done (0 to 1); what it raises ends the evaluation."""
 
 SEED: Final = 1
 """Of all random rearrangements and resamples: the same results give the same numbers."""
 
 
-def silent(_what: str, _share: float) -> None:
-    """Report nothing."""
-
-
-def evaluate(study: Study, *, seed: int = SEED, progress: Progress = silent, planning: bool = True) -> Results:
+def evaluate(study: Study, *, progress: Progress = silent, planning: bool = True) -> Results:
     """Test everything that the answers and recordings of a study can answer.
 
     While the key is sealed only counts and comparisons of codes are there; ``BlockFound.absent`` says what waits, and
@@ -52,7 +45,7 @@ def evaluate(study: Study, *, seed: int = SEED, progress: Progress = silent, pla
     """
     failures = Failures()
     try:
-        return _evaluated(study, seed, failures, partial(_ending, progress), planning=planning)
+        return _evaluated(study, failures, partial(_ending, progress), planning=planning)
     except Ended as ended:
         raise ended.error from None
 
@@ -65,12 +58,12 @@ def _ending(progress: Progress, what: str, share: float) -> None:
         raise Ended(error) from error
 
 
-def _evaluated(study: Study, seed: int, failures: Failures, progress: Progress, *, planning: bool) -> Results:
+def _evaluated(study: Study, failures: Failures, progress: Progress, *, planning: bool) -> Results:
     blocks = []
     for number, block in enumerate(study.blocks):
         each = partial(_testing, progress, 0.5 * number / len(study.blocks))
         found = failures.attempt(
-            "all tests", partial(_block, study, block, seed, each, failures, planning=planning), block=block.id
+            "all tests", partial(_block, study, block, each, failures, planning=planning), block=block.id
         )
         blocks.append(untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found)
     shown = failures.attempt("the delays as they were shown", lambda: delivered(study))
@@ -86,7 +79,7 @@ def _evaluated(study: Study, seed: int, failures: Failures, progress: Progress, 
         delivered=() if isinstance(shown, Failure) else shown,
         orders={} if isinstance(run, Failure) else run,
         performance=None if isinstance(moved, Failure) else moved,
-        seed=seed,
+        seed=SEED,
         failures=tuple(failures.found),
         questions=() if isinstance(asked_, Failure) else asked_,
         scores=() if isinstance(scores, Failure) else scores,
@@ -99,9 +92,9 @@ def _testing(progress: Progress, share: float, what: str) -> None:
 
 
 def _block(
-    study: Study, block: Block, seed: int, each: Callable[[str], object], failures: Failures, *, planning: bool
+    study: Study, block: Block, each: Callable[[str], object], failures: Failures, *, planning: bool
 ) -> BlockFound:
-    return found_in(study, asked(study, block, seed, each, failures, planning=planning))
+    return found_in(study, asked(study, block, SEED, each, failures, planning=planning))
 
 
 def found_in(study: Study | None, answers: Asked) -> BlockFound:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -66,10 +67,8 @@ def carry_out(order: Order, tell: Tell, stop: Callable[[], bool]) -> Done:
             include(order.folder, order.participant, order.session, trial=order.trial, by=order.by, reason=order.reason)
         case OpenKey():
             return Done(warnings=unblind(order.folder, by=order.by, reason=order.reason).left)
-        case WriteTables():
-            return _write_tables(order, tell, stop)
-        case WriteReport():
-            return _write_report(order, tell, stop)
+        case WriteTables() | WriteReport():
+            return _write(order, tell, stop)
     return Done()
 
 
@@ -179,10 +178,7 @@ def _evaluate(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
     from study_app.analysis.figures.report_figures import pictures  # noqa: PLC0415
 
-    def going(what: str, share: float) -> None:
-        _go_on(stop)
-        tell(Progress(what, share))
-
+    going = partial(_going, tell, stop)
     going("testing", 0.0)
     results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share), planning=False)
     for drawn, picture in enumerate(pictures(study, results, ("svg",)), start=1):
@@ -205,39 +201,21 @@ def _name(study: Study, block: Block) -> str:
     return f"{block.kind}-{block.id}" if len(study.blocks_of(block.kind)) > 1 else block.kind
 
 
-def _write_tables(order: WriteTables, tell: Tell, stop: Callable[[], bool]) -> Done:
-    """Do what ``analysis.export.export.export`` does, and ask between its steps whether to give up."""
-    from study_app.analysis.export import spss  # noqa: PLC0415
-    from study_app.analysis.export.export import export_files  # noqa: PLC0415
-    from study_app.analysis.tables.study import load_study  # noqa: PLC0415
-    from study_app.store.output_files import write_files  # noqa: PLC0415
-
-    if "sav" in order.extras:
-        spss.require()
-    tell(Progress("reading", 0.0))
-    study = load_study(order.folder)
-    _go_on(stop)
-    tell(Progress("making the tables", 0.3))
-    files = export_files(study, order.extras)
-    _go_on(stop)
-    tell(Progress("writing", 0.9))
-    warnings: list[str] = []
-    written = write_files(order.to, files)
-    study.tell_doubts(warnings.append)
-    return Done(written, tuple(warnings))
-
-
-def _write_report(order: WriteReport, tell: Tell, stop: Callable[[], bool]) -> Done:
+def _write(order: WriteTables | WriteReport, tell: Tell, stop: Callable[[], bool]) -> Done:
+    from study_app.analysis.export.export import export  # noqa: PLC0415
     from study_app.analysis.report.write_report import report  # noqa: PLC0415
 
     warnings: list[str] = []
-
-    def going(what: str, share: float) -> None:
-        _go_on(stop)
-        tell(Progress(what, share))
-
-    written = report(order.folder, order.to, progress=going, warn=warnings.append, failed=warnings.append)
+    make = partial(export, extras=order.extras) if isinstance(order, WriteTables) else report
+    written = make(
+        order.folder, order.to, progress=partial(_going, tell, stop), warn=warnings.append, failed=warnings.append
+    )
     return Done(written, tuple(warnings))
+
+
+def _going(tell: Tell, stop: Callable[[], bool], what: str, share: float) -> None:
+    _go_on(stop)
+    tell(Progress(what, share))
 
 
 def _go_on(stop: Callable[[], bool]) -> None:

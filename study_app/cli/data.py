@@ -37,7 +37,10 @@ from study_app.cli.progress import progress
 def export(
     results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psych_ds: bool, validator: Path | None
 ) -> None:
-    """Write the tidy tables of all participants, with a codebook."""
+    """Write the tidy tables of all participants, with a codebook.
+
+    Ends with exit code 3 if a section of the report that --psych-ds adds could not be computed.
+    """
     if validator is not None and not psych_ds:
         raise click.UsageError("--validator checks the folder that --psych-ds writes: give both")
     from study_app.analysis.export.export import export as export_study
@@ -45,13 +48,23 @@ def export(
 
     asked: dict[Extra, bool] = {"wide": wide, "parquet": parquet, "sav": sav, "psych-ds": psych_ds}
     extras = [name for name, wanted in asked.items() if wanted]
+    failed: list[str] = []
     with progress() as show:
         show("writing the tables")
-        files = export_study(results, to, extras=extras, warn=partial(click.echo, err=True))
+        files = export_study(results, to, extras=extras, warn=partial(click.echo, err=True), failed=failed.append)
     for written in files:
         click.echo(written)
     if validator is not None:
         _validate(validator, to)
+    _say(failed)
+
+
+def _say(failed: list[str]) -> None:
+    """Say which sections of a report could not be computed; end with exit code 3 if there are any."""
+    for line in failed:
+        click.echo(line, err=True)
+    if failed:
+        raise click.exceptions.Exit(EXIT_FOUND)
 
 
 def _validate(validator: Path, to: Path) -> None:
@@ -80,6 +93,23 @@ def plot(results: Path, to: Path) -> None:
         files = plot_study(results, to, warn=partial(click.echo, err=True))
     for written in files:
         click.echo(written)
+
+
+@click.command()
+@takes_study
+@click.option("--to", type=Target(), required=True, metavar="DIR", help="Folder for the report.")
+def report(results: Path, to: Path) -> None:
+    """Write the report of a study: tests, figures, tables, conclusions and limitations, and how to reproduce it.
+
+    Ends with exit code 3 if a section could not be computed: the report names it and contains everything else.
+    """
+    from study_app.analysis.report.write_report import report as write_report
+
+    failed: list[str] = []
+    with progress() as show:
+        files = write_report(results, to, progress=show, warn=partial(click.echo, err=True), failed=failed.append)
+    click.echo(f"{files[0]}  and {len(files) - 1} more files in its folder")
+    _say(failed)
 
 
 @click.command()

@@ -7,7 +7,10 @@ from pathlib import Path
 
 from study_app.analysis.export import psychds_dataset, spss
 from study_app.analysis.export.frame_csv import table_bytes
-from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_files, tables_of
+from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_files
+from study_app.analysis.export.typed_tables import deliver
+from study_app.analysis.export.wide_table import wide
+from study_app.analysis.results.section_failures import Failure, Progress, silent
 from study_app.analysis.tables.study import Study, load_study
 from study_app.store.output_files import write_files
 
@@ -17,7 +20,9 @@ def export(
     to: Path,
     *,
     extras: Collection[Extra] = NOTHING_ELSE,
+    progress: Progress = silent,
     warn: Callable[[str], object] | None = None,
+    failed: Callable[[str], object] | None = None,
 ) -> tuple[Path, ...]:
     """Write the tables and the codebook of a study into the folder ``to``; return the files.
 
@@ -32,6 +37,10 @@ def export(
         "wide": the answers, a row a participant; "parquet": the tables as Parquet; "sav": the answers, long and wide,
         for SPSS; "psych-ds": a folder to share that keeps the rules of Psych-DS: all tables, report, script
         and the study's file.
+    progress : callable, optional
+        Is called with what is being done and which share of all is done (0 to 1); what it raises ends the export.
+    failed : callable, optional
+        Is called with a line for every section of the report to share that could not be computed.
 
     Raises
     ------
@@ -42,24 +51,30 @@ def export(
     """
     if "sav" in extras:
         spss.require()
+    progress("reading", 0.0)
     study = load_study(folder)
-    written = write_files(Path(to), export_files(study, extras))
+    progress("making the tables", 0.3)
+    files, failures = _files(study, extras)
+    progress("writing", 0.9)
+    written = write_files(Path(to), files)
     study.tell_doubts(warn)
+    if failed is not None:
+        for failure in failures:
+            failed(f"error: {failure}")
     return written
 
 
-def export_files(study: Study, extras: Collection[Extra] = NOTHING_ELSE) -> dict[str, bytes]:
-    """Return the tables and the codebook of a study, and the ``extras``, by the names of their files."""
-    files = table_files(study, extras)
-    if "psych-ds" in extras:
-        tables = {file_name(study, table, "csv"): table for table in tables_of(study, with_wide=True)}
-        contents = {name: files.get(name) or table_bytes(table) for name, table in tables.items()}
-        described = {name: table.columns for name, table in tables.items()}
-        files |= psychds_dataset.dataset_files(study, contents, described, _report(study))
-    return files
-
-
-def _report(study: Study) -> dict[str, bytes]:
+def _files(study: Study, extras: Collection[Extra]) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
+    """Return all files by their names, and the sections of the report to share that failed."""
+    across, cells = wide(study) if extras else (None, {})
+    tables = [*deliver(study), *([] if across is None else [across])]
+    files = table_files(study, tables, extras, cells)
+    if "psych-ds" not in extras:
+        return files, ()
     from study_app.analysis.report.write_report import asks, report_files  # noqa: PLC0415 - only to share a study
 
-    return report_files(study)[0] if asks(study) else {}
+    report, failures = report_files(study) if asks(study) else ({}, ())
+    named = {file_name(study, table, "csv"): table for table in tables}
+    contents = {name: files.get(name) or table_bytes(table) for name, table in named.items()}
+    described = {name: table.columns for name, table in named.items()}
+    return files | psychds_dataset.dataset_files(study, contents, described, report), failures

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final, Literal, TypeAlias
 
 from study_app.analysis.export import spss
 from study_app.analysis.export.codebook import codebook_bytes
 from study_app.analysis.export.delivered import Delivered
 from study_app.analysis.export.frame_csv import table_bytes
-from study_app.analysis.export.typed_tables import deliver
-from study_app.analysis.export.wide_table import wide
+from study_app.analysis.export.wide_table import Cells, QuestionCells
 from study_app.analysis.tables.study import Study
 
 Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
@@ -19,28 +19,27 @@ OPENED: Final = ("tracks", "thresholds", "settings")
 NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
 
 
-def tables_of(study: Study, *, with_wide: bool) -> list[Delivered]:
-    """Return the tables of a study, the wide one last where it is asked for."""
-    return [*deliver(study), *([wide(study)[0]] if with_wide else [])]
+def table_files(
+    study: Study,
+    tables: Sequence[Delivered],
+    extras: Collection[Extra] = NOTHING_ELSE,
+    cells: Mapping[str, Cells | QuestionCells] = MappingProxyType({}),
+) -> dict[str, bytes]:
+    """Return tables of a study and their codebook, in the formats of ``extras``, too, by the names of their files.
 
-
-def table_files(study: Study, extras: Collection[Extra] = NOTHING_ELSE) -> dict[str, bytes]:
-    """Return the tables and the codebook of a study, in the formats of ``extras``, too, by the names of their files."""
-    tables = list(deliver(study))
-    responses = tables[0]
-    across, cells = wide(study) if extras else (None, {})
-    if across is not None and "wide" in extras:
-        tables.append(across)
-    files = {file_name(study, table, "csv"): table_bytes(table) for table in tables}
-    columns = {file_name(study, table, "csv"): table.columns for table in tables}
+    With ``extras`` the wide table is the last of ``tables``, and ``cells`` says what its columns hold.
+    """
+    written = tables if "wide" in extras or not extras else tables[:-1]
+    files = {file_name(study, table, "csv"): table_bytes(table) for table in written}
+    columns = {file_name(study, table, "csv"): table.columns for table in written}
     files["codebook.json"] = codebook_bytes(study, columns)
     if "parquet" in extras:
         from study_app.analysis.export.parquet import parquet_bytes  # noqa: PLC0415 - loads its library where it is asked for
 
-        files |= {file_name(study, table, "parquet"): parquet_bytes(table) for table in tables}
-    if across is not None and "sav" in extras:
-        files[file_name(study, responses, "sav")] = spss.long_sav(study, responses)
-        files[file_name(study, across, "sav")] = spss.wide_sav(study, across, cells)
+        files |= {file_name(study, table, "parquet"): parquet_bytes(table) for table in written}
+    if "sav" in extras:
+        files[file_name(study, tables[0], "sav")] = spss.long_sav(study, tables[0])
+        files[file_name(study, tables[-1], "sav")] = spss.wide_sav(study, tables[-1], cells)
         files |= {file_name(study, one, "sav"): spss.plain_sav(study, one) for one in tables if one.name in OPENED}
     return files
 

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from study_app import __version__
-from study_app.analysis.evaluate import Progress, evaluate
+from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import table_files
+from study_app.analysis.export.typed_tables import deliver
 from study_app.analysis.figures.levels.level_figure import level_pictures
 from study_app.analysis.figures.levels.settings_figure import setting_pictures
 from study_app.analysis.figures.levels.track_figure import track_pictures
@@ -28,7 +29,7 @@ from study_app.analysis.report.methods_paragraph import methods, version_words
 from study_app.analysis.report.r_script import r_script
 from study_app.analysis.report.typeface import font_faces
 from study_app.analysis.results.block_results import Results
-from study_app.analysis.results.section_failures import Failure, Failures
+from study_app.analysis.results.section_failures import Failure, Failures, Progress, silent
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study import Study, load_study
 from study_app.errors import AnalysisError
@@ -43,8 +44,7 @@ def report(
     folder: Path,
     to: Path,
     *,
-    progress: Callable[[str, float], object] | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = silent,
     warn: Callable[[str], object] | None = None,
     failed: Callable[[str], object] | None = None,
 ) -> tuple[Path, ...]:
@@ -55,9 +55,7 @@ def report(
     Parameters
     ----------
     progress : callable, optional
-        Is called with what is being done and which share of all is done (0 to 1).
-    cancelled : callable, optional
-        Is asked again and again whether to give up.
+        Is called with what is being done and which share of all is done (0 to 1); what it raises ends the report.
     warn : callable, optional
         Is called with a line for every file that is not as it was recorded, and is used as it is.
     failed : callable, optional
@@ -67,17 +65,16 @@ def report(
     Raises
     ------
     AnalysisError
-        The results cannot be evaluated, ``to`` cannot be written, or it was cancelled; nothing was written.
+        The results cannot be evaluated, or ``to`` cannot be written; nothing was.
     StoreError
         The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
     """
-    going = partial(_going, progress, cancelled)
-    going("reading", 0.0)
+    progress("reading", 0.0)
     study = load_study(folder)
     if not asks(study):
         raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to report")
-    files, found = report_files(study, going)
-    going("writing", 0.95)
+    files, found = report_files(study, progress)
+    progress("writing", 0.95)
     written = write_files(Path(to), files)
     study.tell_doubts(warn)
     if failed is not None:
@@ -91,30 +88,18 @@ def asks(study: Study) -> bool:
     return bool(study.blocks or study.others.questions)
 
 
-def report_files(
-    study: Study, going: Progress = lambda _what, _share: None
-) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
+def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
     """Return the files of a study's report by their names, ``report.html`` first, and the sections that failed."""
-    results = evaluate(study, progress=lambda what, share: going(what, 0.1 + 0.6 * share))
+    results = evaluate(study, progress=lambda what, share: progress(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
-    drawn = list(_drawn(study, results, going, failures))
+    drawn = list(_drawn(study, results, progress, failures))
     return _files(study, results, drawn, failures), tuple(failures.found)
 
 
-def _going(
-    progress: Callable[[str, float], object] | None, cancelled: Callable[[], bool] | None, what: str, share: float
-) -> None:
-    """Tell what is being done, unless it is to be given up."""
-    if cancelled is not None and cancelled():
-        raise AnalysisError("the report was cancelled; nothing was written")
-    if progress is not None:
-        progress(what, share)
-
-
-def _drawn(study: Study, results: Results, going: Progress, failures: Failures) -> Iterator[Picture]:
+def _drawn(study: Study, results: Results, progress: Progress, failures: Failures) -> Iterator[Picture]:
     drawn = chain(pictures(study, results, failures=failures), _of_questions(study, results, failures))
     for number, picture in enumerate(drawn, start=1):
-        going(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, number / 4))
+        progress(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, number / 4))
         yield picture
 
 
@@ -148,7 +133,7 @@ def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: F
     for one in drawn:
         files |= {f"{one.name}.{form}": content for form, content in one.files.items()}
         files[f"{one.name}.txt"] = f"{one.caption}\n".encode()
-    exported = failures.attempt("exported tables", lambda: table_files(study))
+    exported = failures.attempt("exported tables", lambda: table_files(study, deliver(study)))
     files |= {} if isinstance(exported, Failure) else exported
     page_ = _page(study, results, drawn, texts, failures).encode()
     return {"report.html": page_, "report.json": number_files.document(study, results, texts, failures), **files}

@@ -6,9 +6,15 @@ import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 T = TypeVar("T")
+Progress: TypeAlias = Callable[[str, float], object]
+"""Receives what is being done, and which share of all is done (0 to 1); what it raises ends the evaluation."""
+
+
+def silent(_what: str, _share: float) -> None:
+    """Report nothing."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from study_app.analysis.report.write_report import report
 from study_app.analysis.results.words import counted, listed, number, p_equals, p_value
 from study_app.analysis.tables.study import load_study
 from study_app.cli import commands
-from study_app.errors import AnalysisError, StudyError
+from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve
 from tests.analysis.report.pages import answered_by_two, numbers, read, rows
 
@@ -125,7 +125,9 @@ def test_the_exclusions_and_what_was_not_completed_are_listed(rek: Results, tmp_
     assert numbers(tmp_path / "report")["study"]["participants"] == 5
 
 
-def test_it_can_be_cancelled_at_every_step_and_then_nothing_is_written(small: Results, tmp_path: Path) -> None:
+def test_what_progress_raises_ends_the_report_at_every_step_and_nothing_is_written(
+    small: Results, tmp_path: Path
+) -> None:
     answered_by_two(small)
     small.open()
     told: list[tuple[str, float]] = []
@@ -134,14 +136,15 @@ def test_it_can_be_cancelled_at_every_step_and_then_nothing_is_written(small: Re
     assert shares == sorted(shares)
     assert shares[-1] <= 1
     for step in (0, len(told) // 2):
-        asked: list[bool] = []
+        asked: list[str] = []
 
-        def cancelled(asked: list[bool] = asked, step: int = step) -> bool:
-            asked.append(True)
-            return len(asked) > step
+        def cancel(what: str, _share: float, asked: list[str] = asked, step: int = step) -> None:
+            asked.append(what)
+            if len(asked) > step:
+                raise AnalysisError("cancelled")
 
-        with pytest.raises(StudyError, match="cancelled; nothing was written"):
-            report(small.folder, tmp_path / "not", cancelled=cancelled)
+        with pytest.raises(AnalysisError, match="cancelled"):
+            report(small.folder, tmp_path / "not", progress=cancel)
         assert len(asked) == step + 1
         assert not (tmp_path / "not").exists()
 

@@ -105,3 +105,15 @@ def test_a_report_with_failures_is_written_and_ends_with_three(
     names = {path.name for path in to.iterdir()}
     assert {"tests.csv", "recognition.png", "codebook.json", "methods.txt"} <= names
     assert not {"report.R", "motion.csv", "liquids.png"} & names
+
+
+def test_an_export_to_share_says_which_sections_of_its_report_failed(
+    opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("study_app.analysis.report.number_files.motion_csv", fail)
+    done = CliRunner().invoke(commands, ["export", str(opened.folder), "--to", str(tmp_path / "out"), "--psych-ds"])
+    assert done.exit_code == 3, done.output
+    assert "error: motion.csv: its computation failed (ValueError" in done.output
+    names = {path.name for path in (tmp_path / "out" / "psych-ds" / "results").iterdir()}
+    assert "report.html" in names
+    assert "motion.csv" not in names
