@@ -7,7 +7,7 @@ from typing import Final
 
 import pandas as pd
 
-from study_app.store.tables.column import Column, header
+from study_app.store.tables.column import Column, header, optional
 from study_app.store.tables.columns import PARTICIPANTS
 
 _STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
@@ -15,7 +15,7 @@ _STATUS: Final = next(column for column in PARTICIPANTS if column.name == "statu
 JUDGED: Final = (
     Column("session_status", "text", "How the row's session ended.", levels=_STATUS.levels),
     Column("excluded", "flag", "true where exclusions.csv leaves out the row's session or trial."),
-    Column("exclusion_reason", "text", "Why it is left out.", may_miss=True),
+    optional("exclusion_reason", "text", "Why it is left out."),
     Column(
         "counted",
         "flag",

@@ -17,7 +17,7 @@ from study_app.analysis.export.level_tables import level_tables
 from study_app.analysis.tables.compared_blocks import Setting
 from study_app.analysis.tables.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.tables.study import Study
-from study_app.store.tables.column import Column, header, unsealed
+from study_app.store.tables.column import Column, header, optional, unsealed
 from study_app.store.tables.columns import RESPONSES, TRIALS_2, tables_of
 
 OF_A_FORM: Final = Setting("")
@@ -30,12 +30,8 @@ OPENED: Final = (
     Column("liquid", "text", "Id of the liquid that was felt."),
     Column("delay_ms", "number", "Visual delay that was asked for.", "ms", minimum=0),
 )
-ACHIEVED: Final = Column(
-    "delay_achieved_ms",
-    "number",
-    "Visual delay that was achieved: asked for, plus the trial's mean error.",
-    "ms",
-    may_miss=True,
+ACHIEVED: Final = optional(
+    "delay_achieved_ms", "number", "Visual delay that was achieved: asked for, plus the trial's mean error.", "ms"
 )
 _QUARTILE: Final = f"quartiles {QUARTILES}"
 MEASURED: Final = (
@@ -53,17 +49,16 @@ MEASURED: Final = (
     Column("cannot_judge", "integer", "Answers off the scale.", minimum=0),
     Column("missing", "integer", "Presentations without any answer.", minimum=0),
     *(Column(f"count_{level}", "integer", f"Answers at level {level}.", minimum=0) for level in LEVELS),
-    Column("median", "number", "Median of the valid answers.", minimum=1, maximum=7, may_miss=True),
-    Column("q1", "number", f"Lower quartile; {_QUARTILE}.", minimum=1, maximum=7, may_miss=True),
-    Column("q3", "number", f"Upper quartile; {_QUARTILE}.", minimum=1, maximum=7, may_miss=True),
-    Column(
+    optional("median", "number", "Median of the valid answers.", minimum=1, maximum=7),
+    optional("q1", "number", f"Lower quartile; {_QUARTILE}.", minimum=1, maximum=7),
+    optional("q3", "number", f"Upper quartile; {_QUARTILE}.", minimum=1, maximum=7),
+    optional(
         "agree_percent",
         "number",
         f"Share of the valid answers that agree (levels {AGREEMENT[0]} to {AGREEMENT[-1]}).",
         "%",
         minimum=0,
         maximum=100,
-        may_miss=True,
     ),
 )
 

@@ -14,7 +14,7 @@ from study_app.analysis.tables.asked_questions import AskedQuestion, AskedScore
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting, setting_name
 from study_app.analysis.tables.measures import Array, by_participant
 from study_app.analysis.tables.study import Study
-from study_app.store.tables.column import Column, Kind
+from study_app.store.tables.column import Column, Kind, optional
 from study_app.store.tables.columns import RESPONSES
 
 _PARTICIPANT = next(column for column in RESPONSES if column.name == "participant")
@@ -111,13 +111,13 @@ def _question_column(name: str, cells: QuestionCells, frame: pd.DataFrame) -> Co
     about = "" if setting is None else f" About {setting_name(setting, asked.where.settings)}."
     if isinstance(asked, AskedScore):
         of = f" of {asked.instrument}" if asked.instrument else ""
-        return Column(name, kind, f"Score {asked.name}{of}, in {asked.where.title}.{about}", may_miss=True)
+        return optional(name, kind, f"Score {asked.name}{of}, in {asked.where.title}.{about}")
     text = asked.text if asked.text.endswith((".", "?", "!")) else f"{asked.text}."
     described = f"{text} In {asked.where.title}.{about}"
     if asked.question.value_type == "text":
-        return Column(name, "text", described, may_miss=True)
+        return optional(name, "text", described)
     least, most = asked.bounds or (None, None)
-    return Column(name, kind, described, minimum=least, maximum=most, may_miss=True)
+    return optional(name, kind, described, minimum=least, maximum=most)
 
 
 def _name(cells: Cells) -> str:
@@ -140,11 +140,10 @@ def _numbers(values: Array) -> pd.api.extensions.ExtensionArray:
 
 
 def _column(name: str, cells: Cells, frame: pd.DataFrame) -> Column:
-    return Column(
+    return optional(
         name,
         "integer" if pd.api.types.is_integer_dtype(frame[name]) else "number",
         f"{cells.item.text} About {cells.block.name(cells.setting)}, in {cells.block.title}.",
         minimum=1,
         maximum=7,
-        may_miss=True,
     )

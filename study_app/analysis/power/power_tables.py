@@ -12,7 +12,7 @@ from study_app.analysis.power.batch_counts import EFFECTS
 from study_app.analysis.power.permutation_tests import DRAWS
 from study_app.analysis.power.power_curves import WANTED, Curve, Powers, Question, interval
 from study_app.analysis.results.words import enough
-from study_app.store.tables.column import Column
+from study_app.store.tables.column import Column, optional
 from study_app.store.tables.csv_files import csv_bytes
 
 COLUMNS: Final = (
@@ -20,28 +20,26 @@ COLUMNS: Final = (
     Column("simulated", "flag", "true: all of these answers come from a model, none from people."),
     Column("block", "text", "Id of the block of trials."),
     Column("question", "text", "What is tested."),
-    Column("item", "text", "Id of the statement; n/a where the test is over several.", may_miss=True),
-    Column("over", "text", "Over what, where not over one statement.", may_miss=True),
-    Column("setting", "text", "The delay that the test is about; n/a where it is about all.", may_miss=True),
+    optional("item", "text", "Id of the statement; n/a where the test is over several."),
+    optional("over", "text", "Over what, where not over one statement."),
+    optional("setting", "text", "The delay that the test is about; n/a where it is about all."),
     Column("participants", "integer", "Participants of each study.", minimum=2),
     Column("studies", "integer", "Simulated studies.", minimum=1),
     Column("power", "number", "Share of the studies that show it, under the answer model.", minimum=0, maximum=1),
     Column("power_low", "number", "Lower end of the 95 % interval of that share (Wilson).", minimum=0, maximum=1),
     Column("power_high", "number", "Upper end of it.", minimum=0, maximum=1),
-    Column(
+    optional(
         "without_effect",
         "number",
         "The same share where settings do not differ at all: false alarms; of equivalence, its power.",
         minimum=0,
         maximum=1,
-        may_miss=True,
     ),
-    Column("effect_points", "number", "The difference of mean answers in the model, in points.", may_miss=True),
-    Column(
+    optional("effect_points", "number", "The difference of mean answers in the model, in points."),
+    optional(
         "detectable_points",
         "number",
         "The smallest difference of mean answers that 80 % of such studies show, in points.",
-        may_miss=True,
     ),
 )
 

@@ -10,9 +10,10 @@ from typing import Any, Final
 from study_app import __version__
 from study_app.analysis.power.power_curves import interval
 from study_app.analysis.power.threshold_studies import Found
-from study_app.analysis.tables.compared_blocks import spoken, text_in
+from study_app.analysis.tables.compared_blocks import spoken
 from study_app.protocol.model import Protocol
-from study_app.store.tables.column import Column
+from study_app.protocol.texts import text_in
+from study_app.store.tables.column import Column, optional
 from study_app.store.tables.csv_files import csv_bytes
 
 COLUMNS: Final = (
@@ -23,17 +24,16 @@ COLUMNS: Final = (
     Column("participants", "integer", "Participants of each study.", minimum=2),
     Column("studies", "integer", "Simulated studies.", minimum=1),
     Column("spread", "number", "Standard deviation of the logarithm of one participant's threshold.", minimum=0),
-    Column(
+    optional(
         "half_interval",
         "number",
         "Half the 95 % interval of the group's mean, as a share of it: median of the studies.",
         minimum=0,
-        may_miss=True,
     ),
-    Column("precision", "number", "The planned half interval; n/a: none.", minimum=0, may_miss=True),
-    Column("within", "number", "Share of the studies that reach it.", minimum=0, maximum=1, may_miss=True),
-    Column("within_low", "number", "Lower end of the share's 95 % interval.", minimum=0, maximum=1, may_miss=True),
-    Column("within_high", "number", "Upper end of it.", minimum=0, maximum=1, may_miss=True),
+    optional("precision", "number", "The planned half interval; n/a: none.", minimum=0),
+    optional("within", "number", "Share of the studies that reach it.", minimum=0, maximum=1),
+    optional("within_low", "number", "Lower end of the share's 95 % interval.", minimum=0, maximum=1),
+    optional("within_high", "number", "Upper end of it.", minimum=0, maximum=1),
 )
 
 

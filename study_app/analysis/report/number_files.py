@@ -24,7 +24,7 @@ from study_app.analysis.tables.study import Study
 from study_app.store.blinded import blinding
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
-from study_app.store.tables.column import Column
+from study_app.store.tables.column import Column, optional
 from study_app.store.tables.csv_files import csv_bytes
 
 FORMAT: Final = 1
@@ -36,9 +36,9 @@ MOTION: Final = (
     Column("setting", "text", "What the setting is."),
     Column("measure", "text", "The measure, its unit at the end."),
     Column("n", "integer", "Participants with the measure.", minimum=0),
-    Column("median", "number", "Median over participants.", may_miss=True),
-    Column("q1", "number", "Lower quartile over participants.", may_miss=True),
-    Column("q3", "number", "Upper quartile over participants.", may_miss=True),
+    optional("median", "number", "Median over participants."),
+    optional("q1", "number", "Lower quartile over participants."),
+    optional("q3", "number", "Upper quartile over participants."),
     Column("trials", "integer", "Trials that count under the setting.", minimum=0),
     Column("judged", "integer", "Of these: those of which it is known whether they kept to the limits.", minimum=0),
     Column("valid", "integer", "Of these: those that kept to the protocol's limits of timing.", minimum=0),

@@ -8,34 +8,34 @@ from study_app.analysis.designs.verdicts import ALONE
 from study_app.analysis.results.block_results import BlockFound
 from study_app.analysis.results.item_test import Tested
 from study_app.analysis.statistics.outcome import Outcome
-from study_app.store.tables.column import Column
+from study_app.store.tables.column import Column, optional
 
 TESTS: Final = (
     Column("block", "text", "Id of the block."),
     Column("question", "text", "What is asked."),
-    Column("item", "text", "Id of the statement; n/a where the test is over several.", may_miss=True),
-    Column("comparison", "text", "Which settings, where not all.", may_miss=True),
+    optional("item", "text", "Id of the statement; n/a where the test is over several."),
+    optional("comparison", "text", "Which settings, where not all."),
     Column("test", "text", "The test."),
     Column("n", "integer", "Participants used.", minimum=0),
     Column("dropped", "integer", "Participants not used, for missing answers.", minimum=0),
     Column("statistic_name", "text", "What the statistic is."),
-    Column("statistic", "number", "The statistic.", may_miss=True),
-    Column("p", "number", "p, not corrected.", minimum=0, maximum=1, may_miss=True),
-    Column("p_adjusted", "number", "p, corrected within the family.", minimum=0, maximum=1, may_miss=True),
-    Column("smallest_p", "number", "The smallest p that could have come out.", minimum=0, maximum=1, may_miss=True),
-    Column("family", "text", "What is corrected together.", may_miss=True),
-    Column("members", "integer", "Tests in the family.", minimum=1, may_miss=True),
-    Column("correction", "text", "How p is corrected.", may_miss=True),
-    Column("primary", "flag", "true where it was decided on before the study.", may_miss=True),
-    Column("verdict", "text", "What may be said.", may_miss=True),
+    optional("statistic", "number", "The statistic."),
+    optional("p", "number", "p, not corrected.", minimum=0, maximum=1),
+    optional("p_adjusted", "number", "p, corrected within the family.", minimum=0, maximum=1),
+    optional("smallest_p", "number", "The smallest p that could have come out.", minimum=0, maximum=1),
+    optional("family", "text", "What is corrected together."),
+    optional("members", "integer", "Tests in the family.", minimum=1),
+    optional("correction", "text", "How p is corrected."),
+    optional("primary", "flag", "true where it was decided on before the study."),
+    optional("verdict", "text", "What may be said."),
     Column("effect_name", "text", "What the effect is."),
-    Column("effect", "number", "The effect.", may_miss=True),
-    Column("low", "number", "Lower end of the effect's interval.", may_miss=True),
-    Column("high", "number", "Upper end of the effect's interval.", may_miss=True),
-    Column("level", "number", "Confidence of the interval.", may_miss=True),
-    Column("interval", "text", "How the interval was made, or why there is none.", may_miss=True),
+    optional("effect", "number", "The effect."),
+    optional("low", "number", "Lower end of the effect's interval."),
+    optional("high", "number", "Upper end of the effect's interval."),
+    optional("level", "number", "Confidence of the interval."),
+    optional("interval", "text", "How the interval was made, or why there is none."),
     Column("method", "text", "How p was found."),
-    Column("note", "text", "What must be said with it.", may_miss=True),
+    optional("note", "text", "What must be said with it."),
 )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, TypeAlias
 
 Kind: TypeAlias = Literal["text", "integer", "number", "flag", "time"]
@@ -28,6 +29,10 @@ class Column:
     maximum: float | None = None
     may_miss: bool = False
     sealed: bool = False
+
+
+optional = partial(Column, may_miss=True)
+"""A column in which a cell can be ``n/a``."""
 
 
 def unsealed(columns: tuple[Column, ...]) -> tuple[Column, ...]:

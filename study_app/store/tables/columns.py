@@ -10,24 +10,24 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from study_app.haptics.model.layout import LIMITER_NAMES
-from study_app.store.tables.column import Column
+from study_app.store.tables.column import Column, optional
 from study_app.store.tables.identity_columns import CODE, PARTICIPANT, SESSION, SESSION_COLUMNS, TRIAL, TRIAL_COLUMNS
 
 
 def _measure(name: str, description: str, unit: str = "", *, sealed: bool = False) -> Column:
-    return Column(name, "number", description, unit, minimum=0, may_miss=True, sealed=sealed)
+    return optional(name, "number", description, unit, minimum=0, sealed=sealed)
 
 
 def _signed(name: str, description: str, unit: str = "") -> Column:
-    return Column(name, "number", description, unit, may_miss=True, sealed=True)
+    return optional(name, "number", description, unit, sealed=True)
 
 
 def _count(name: str, description: str, *, sealed: bool = False) -> Column:
-    return Column(name, "integer", description, minimum=0, may_miss=True, sealed=sealed)
+    return optional(name, "integer", description, minimum=0, sealed=sealed)
 
 
 def _delay_error(name: str, which: str) -> Column:
-    return Column(name, "number", f"Visual delay, achieved minus requested: {which}.", "ms", may_miss=True, sealed=True)
+    return optional(name, "number", f"Visual delay, achieved minus requested: {which}.", "ms", sealed=True)
 
 
 RESPONSES: tuple[Column, ...] = (
@@ -36,13 +36,12 @@ RESPONSES: tuple[Column, ...] = (
     CODE,
     Column("item", "text", "Id of the statement; its text is in the session's receipt."),
     Column("number", "integer", "Position of the statement on its page, from 1.", minimum=1),
-    Column(
+    optional(
         "response",
         "integer",
         "The answer on the scale, from 1 (completely disagree) to 7 (completely agree).",
         minimum=1,
         maximum=7,
-        may_miss=True,
     ),
     Column("cannot_judge", "flag", "true if the participant chose the answer off the scale."),
     _measure("onset_s", "Time when the statement was shown, on the session's clock.", "s"),
@@ -57,18 +56,17 @@ _RESPONSES_BY_NAME = {column.name: column for column in RESPONSES}
 
 RESPONSES_2: tuple[Column, ...] = (
     *SESSION_COLUMNS,
-    Column("form", "text", "Id of the questionnaire that was presented on its own; n/a after a trial.", may_miss=True),
+    optional("form", "text", "Id of the questionnaire that was presented on its own; n/a after a trial."),
     *(replace(column, may_miss=True) for column in (*TRIAL_COLUMNS, CODE)),
     replace(_RESPONSES_BY_NAME["item"], description="Id of the question; its words are in the session's receipt."),
     Column("kind", "text", "Kind of the question: statement, rating, slider, number, choice, text."),
     replace(_RESPONSES_BY_NAME["number"], description="Place of the question on its page, from 1, as shown."),
-    Column(
+    optional(
         "response",
         "text",
         "The answer: a point of the scale, a number, the id of an option (of several, with spaces between), or a text.",
-        may_miss=True,
     ),
-    Column("value", "number", "The answer as a number, where it is one.", may_miss=True),
+    optional("value", "number", "The answer as a number, where it is one."),
     *(_RESPONSES_BY_NAME[name] for name in ("cannot_judge", "onset_s", "first_choice_s", "last_change_s", "changes")),
     _RESPONSES_BY_NAME["answered_at"],
 )
@@ -95,7 +93,7 @@ TRIALS: tuple[Column, ...] = (
     CODE,
     Column("trial_started_at", "time", "Time when the trial began."),
     Column("trial_started_s", "number", "Time when the trial began, on the session's clock.", "s", minimum=0),
-    Column(
+    optional(
         "outcome",
         "text",
         "How the trial ended; n/a while it runs.",
@@ -104,7 +102,6 @@ TRIALS: tuple[Column, ...] = (
             ("timeout", "the task's time ran out"),
             ("interrupted", "stopped early: paused, repeated, cancelled, or the program ended"),
         ),
-        may_miss=True,
     ),
     _measure(
         "duration_s",
@@ -150,40 +147,27 @@ TRIALS: tuple[Column, ...] = (
         ("Longest time between two frames, or between the last frame and the end of the task."),
         "ms",
     ),
-    Column(
+    optional(
         "valid",
         "flag",
         "true if the trial met the protocol's limits of lateness, gaps, delay error and withheld force; until "
         "unblinding, only those of lateness and gaps.",
-        may_miss=True,
     ),
-    Column(
-        "recording",
-        "text",
-        "File of the trial's samples, in the session's folder; n/a if none was stored.",
-        may_miss=True,
-    ),
-    Column(
-        "recording_frames",
-        "text",
-        "File of the frames shown, in the session's folder; n/a if none was stored.",
-        may_miss=True,
-    ),
+    optional("recording", "text", "File of the trial's samples, in the session's folder; n/a if none was stored."),
+    optional("recording_frames", "text", "File of the frames shown, in the session's folder; n/a if none was stored."),
     _count("samples_recorded", "Number of samples in the recording."),
     _count("samples_unrecorded", "Number of samples missing from the recording because the disk was too slow."),
-    Column(
+    optional(
         "recording_lost",
         "text",
         "Why the trial's recording could not be stored; n/a if it was stored or not requested.",
-        may_miss=True,
     ),
     Column("marked", "flag", "true if the operator marked the trial."),
-    Column(
+    optional(
         "notes",
         "text",
         "The operator's notes from the start of this trial to the start of the next, the reason of a repetition, "
         "and failures of the device, one per line.",
-        may_miss=True,
     ),
 )
 
@@ -222,23 +206,21 @@ INTERVALS: tuple[Column, ...] = (
     Column("interval", "integer", "Which interval of the trial, from 1.", minimum=1),
     Column("interval_started_s", "number", "When the interval began, on the session's clock.", "s", minimum=0),
     _measure("gap_s", "From the end of the interval before to the beginning of this one; n/a for the first.", "s"),
-    Column(
+    optional(
         "presented",
         "text",
         "What the interval presented.",
         levels=(("standard", "the standard"), ("comparison", "the comparison")),
-        may_miss=True,
         sealed=True,
     ),
-    Column("standard", "number", "The trial's standard, in the unit of the varied number.", may_miss=True, sealed=True),
-    Column("level", "number", f"The trial's level: {_LEVEL}.", may_miss=True, sealed=True),
-    Column("catch", "flag", "true in a catch trial, which presents the largest level.", may_miss=True, sealed=True),
-    Column(
+    optional("standard", "number", "The trial's standard, in the unit of the varied number.", sealed=True),
+    optional("level", "number", f"The trial's level: {_LEVEL}.", sealed=True),
+    optional("catch", "flag", "true in a catch trial, which presents the largest level.", sealed=True),
+    optional(
         "invalid_reasons",
         "text",
         "Keys of the protocol's limits that the interval breaks, with spaces between; n/a if it was delivered as "
         "requested.",
-        may_miss=True,
     ),
     *DELIVERED,
     *(column for column in TRIALS[_OUTCOME:] if column.name not in _NOT_OF_INTERVALS),
@@ -261,22 +243,21 @@ PARTICIPANTS: tuple[Column, ...] = (
         ),
     ),
     Column("session_started_at", "time", "Time when the session began."),
-    Column("session_ended_at", "time", "Time when the session ended.", may_miss=True),
+    optional("session_ended_at", "time", "Time when the session ended."),
     Column("resumed", "integer", "How often it was resumed after its program had ended.", minimum=0),
-    Column("device", "text", "The haptic device.", may_miss=True),
+    optional("device", "text", "The haptic device."),
     Column("language", "text", "Language of the participant's pages."),
     Column("trials", "integer", "Number of completed main trials.", minimum=0),
     Column("responses", "integer", "Number of answers in main trials, including those off the scale.", minimum=0),
-    Column(
+    optional(
         "validity",
         "text",
         "Whether the session's main trials were valid; n/a before the first has ended.",
         levels=(("valid", "all did"), ("invalid", "at least one did not")),
-        may_miss=True,
     ),
 )
 
-GROUP = Column("group", "text", "The participant's group; n/a in a study without groups.", may_miss=True, sealed=True)
+GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True)
 TRIALS_2: tuple[Column, ...] = (
     *_TRIALS_BY_NAME.values(),
     _count("intervals", "Number of intervals that this attempt presented; n/a if its block has no design."),

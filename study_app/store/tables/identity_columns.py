@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from study_app.store.tables.column import Column
+from study_app.store.tables.column import Column, optional
 
 STUDY = Column("study", "text", "Short name of the study, from its protocol.")
 PARTICIPANT = Column("participant", "text", "The participant's id: letters and digits, not a name.")
@@ -22,7 +22,7 @@ PHASE = Column(
         ("baseline", "the undisturbed task to which later statements refer"),
     ),
 )
-PART = Column("part", "integer", "Part of the study, as shown to the participant.", minimum=1, may_miss=True)
+PART = optional("part", "integer", "Part of the study, as shown to the participant.", minimum=1)
 INDEX = Column("index", "integer", "Position of the trial in its block, from 1.", minimum=1)
 CODE = Column("code", "text", "What was presented, as a code (L1, D3 ...) that the sealed key translates.")
 

@@ -5,64 +5,46 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from study_app.store.tables.column import Column
+from study_app.store.tables.column import Column, optional
 from study_app.store.tables.columns import INTERVALS
 
 _BY_NAME: Final = {column.name: column for column in INTERVALS}
 
 OF_TRACKS: Final[tuple[Column, ...]] = (
-    Column(
-        "analysed",
-        "flag",
-        "true where the row counts and does not present the modulus of a magnitude estimation.",
-    ),
+    Column("analysed", "flag", "true where the row counts and does not present the modulus of a magnitude estimation."),
     Column("track", "text", "What the code stands for: standard and number of the track (8/1), or the condition."),
     Column("slot", "integer", "Position of the trial among those of its code in the session, from 1.", minimum=1),
     _BY_NAME["catch"],
     _BY_NAME["standard"],
     replace(_BY_NAME["level"], name="level_asked"),
-    Column(
+    optional(
         "level_delivered",
         "number",
         "The level at which the hand met the comparison: from the delivered values, and for a visual delay from the "
         "mean errors of the frames; n/a where it was not measured.",
-        may_miss=True,
     ),
-    Column(
+    optional(
         "comparison",
         "number",
         "The comparison at this level, in the unit of the varied number; n/a where conditions are compared.",
-        may_miss=True,
     ),
-    Column(
+    optional(
         "arrangement",
         "text",
         "What the intervals presented, in order: S the standard, C the comparison; n/a if none was presented.",
-        may_miss=True,
     ),
-    Column(
+    optional(
         "comparison_interval",
         "integer",
         "The interval that alone presented the comparison, from 1; n/a where there is none.",
         minimum=1,
-        may_miss=True,
     ),
-    Column("response", "text", "The answer; n/a without one.", may_miss=True),
-    Column("value", "number", "The answer as a number, where it is one.", may_miss=True),
-    Column("right", "flag", "true if the answer was correct; n/a where no answer is.", may_miss=True),
-    Column(
-        "response_s",
-        "number",
-        "Time from the question to the first choice of an answer.",
-        "s",
-        minimum=0,
-        may_miss=True,
-    ),
-    Column(
-        "reversal",
-        "flag",
-        "true if the up–down track changed its direction here; n/a where the method has no steps.",
-        may_miss=True,
+    optional("response", "text", "The answer; n/a without one."),
+    optional("value", "number", "The answer as a number, where it is one."),
+    optional("right", "flag", "true if the answer was correct; n/a where no answer is."),
+    optional("response_s", "number", "Time from the question to the first choice of an answer.", "s", minimum=0),
+    optional(
+        "reversal", "flag", "true if the up–down track changed its direction here; n/a where the method has no steps."
     ),
     replace(
         _BY_NAME["setting"],
@@ -73,90 +55,74 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
 
 SETTINGS: Final[tuple[Column, ...]] = (
     Column("block", "text", "Id of the block."),
-    Column(
-        "standard", "number", "The standard, in the unit of the varied number; n/a where there is none.", may_miss=True
-    ),
+    optional("standard", "number", "The standard, in the unit of the varied number; n/a where there is none."),
     Column("n", "integer", "Settings that count.", minimum=0),
     Column("pse", "number", "Point of subjective equality, a level: the mean of the settings in u."),
-    Column("low", "number", "Lower end of the 95 % interval of the PSE (Student's t).", may_miss=True),
-    Column("high", "number", "Upper end of the 95 % interval of the PSE (Student's t).", may_miss=True),
-    Column(
+    optional("low", "number", "Lower end of the 95 % interval of the PSE (Student's t)."),
+    optional("high", "number", "Upper end of the 95 % interval of the PSE (Student's t)."),
+    optional(
         "jnd",
         "number",
         "Just-noticeable difference: the standard deviation of the settings, in u (decades where levels are spaced by "
         "their logarithm, else in the unit of the levels).",
         minimum=0,
-        may_miss=True,
     ),
-    Column("constant_error", "number", "PSE minus standard, in u; n/a where no standard was presented.", may_miss=True),
-    Column(
-        "hysteresis",
-        "number",
-        "Mean of the settings that started high minus mean of those that started low, in u.",
-        may_miss=True,
+    optional("constant_error", "number", "PSE minus standard, in u; n/a where no standard was presented."),
+    optional(
+        "hysteresis", "number", "Mean of the settings that started high minus mean of those that started low, in u."
     ),
 )
 """Of one row per participant and standard of a block whose levels participants set."""
 
 THRESHOLDS: Final[tuple[Column, ...]] = (
     Column("block", "text", "Id of the block."),
-    Column(
-        "standard", "number", "The standard, in the unit of the varied number; n/a where there is none.", may_miss=True
-    ),
-    Column("condition", "text", "The condition that was compared; n/a in a block of levels.", may_miss=True),
+    optional("standard", "number", "The standard, in the unit of the varied number; n/a where there is none."),
+    optional("condition", "text", "The condition that was compared; n/a in a block of levels."),
     Column("n", "integer", "Answers that count.", minimum=0),
-    Column(
+    optional(
         "threshold",
         "number",
         "Level at which the psychometric function is half-way between guesses and lapses: posterior median, in the "
         "unit of the stimulus' levels; n/a where the answers enter no such function.",
-        may_miss=True,
     ),
-    Column("low", "number", "Lower end of the threshold's equal-tailed 95 % interval.", may_miss=True),
-    Column("high", "number", "Upper end of the threshold's equal-tailed 95 % interval.", may_miss=True),
-    Column(
+    optional("low", "number", "Lower end of the threshold's equal-tailed 95 % interval."),
+    optional("high", "number", "Upper end of the threshold's equal-tailed 95 % interval."),
+    optional(
         "beyond",
         "text",
         "Whether the threshold lies beyond the levels that were presented; n/a: between them.",
         levels=(("above", "above the highest"), ("below", "below the lowest")),
-        may_miss=True,
     ),
-    Column(
+    optional(
         "width",
         "number",
         "Posterior median of the function's width, from 5 to 95 % of its rise: in decades where levels are spaced by "
         "their logarithm, else in the unit of the levels.",
         minimum=0,
-        may_miss=True,
     ),
-    Column("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1, may_miss=True),
-    Column(
+    optional("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1),
+    optional(
         "weber_exponent",
         "number",
         "Slope of ln JND on ln standard over the participant's standards: the same in each of these rows; n/a with "
         "fewer than two standards.",
-        may_miss=True,
     ),
-    Column("flat_width_threshold", "number", "The threshold under a flat prior on the width.", may_miss=True),
-    Column(
+    optional("flat_width_threshold", "number", "The threshold under a flat prior on the width."),
+    optional(
         "reversal_mean",
         "number",
         "Mean of the last reversals of the up–down tracks; n/a for other methods and with too few.",
-        may_miss=True,
     ),
-    Column(
+    optional(
         "target_percent",
         "number",
         "Percentage of successes to which the rule of the up–down tracks converges.",
         "%",
         minimum=0,
         maximum=100,
-        may_miss=True,
     ),
-    Column(
-        "d_prime", "number", "Sensitivity over all levels presented; n/a where no answer is correct.", may_miss=True
-    ),
-    Column(
+    optional("d_prime", "number", "Sensitivity over all levels presented; n/a where no answer is correct."),
+    optional(
         "d_prime_model",
         "text",
         "The model of d_prime, where the design has two.",
@@ -164,38 +130,23 @@ THRESHOLDS: Final[tuple[Column, ...]] = (
             ("differencing", "intervals are compared with each other"),
             ("independent", "each interval is compared with known alternatives"),
         ),
-        may_miss=True,
     ),
-    Column("d_prime_other", "number", "Sensitivity under the other model.", may_miss=True),
-    Column(
+    optional("d_prime_other", "number", "Sensitivity under the other model."),
+    optional(
         "criterion",
         "number",
         "c of yes–no and of two-interval forced choice, k of the differencing model of same–different.",
-        may_miss=True,
     ),
-    Column(
-        "share_first",
-        "number",
-        "Share of the first of the answers, such as “first” or “yes”.",
-        minimum=0,
-        maximum=1,
-        may_miss=True,
+    optional(
+        "share_first", "number", "Share of the first of the answers, such as “first” or “yes”.", minimum=0, maximum=1
     ),
-    Column(
+    optional(
         "fit_p",
         "number",
         "p of the function's deviance among simulated sets of answers; below 0.05 the function does not fit.",
         minimum=0,
         maximum=1,
-        may_miss=True,
     ),
-    Column(
-        "drift",
-        "number",
-        "Correlation of trial number and deviance residual.",
-        minimum=-1,
-        maximum=1,
-        may_miss=True,
-    ),
+    optional("drift", "number", "Correlation of trial number and deviance residual.", minimum=-1, maximum=1),
 )
 """Of one row per participant and standard, or compared condition."""
