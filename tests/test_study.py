@@ -238,7 +238,7 @@ def test_a_finished_folder_names_no_condition_liquid_parameter_or_delay(tmp_path
 KILLED = """
 import sys
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 
 kept = SessionStore.append
 

@@ -14,23 +14,6 @@ from study_app.protocol.questions.number import NumberView
 from study_app.protocol.questions.question import ItemView
 from study_app.protocol.trials.task import AnyTask
 
-__all__ = [
-    "ChoicePage",
-    "DesignPage",
-    "EndPage",
-    "FeedbackPage",
-    "Interval",
-    "ItemView",
-    "NumberPage",
-    "Page",
-    "PausePage",
-    "Progress",
-    "QuestionnairePage",
-    "TaskPage",
-    "TextPage",
-    "TroublePage",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Progress:

@@ -11,7 +11,7 @@ import shutil
 import stat
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO
@@ -35,16 +35,23 @@ def write_file(path: Path, content: bytes, *, waits: bool = True, changed_ns: in
     StoreError
         The file cannot be written; names the file and the system's reason.
     """
-    half = temporary_path(path)
-    try:
+    with _passing_file(path, path) as half:
         write_through(half, content, waits=waits)
         if changed_ns is not None:
             os.utime(half, ns=(changed_ns, changed_ns))
         half.replace(path)
         if waits:
             sync_folder(path.parent)
+
+
+@contextlib.contextmanager
+def _passing_file(path: Path, written: Path) -> Iterator[Path]:
+    """Yield a temporary name next to ``path`` and remove its file at the end; errors say that ``written`` failed."""
+    half = temporary_path(path)
+    try:
+        yield half
     except OSError as error:
-        raise cannot_write(path, error) from error
+        raise cannot_write(written, error) from error
     finally:
         with contextlib.suppress(OSError):
             half.unlink(missing_ok=True)
@@ -222,15 +229,9 @@ def probe(folder: Path) -> int:
         Nothing can be written there.
     """
     place = next(path for path in (folder, *folder.absolute().parents) if is_there(path))
-    path = temporary_path(place / "probe")
-    try:
+    with _passing_file(place / "probe", folder) as path:
         write_through(path, b"probe\n")
         return shutil.disk_usage(place).free
-    except OSError as error:
-        raise cannot_write(folder, error) from error
-    finally:
-        with contextlib.suppress(OSError):
-            path.unlink(missing_ok=True)
 
 
 def disk_time_ns(folder: Path) -> int:
@@ -241,15 +242,9 @@ def disk_time_ns(folder: Path) -> int:
     StoreError
         Nothing can be written there.
     """
-    path = temporary_path(folder / "time")
-    try:
+    with _passing_file(folder / "time", folder) as path:
         path.touch(exist_ok=False)
         return path.stat().st_mtime_ns
-    except OSError as error:
-        raise cannot_write(folder, error) from error
-    finally:
-        with contextlib.suppress(OSError):
-            path.unlink(missing_ok=True)
 
 
 def sync_folder(path: Path) -> None:

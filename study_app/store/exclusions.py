@@ -81,15 +81,12 @@ def exclude(
     _check_there(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
     new = Exclusion(participant, session, trial, by.strip(), reason.strip(), at)
-    opening = open_alone(folder)
-    try:
+    with open_alone(folder):
         rows = exclusions(folder)
         for row in rows:
             if row.what in (new.what, (participant, session, None)):
                 raise StoreError(f"{named(new)} is already excluded, since {row.excluded_at} ({row.reason})")
         write_file(study.exclusions, exclusion_bytes((*rows, new)))
-    finally:
-        opening.release()
     return new
 
 
@@ -114,8 +111,7 @@ def include(
     """
     _refuse_empty(by, reason, "reversing an exclusion needs a name and a reason")
     study = StudyFolder(folder)
-    opening = open_alone(folder)
-    try:
+    with open_alone(folder):
         rows = exclusions(folder)
         taken = next((row for row in rows if row.what == (participant, session, trial)), None)
         if taken is None:
@@ -126,8 +122,6 @@ def include(
         record = {"at": at, "by": by.strip(), "reason": reason.strip(), "exclusion": asdict(taken)}
         append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
         write_file(study.exclusions, exclusion_bytes(tuple(row for row in rows if row is not taken)))
-    finally:
-        opening.release()
     return taken
 
 

@@ -20,7 +20,7 @@ from study_app.session import start
 from study_app.session.pages import TaskPage
 from study_app.store import receipt
 from study_app.store.folders import StudyFolder
-from study_app.store.verification.leaks import Telltales, leaks, telltales
+from study_app.store.verification.leaks import Telltales, find_leaks, telltales
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.windows import Person, traces_of, words_of
@@ -110,7 +110,7 @@ def test_nothing_seen_written_or_logged_tells_a_condition(
         shown = Telltales(word for word in words.words if not word[0].isdigit() or len(word) > 5)
     for text in (*said, *told, *logged):
         assert shown.in_text(text) == [], text
-    assert leaks(results, protocol) == []
+    assert find_leaks(results, telltales(protocol)) == []
     assert set(forces) == {HiddenForceCard if blinding == "double" else ForceCard}
     assert [receipt.read(one.receipt)["protocol"]["study"]["blinding"] for one in StudyFolder(results).sessions()] == [
         blinding

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from study_app.protocol.questions.question import ItemView
 from study_app.protocol.trials.task import AnyTask
 from study_app.protocol.trials.tasks.explore import Explore
 from study_app.protocol.trials.tasks.follow import Follow
 from study_app.protocol.trials.tasks.reach import Reach
-from study_app.session.pages import ItemView, Progress, QuestionnairePage, TaskPage, TextPage
+from study_app.session.pages import Progress, QuestionnairePage, TaskPage, TextPage
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
 

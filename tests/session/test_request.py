@@ -11,7 +11,8 @@ from study_app.app.session import entry
 from study_app.errors import StoreError
 from study_app.protocol.load import load, source_bytes
 from study_app.session.request import NewSession, resumed
-from study_app.store.sessions.begin import SessionStart, SessionStore, begin
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.open_session import SessionStore
 
 
 @pytest.fixture

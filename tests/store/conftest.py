@@ -16,7 +16,8 @@ from study_app.haptics.model.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.clock import SessionClock
-from study_app.store.sessions.begin import SessionStart, SessionStore, begin
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.open_session import SessionStore
 
 SEVEN = ("Completely disagree", "Mostly", "Somewhat", "Neutral", "Somewhat agree", "Mostly agree", "Completely agree")
 

@@ -16,8 +16,8 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include
-from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.folder_lock import is_open
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 
 pytestmark = pytest.mark.slow

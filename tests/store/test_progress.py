@@ -11,7 +11,7 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.store.progress import Given, Progress, progress, progress_of
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 
 
 def lines_of(*events: dict[str, Any]) -> list[dict[str, Any]]:

@@ -17,9 +17,10 @@ from study_app.devices.simulated.hand_commands import HandOrders
 from study_app.protocol.forms.show_if import Value, shown
 from study_app.protocol.forms.simulated_observer import Felt, Rater, judgements
 from study_app.protocol.model import Explore, Follow, Reach
+from study_app.protocol.questions.question import ItemView
 from study_app.protocol.trials.task import AnyTask
 from study_app.psychophysics.delivery import lag
-from study_app.session.pages import DesignPage, ItemView, QuestionnairePage, TextPage
+from study_app.session.pages import DesignPage, QuestionnairePage, TextPage
 from study_app.session.simulated.exploration import exploration
 from study_app.session.trial import TankView
 from study_app.store.tables.delivered import LONGEST_S

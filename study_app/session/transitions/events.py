@@ -14,178 +14,156 @@ from study_app.session.transitions.commands import Command
 
 
 @dataclass(frozen=True, slots=True)
-class Begin:
+class _Timed:
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Begin(_Timed):
     """Everything is open; show the first page."""
 
-    at_s: float
-
 
 @dataclass(frozen=True, slots=True)
-class Continue:
+class Continue(_Timed):
     """The participant goes on from a text page, or ends an exploration after its least time."""
 
-    at_s: float
-
 
 @dataclass(frozen=True, slots=True)
-class LanguageChosen:
+class LanguageChosen(_Timed):
     """The participant wants to read in another of the study's languages; possible until a consent is given."""
 
-    at_s: float
     language: str
 
 
 @dataclass(frozen=True, slots=True)
-class TaskDone:
+class TaskDone(_Timed):
     """The task of the running trial is over; ``summary`` is what its row records (see ``store.tables.columns``).
 
     ``invalid`` names the limits that an interval breaks, so that it was not delivered as requested.
     """
 
-    at_s: float
     outcome: Literal["complete", "timeout"]
     summary: dict[str, Any]
     invalid: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class ItemShown:
+class ItemShown(_Timed):
     """A statement became visible to the participant."""
 
-    at_s: float
     item: str
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen:
+class Chosen(_Timed):
     """The participant answered ``item`` with ``value``, None for "cannot judge"; may come again."""
 
-    at_s: float
     item: str
     value: Value
 
 
 @dataclass(frozen=True, slots=True)
-class Retracted:
+class Retracted(_Timed):
     """The participant took the answer to ``item`` back: an entry was emptied."""
 
-    at_s: float
     item: str
 
 
 @dataclass(frozen=True, slots=True)
-class Stepped:
+class Stepped(_Timed):
     """The participant wants more of what an adjustment sets by some steps, or less where ``steps`` is below 0."""
 
-    at_s: float
     steps: int
 
 
 @dataclass(frozen=True, slots=True)
-class Submitted:
+class Submitted(_Timed):
     """The participant confirms the questionnaire, or a setting."""
 
-    at_s: float
-
 
 @dataclass(frozen=True, slots=True)
-class TimeUp:
+class TimeUp(_Timed):
     """A rest between two intervals, or a feedback, has lasted long enough; only the clock says so."""
 
-    at_s: float
-
 
 @dataclass(frozen=True, slots=True)
-class PauseAsked:
+class PauseAsked(_Timed):
     """Esc, the operator's pause, or the program's when it is ended from outside or stood still."""
 
-    at_s: float
     by: Literal["participant", "operator", "program"]
 
 
 @dataclass(frozen=True, slots=True)
-class ResumeAsked:
+class ResumeAsked(_Timed):
     """Go on from the pause; a trial under way starts again. What the operator stopped is the operator's to resume."""
 
-    at_s: float
     by: Literal["participant", "operator"]
 
 
 @dataclass(frozen=True, slots=True)
-class ForceStopped:
+class ForceStopped(_Timed):
     """The force was switched off (the servo already sends zero); the session pauses."""
 
-    at_s: float
     by: Literal["participant", "operator", "device", "program"]
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
+class Note(_Timed):
     """The operator's note, or a mark (empty text allowed) at a moment."""
 
-    at_s: float
     kind: Literal["note", "mark"]
     text: str
 
 
 @dataclass(frozen=True, slots=True)
-class RepeatAsked:
+class RepeatAsked(_Timed):
     """The operator wants the running trial again, with a reason."""
 
-    at_s: float
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
-class EndAsked:
+class EndAsked(_Timed):
     """The operator ends the session early, or the participant does not consent."""
 
-    at_s: float
     status: Literal["withdrawn", "aborted"]
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
-class Broke:
+class Broke(_Timed):
     """Device, servo or program failed; ``what`` is for the operator and the journal, not for the participant.
 
     After a failure ``by`` the device (or its servo) the session can go on, see `Reconnected`.
     """
 
-    at_s: float
     what: str
     by: Literal["device", "program"] = "program"
 
 
 @dataclass(frozen=True, slots=True)
-class Reconnected:
+class Reconnected(_Timed):
     """The device that failed is open and homed again, its servo runs at zero force; the journal keeps ``described``."""
 
-    at_s: float
     described: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class WriteFailed:
+class WriteFailed(_Timed):
     """The disk did not take a command, for a reason; it and those after it, of moment ``at_s``, are ``left``."""
 
-    at_s: float
     reason: str
     left: tuple[Command, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class WriteRetried:
+class WriteRetried(_Timed):
     """What the disk did not take is tried again."""
-
-    at_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class WriteCompleted:
+class WriteCompleted(_Timed):
     """The disk took all that was left."""
-
-    at_s: float
 
 
 Event: TypeAlias = (

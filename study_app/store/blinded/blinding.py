@@ -191,12 +191,6 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
     return key.codes
 
 
-def revealed(folder: Path) -> Codes | None:
-    """Return block → code → condition id if the key was revealed, else None."""
-    key = revealed_key(folder)
-    return None if key is None else key.codes
-
-
 def revealed_key(folder: Path) -> Key | None:
     """Return the key with the conditions' tables if it was revealed, else None.
 

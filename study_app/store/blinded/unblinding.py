@@ -85,11 +85,8 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
     lines = journal.read(session.journal)
     if not lines or not lines[0].get("measures_sealed"):
         return []
-    opening = open_alone(session.path)
-    try:
+    with open_alone(session.path):
         return list(_rewrite(Place(study, session, lines[0]["study"]), lines, key))
-    finally:
-        opening.release()
 
 
 def _rewrite(place: Place, lines: list[Line], key: Key) -> list[str]:

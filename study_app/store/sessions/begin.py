@@ -34,8 +34,6 @@ from study_app.store.sessions.unstarted_sessions import sweep_claims, take_over
 from study_app.store.tables.participants import write_participants
 from study_app.store.tables.study_description import check_study, write_description
 
-__all__ = ["Place", "SessionStart", "SessionStore", "begin"]
-
 
 @dataclass(frozen=True, slots=True)
 class SessionStart:

@@ -16,7 +16,7 @@ import secrets
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import psutil
 
@@ -30,9 +30,15 @@ SAME_S = 0.05  # processes of one number that began within this are the same one
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """A folder that this program has open until ``release``."""
+    """A folder that this program has open until ``release``, or the end of a ``with`` block."""
 
     marker: Path
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
 
     def release(self) -> None:
         """Let other programs have it; a marker that cannot be taken away means nothing once this program has ended."""

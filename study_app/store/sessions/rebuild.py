@@ -48,8 +48,7 @@ def rebuild(session_folder: Path) -> Rebuilt:
         session's other files; or a file cannot be written.
     """
     study_folder, folder = locate(session_folder)
-    opening = open_alone(folder.path)
-    try:
+    with open_alone(folder.path):
         contents = journal.whole(folder.journal)
         place = Place(study_folder, folder, progress_of(contents.lines).start["study"])
         refuse_if_cut(place, contents.lines)
@@ -65,8 +64,6 @@ def rebuild(session_folder: Path) -> Rebuilt:
         if ended:
             rewritten += _renew_proof(place, contents.lines, rewritten)
         return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
-    finally:
-        opening.release()
 
 
 def _renew(path: Path, content: bytes) -> bool:

@@ -110,17 +110,6 @@ def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = 
     return Telltales(word for word in words if not Telltales([word]).in_text(known))
 
 
-def leaks(folder: Path, protocol: Protocol) -> list[Leak]:
-    """Return where in a study folder, or one like it, a condition of ``protocol`` is revealed.
-
-    Raises
-    ------
-    StoreError
-        A file cannot be read.
-    """
-    return find_leaks(folder, telltales(protocol))
-
-
 def find_leaks(folder: Path, words: Telltales) -> list[Leak]:
     """Return where in ``folder`` one of ``words`` stands: in a name or in a text, statements and recordings aside.
 

@@ -16,7 +16,8 @@ import numpy as np
 from study_app.haptics.model.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.store.sessions.begin import SessionStart, SessionStore, begin
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.verification.verify_study import verify
 

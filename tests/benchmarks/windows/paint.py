@@ -21,9 +21,10 @@ from study_app.gui.participant.tank_widget import TankWidget
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
+from study_app.protocol.questions.question import ItemView
 from study_app.protocol.trials.tasks.reach import Reach
 from study_app.protocol.wording.languages import words
-from study_app.session.pages import ItemView, Page, PausePage, Progress, QuestionnairePage, TaskPage, TextPage
+from study_app.session.pages import Page, PausePage, Progress, QuestionnairePage, TaskPage, TextPage
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
 

@@ -21,13 +21,12 @@ from study_app.store.blinded.blinding import (
     check_conditions,
     open_or_draw_key,
     reveal,
-    revealed,
     revealed_key,
     reveals,
     unreadable_reveals,
 )
 from study_app.store.blinded.unblinding import unblind
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 
 
@@ -268,10 +267,9 @@ def test_a_reveal_is_recorded_before_it_tells(start: Callable[..., SessionStore]
     store = start("P001")
     store.finish("completed")
     folder = tmp_path / "study"
-    assert revealed(folder) is None
     assert revealed_key(folder) is None
     codes = reveal(folder, " Dr. Ørsted ", 'end of data, "n = 1"\n')
-    assert codes == store.key.codes == revealed(folder)
+    assert codes == store.key.codes
     assert revealed_key(folder) == store.key
     reveal(folder, "CD", "again")
     first, second = reveals(folder)
@@ -300,7 +298,7 @@ def test_a_reveal_that_cannot_be_recorded_tells_nothing(start: Callable[..., Ses
 def test_a_torn_reveal_reveals_nothing(tmp_path: Path, protocol: Protocol) -> None:
     open_or_draw_key(tmp_path, protocol)
     (tmp_path / "blinding" / "reveals.jsonl").write_bytes(b'{"at": "2026-0')
-    assert revealed(tmp_path) is None
+    assert revealed_key(tmp_path) is None
 
 
 @pytest.mark.parametrize("line", [b"5", b"null", b'"by AB"', b"[1]", b"xat: 2026"])
@@ -311,7 +309,7 @@ def test_a_line_that_is_no_reveal_is_told_and_the_others_count(
     folder = tmp_path / "study"
     path = folder / "blinding" / "reveals.jsonl"
     path.write_bytes(line + b"\n")
-    assert revealed(folder) is None
+    assert revealed_key(folder) is None
     unblind(folder, "AB", "done")
     assert unreadable_reveals(folder) == ((1, False),)
     assert [one["by"] for one in reveals(folder)] == ["AB"]

@@ -22,7 +22,7 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.checksums import replace_checksums
 from study_app.store.folders import REBUILT, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import reopen
 from study_app.store.tables.column import header, unsealed

@@ -12,7 +12,7 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.journals.journal import scan
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.verify_study import verify

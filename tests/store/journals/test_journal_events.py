@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from study_app.store.journals.journal_events import EVENTS, problem, unknown_events
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 
 OF_ALL = {"n": 1, "t_s": 0.0, "at": "2026-03-01T10:00:00.000+01:00"}
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from study_app.protocol.model import Protocol
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.reopen import reopen
 from tests.store.conftest import SOURCE
 

@@ -19,7 +19,7 @@ from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.atomic import sync_folder
 from study_app.store.journals import journal
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from tests.store.conftest import FullDisk
 from tests.store.sessions.conftest import every_byte
 

@@ -20,8 +20,8 @@ from study_app.store import receipt
 from study_app.store.checksums import read_checksums
 from study_app.store.journals import journal
 from study_app.store.recording_files import read_facts
-from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.folder_lock import is_open
+from study_app.store.sessions.open_session import SessionStore
 from tests.store.conftest import FullDisk
 
 

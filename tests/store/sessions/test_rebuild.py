@@ -9,9 +9,8 @@ import pytest
 from study_app.errors import StoreError
 from study_app.store import receipt
 from study_app.store.journals import journal
-from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.folder_lock import is_open
-from study_app.store.sessions.open_session import Place, table_files
+from study_app.store.sessions.open_session import Place, SessionStore, table_files
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.verification.integrity import doubts
 from study_app.store.verification.verify_study import verify

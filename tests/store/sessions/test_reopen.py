@@ -23,8 +23,8 @@ from study_app.store.journals import journal
 from study_app.store.recorder import event_of, recording_files
 from study_app.store.recording_files import read_samples
 from study_app.store.recording_writer import write_frames
-from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.folder_lock import is_open
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import FullDisk, choose
 from tests.store.sessions.conftest import Again

@@ -14,7 +14,7 @@ import pytest
 from study_app.protocol.load import load, source_bytes
 from study_app.store.journals import journal
 from study_app.store.recording_files import read_samples
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import reopen
 from study_app.store.verification.verify_study import verify

@@ -11,8 +11,8 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
-from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.folder_lock import is_open
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.reopen import check_can_go_on
 from tests.store.conftest import SOURCE
 from tests.store.sessions.conftest import Again, every_byte

@@ -13,8 +13,7 @@ import pytest
 from study_app.store import atomic
 from study_app.store.blinded.blinding import reveal
 from study_app.store.journals.cut_journal import refuse_if_cut
-from study_app.store.sessions.begin import SessionStore
-from study_app.store.sessions.open_session import table_files
+from study_app.store.sessions.open_session import SessionStore, table_files
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.verification.verify_study import verify
 

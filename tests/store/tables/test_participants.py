@@ -14,7 +14,7 @@ import pytest
 from study_app.errors import StoreError
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.tables import participants
 from study_app.store.verification.verify_study import verify

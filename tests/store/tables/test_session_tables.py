@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.store.journals.journal import read
 from study_app.store.progress import progress_of
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.cells import cell_pattern
 from study_app.store.tables.column import MISSING, Column, header, unsealed
 from study_app.store.tables.columns import RESPONSES, TABLES, TRIALS

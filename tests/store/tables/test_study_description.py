@@ -11,7 +11,7 @@ from study_app.protocol.model import Protocol
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.study_description import check_study, described_study, description_bytes, write_description
 from study_app.store.verification.psychds import validate
 

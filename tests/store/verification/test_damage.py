@@ -19,7 +19,7 @@ from study_app.protocol.model import Protocol
 from study_app.store.blinded import blinding
 from study_app.store.exclusions import exclude
 from study_app.store.journals.journal import scan
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.reproduction import reproduced

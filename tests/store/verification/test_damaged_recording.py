@@ -13,7 +13,7 @@ import pytest
 
 from study_app.errors import StudyError
 from study_app.store import recording_files
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 
 pytestmark = pytest.mark.slow

@@ -20,7 +20,7 @@ from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.blinded.sealing import opened, sealed
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.fingerprints import listed

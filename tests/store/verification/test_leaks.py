@@ -13,13 +13,13 @@ from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.sessions.begin import SessionStore
-from study_app.store.verification.leaks import Telltales, certain_telltales, leaks, presented_numbers, telltales
+from study_app.store.sessions.open_session import SessionStore
+from study_app.store.verification.leaks import Telltales, certain_telltales, find_leaks, presented_numbers, telltales
 from tests.protocol.trials.studies import study as levels_study
 
 
 def found(folder: Path, protocol: Protocol) -> list[tuple[str, str]]:
-    return [(leak.place, leak.word) for leak in leaks(folder, protocol)]
+    return [(leak.place, leak.word) for leak in find_leaks(folder, telltales(protocol))]
 
 
 def test_the_words_to_look_for_are_the_conditions(protocol: Protocol) -> None:
@@ -83,7 +83,7 @@ def test_the_moment_of_an_event_may_be_any_number(
 
 def test_a_leak_does_not_show_its_word_by_itself(tmp_path: Path, protocol: Protocol) -> None:
     (tmp_path / "notes.txt").write_text("mildew")
-    assert "mildew" not in repr(leaks(tmp_path, protocol))
+    assert "mildew" not in repr(find_leaks(tmp_path, telltales(protocol)))
 
 
 def test_statements_may_name_what_they_ask(

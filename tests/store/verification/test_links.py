@@ -17,7 +17,7 @@ from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.journals import journal
 from study_app.store.output_files import write_files
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 
 OWN = ("journal.jsonl", "receipt.json", "key.sealed")

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.unstarted_sessions import never_begun
 from study_app.store.tables.participants import write_participants

@@ -15,7 +15,8 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.sessions.begin import SessionStart, SessionStore, begin
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 from tests.faults.support import short
 from tests.platforms import needs_fork

@@ -13,7 +13,7 @@ from study_app.store.blinded import blinding
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.columns import TABLES
 from study_app.store.tables.csv_files import csv_bytes, read_table
 from study_app.store.verification.verify_study import verify

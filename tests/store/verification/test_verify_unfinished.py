@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from study_app.store.journals import journal
-from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 from tests.store.forging import forge
 from tests.store.verification.findings import PARTICIPANTS, SESSION, replace, told, warned

@@ -16,7 +16,8 @@ from study_app.gui.participant.pages.progress_line import ProgressLine
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.protocol.forms.show_if import shown
-from study_app.session.pages import ItemView, QuestionnairePage
+from study_app.protocol.questions.question import ItemView
+from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import Chosen, ItemShown, Retracted, Submitted
 
 if TYPE_CHECKING:

@@ -16,8 +16,9 @@ from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.pages.questionnaire_grid import LEAST_CELL, POINTS, Asked, grid, parts
 from study_app.gui.participant.pages.statement_field import WRAP_LEFT, StatementField
 from study_app.gui.theme.theme import font
+from study_app.protocol.questions.question import ItemView
 from study_app.protocol.wording.languages import words
-from study_app.session.pages import ItemView, QuestionnairePage
+from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
 from tests.gui.small import LABELS, ManualClock, questionnaire
 
