@@ -192,6 +192,7 @@ class MainController(QObject):
         self.designer.saving.saved.connect(self._show_saved)
         self.designer.playing.kept.connect(self._show_saved)
         self.designer.feeling.asked.connect(self._feel)
+        self.designer.editing.opened_other.connect(self._forget_study)
         self.designer.feeling.returned.connect(lambda: self.window.go("designer"))
         return self.designer.place
 
@@ -234,6 +235,11 @@ class MainController(QObject):
         if self.lab is not None and self._for_lab is not None:
             self.lab.feel_of_study(self._for_lab.a, self._for_lab.b, self._for_lab.study)
             self._for_lab = None
+
+    def _forget_study(self) -> None:
+        """Let the lab offer no more to put its liquids back: another study is open in the designer."""
+        if self.lab is not None:
+            self.lab.study = ""
 
     def _put_back(self, side: Side, setting: Setting) -> None:
         """Put a liquid back into the study that is edited, and go there."""

@@ -7,6 +7,7 @@ keeps the other's draft as a version before it writes its own.
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -55,6 +56,7 @@ class Keeper:
         self._file = file
         self._own: str | None = None
         self._pending: Draft | None = None
+        self._obsolete = False
         self._due_s = 0.0
 
     def take(self, draft: Draft) -> None:
@@ -68,14 +70,14 @@ class Keeper:
         self._pending = Draft(text, self.base, selected)
 
     def write_if_due(self, now_s: float) -> bool:
-        """Write the draft if it is due; return whether it was written.
+        """Write the draft if it is due, or delete one that could not be deleted; return whether it was written.
 
         Raises
         ------
         StoreError
-            It cannot be written; it stays due.
+            It cannot be written or deleted; it stays due.
         """
-        return self._pending is not None and now_s >= self._due_s and self.write()
+        return (self._pending is None or now_s >= self._due_s) and self.write()
 
     def write(self) -> bool:
         """Write what is pending at once, as on leaving the place; return whether there was something.
@@ -83,31 +85,34 @@ class Keeper:
         Raises
         ------
         StoreError
-            It cannot be written; it stays due.
+            It cannot be written or deleted; it stays due.
         """
         if self._pending is None:
+            if self._obsolete:
+                self._delete()
             return False
         other = draft_of(self._file)
         if other is not None and other.text not in {self._own, self._pending.text}:
             keep_version(self._file, other.text.encode(), "draft")
             self.others += 1
         keep(self._file, self._pending)
-        self._own, self._pending = self._pending.text, None
+        self._own, self._pending, self._obsolete = self._pending.text, None, False
         return True
 
     def saved(self, base: str) -> None:
-        """Forget the draft: the file holds it. The draft of another program stays.
+        """Forget the draft: the file holds it. One that cannot be deleted stays due; `write` says why.
 
-        Raises
-        ------
-        StoreError
-            It cannot be deleted.
+        The draft of another program stays.
         """
-        self.base, self._pending = base, None
+        self.base, self._pending, self._obsolete = base, None, True
+        with suppress(StoreError):
+            self._delete()
+
+    def _delete(self) -> None:
         other = draft_of(self._file)
         if other is None or other.text == self._own:
             discard(self._file)
-        self._own = None
+        self._own, self._obsolete = None, False
 
 
 def keep(file: Path, draft: Draft) -> None:

@@ -15,6 +15,7 @@ from study_app.app.designer.open_study import OpenStudy
 from study_app.app.designer.steps import Steps
 from study_app.app.designer.studies import there
 from study_app.authoring.history import History
+from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path as Place
@@ -48,7 +49,7 @@ class Editing(QObject):
         self.results = results
         self.opened: OpenStudy | None = None
         self._steps = Steps()
-        self._last: tuple[object, float] = (None, 0.0)
+        self._last: tuple[object, float, Study | None] = (None, 0.0, None)
         self._back: list[Place] = []
         self._made: Step | None = None
 
@@ -65,7 +66,7 @@ class Editing(QObject):
     def open(self, opened: OpenStudy) -> None:
         """Take another study from now on."""
         self.opened = opened
-        self._steps, self._last, self._back = Steps(), (None, 0.0), []
+        self._steps, self._last, self._back = Steps(), (None, 0.0, None), []
         self.opened_other.emit()
 
     # selection
@@ -78,7 +79,7 @@ class Editing(QObject):
         if not back:
             self._back.append(opened.history.selected)
         self._steps.leave()
-        self._last = (None, 0.0)
+        self._last = (None, 0.0, None)
         opened.history = replace(opened.history, selected=path)
         self.keep_selection()
         self.changed.emit()
@@ -125,14 +126,15 @@ class Editing(QObject):
         self._made = step
 
     def _joins(self, key: object) -> bool:
-        """Return whether an edit continues the last step."""
-        before, then = self._last
-        return key is not None and key == before and time.monotonic() - then < JOIN_S
+        """Return whether an edit continues the last step: of the same key, made here, not long ago."""
+        before, then, study = self._last
+        same = self.opened is not None and self.opened.study is study
+        return key is not None and key == before and same and time.monotonic() - then < JOIN_S
 
     def _take(self, opened: OpenStudy, history: History, key: object = None) -> None:
         """Take the history after a step, which edits of the same key may continue; an edit without effect is none."""
         if history.study is not opened.history.study:
-            self._last = (key, time.monotonic())
+            self._last = (key, time.monotonic(), history.study)
         opened.history = history
 
     def make(self, words: str, *edits: Edit, select: Place | None = None) -> None:

@@ -74,9 +74,12 @@ class Feeling(QObject):
 
     def put_back(self, side: Side, setting: Setting) -> None:
         """Give the liquid of a side the values of a setting, as one step."""
-        opened, before = self.editing.writable, self._sides.get(side)
+        opened, before = self.editing.opened, self._sides.get(side)
         if opened is None or before is None or opened.file != self._file:
             self.place.message.emit("It was not put back", "Another study is open in the designer now.")
+            return
+        if opened.read_only:
+            self.place.message.emit("It was not put back", opened.read_only)
             return
         path: Path = ("liquids", before.id)
         document = opened.study.document

@@ -86,7 +86,7 @@ class OpenStudy:
         Raises
         ------
         StoreError
-            It cannot be written.
+            It cannot be written, or one that is obsolete cannot be deleted.
         """
         written = self.keeper.write() if now_s is None else self.keeper.write_if_due(now_s)
         if written:
@@ -94,13 +94,7 @@ class OpenStudy:
         return written
 
     def discard_draft(self) -> None:
-        """Go back to the file as one step, and forget the draft.
-
-        Raises
-        ------
-        StoreError
-            The draft cannot be deleted.
-        """
+        """Go back to the file as one step, and forget the draft."""
         self.history = self.history.typed("Discard the draft", self.saved)
         self.keeper.saved(self.base)
         self.draft = self.kept = None
@@ -165,11 +159,11 @@ class OpenStudy:
         source = self.source()
         check_saving(content_hash(source), self.version, known)
         self._bring_liquid_files(source)
+        keep_content(source)
         self.base = save(self.file, self.study.text, self.base)
         self.saved = self.study.text
         self.keeper.saved(self.base)
         self.kept = self.draft = None
-        keep_content(source)
 
     def _bring_liquid_files(self, source: bytes) -> None:
         """Write the liquid files that the study names into its own folder, where it was copied from another one."""
@@ -191,7 +185,7 @@ class OpenStudy:
         Refused
             The name is not permitted, or taken.
         StoreError
-            The draft of the other cannot be written, or that of this one not be deleted.
+            The draft of the other cannot be written.
         """
         file = check_free(name)
         made = OpenStudy(file, self.history.typed(f"Save as {name}", copy_of(self.study, name).text))
@@ -271,7 +265,7 @@ def why_read_only(opened: OpenStudy, results: Path) -> str:
     file = opened.file.resolve()
     if any(file == shipped_file(name).resolve() for name in shipped()):
         return "This study ships with the program. Make a copy to change it."
-    if opened.base and not os.access(opened.file, os.W_OK):
+    if opened.file.exists() and not os.access(opened.file, os.W_OK):
         return "You may not write this file. Make a copy to change it."
     if any(is_open(session.path) for session in StudyFolder(results / opened.name).sessions()):
         return "A session of this study is under way. Make a copy, or wait until it has ended."

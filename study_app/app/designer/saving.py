@@ -25,6 +25,7 @@ from study_app.viewmodels.designer.versions.standing import save_prompt
 from study_app.viewmodels.designer.view import Banner
 
 DRAFT_MS: Final = 50
+RETRY_MS: Final = 2_000
 
 
 class Saving(QObject):
@@ -45,8 +46,9 @@ class Saving(QObject):
         super().__init__(editing)
         self.editing, self.place, self.runs = editing, place, runs
         self.banner: Banner | None = None
+        self._notice: Banner | None = None
         self.card: SaveCard | None = None
-        self._others = 0
+        self._others, self._trouble = 0, ""
         self._drafting = QTimer(self)
         self._drafting.setInterval(DRAFT_MS)
         self._drafting.timeout.connect(self.write_draft)
@@ -62,16 +64,12 @@ class Saving(QObject):
     def _begin(self) -> None:
         opened = self.editing.opened
         assert opened is not None  # noqa: S101 - that is what was opened
-        self._drafting.start()
-        self._others = opened.keeper.others
-        self.banner = None
-        if opened.read_only:
-            self._say_read_only(opened)
-        elif self._changed_outside(opened):
-            self._say_changed()
-        elif opened.draft is not None and opened.edited and opened.base:
+        self._drafting.start(DRAFT_MS)
+        self._others, self._trouble, self._notice = opened.keeper.others, "", None
+        if opened.draft is not None and opened.edited and opened.base:
             when = time_words(opened.draft.kept_at)
-            self.banner = Banner(f"Draft of {when}, not saved", (("discard", "Discard the draft"),))
+            self._notice = Banner(f"Draft of {when}, not saved", (("discard", "Discard the draft"),))
+        self.banner = _banner(opened) or self._notice
 
     def look_again(self) -> None:
         """Look whether the study may be changed, and whether another program changed its file.
@@ -81,47 +79,18 @@ class Saving(QObject):
         opened = self.editing.opened
         if opened is None:
             return
-        reason = why_read_only(opened, self.editing.results)
-        if reason != opened.read_only:
-            opened.read_only, self.banner = reason, None
-            if reason:
-                self._say_read_only(opened)
+        before = opened.read_only, self.banner
+        opened.read_only = why_read_only(opened, self.editing.results)
+        if not opened.edited and opened.file.exists() and _changed_outside(opened):
+            self._try(opened, opened.take_outside)
+        self.banner = _banner(opened) or self._notice
+        if before != (opened.read_only, self.banner):
             self.editing.announce()
-        if not self._changed_outside(opened):
-            return
-        if reason and not opened.edited and opened.file.exists():
-            self._try(opened.take_outside)
-            self._say_read_only(opened)
-        elif opened.edited or not opened.file.exists():
-            self._say_changed()
-            self.editing.announce()
-        else:
-            self._try(opened.take_outside)
 
     def _look_while_shown(self) -> None:
         if self.place.isVisible():
             self.place.flush()
             self.look_again()
-
-    def _changed_outside(self, opened: OpenStudy) -> bool:
-        try:
-            return opened.changed_outside()
-        except StudyError as error:
-            self.banner = Banner(f"{str(error)[:1].upper()}{str(error)[1:]}")
-            return False
-
-    def _say_read_only(self, opened: OpenStudy) -> None:
-        self.banner = Banner(opened.read_only, (("copy", "Make a copy …"),))
-
-    def _say_changed(self) -> None:
-        opened = self.editing.opened
-        if opened is not None and not opened.file.exists():
-            self.banner = Banner("Another program deleted or moved this file", (("keep", "Keep mine"),))
-            return
-        self.banner = Banner(
-            "Another program changed this file, and it was edited here, too",
-            (("keep", "Keep mine"), ("take", "Take the file's"), ("compare", "Compare")),
-        )
 
     def answer_banner(self, action: str) -> None:
         """Carry out what a button of the banner asks for."""
@@ -133,15 +102,15 @@ class Saving(QObject):
             return
         if action == "compare":
             drafts = [one.hash for one in kept_versions(opened.file) if one.origin == "draft"]
-            self.compare_asked.emit(FILE if self._changed_outside(opened) or not drafts else drafts[-1])
+            self.compare_asked.emit(FILE if _changed_outside(opened) or not drafts else drafts[-1])
             return
-        self.banner = None
+        self._notice = None
         if action == "keep":
-            self._try(lambda: opened.keep_mine(time.monotonic()))
+            self._try(opened, lambda: opened.keep_mine(time.monotonic()))
         elif action == "take":
-            self._try(opened.take_outside)
+            self._try(opened, opened.take_outside)
         else:
-            self._try(opened.discard_draft)
+            self._try(opened, opened.discard_draft)
 
     # saving
 
@@ -152,12 +121,11 @@ class Saving(QObject):
             return
         opened.read_only = why_read_only(opened, self.editing.results)
         if opened.read_only:
-            self._say_read_only(opened)
-            self.editing.announce()
+            self._show_banner(opened)
             return
         known = self.runs.read()
         standing = opened.standing(known)
-        if standing.asks and not self._changed_outside(opened):
+        if standing.asks and not _changed_outside(opened):
             self._ask(opened, standing)
         else:
             self._write(opened)
@@ -200,6 +168,7 @@ class Saving(QObject):
             if self.card is not None:
                 self.card.refuse(f"{refusal}.")
             return
+        self.write_draft(at_once=True)
         self.place.close_prompt()
         self.continued.emit(made)
         self._write(made)
@@ -208,15 +177,14 @@ class Saving(QObject):
         try:
             opened.save(self.runs.read())
         except ChangedOutsideError:
-            self._say_changed()
-            self.editing.announce()
+            self._show_banner(opened)
             return
         except StudyError as error:
             self.place.message.emit("The study was not saved", f"{error}.")
             self.editing.announce()
             return
-        self.banner = None
-        self.editing.announce()
+        self._notice = None
+        self._show_banner(opened)
         self.saved.emit(opened.file)
 
     # drafts
@@ -227,29 +195,65 @@ class Saving(QObject):
         self.write_draft(at_once=True)
 
     def write_draft(self, *, at_once: bool = False) -> None:
-        """Write the draft if it is due."""
+        """Write the draft if it is due; what fails is tried again, and said once."""
         opened = self.editing.opened
         if opened is None:
             return
         try:
             written = opened.write_draft(None if at_once else time.monotonic())
         except StudyError as error:
-            self._drafting.stop()
-            self.place.message.emit("The draft is not kept", f"{error}.")
+            self._drafting.setInterval(RETRY_MS)
+            if self._trouble != str(error):
+                self._trouble = str(error)
+                self.place.message.emit("The draft is not up to date", f"{error}.")
             return
+        if self._trouble:
+            self._trouble = ""
+            self._drafting.setInterval(DRAFT_MS)
         if opened.keeper.others > self._others:
             self._others = opened.keeper.others
-            self.banner = Banner(
+            self._notice = Banner(
                 "Another window of the program edits this study, too: its unsaved edits are kept as a version",
                 (("compare", "Compare"),),
             )
-            self.editing.announce()
+            self._show_banner(opened)
         if written:
             self.kept.emit()
 
-    def _try(self, act: Callable[[], object]) -> None:
+    def _try(self, opened: OpenStudy, act: Callable[[], object]) -> None:
         try:
             act()
         except StudyError as error:
             self.place.message.emit("This was not done", f"{error}.")
+        self._show_banner(opened)
+
+    def _show_banner(self, opened: OpenStudy) -> None:
+        self.banner = _banner(opened) or self._notice
         self.editing.announce()
+
+
+def _banner(opened: OpenStudy) -> Banner | None:
+    """Return why a study is read-only, or what another program did to its file; None where there is neither."""
+    if opened.read_only:
+        return Banner(opened.read_only, (("copy", "Make a copy …"),))
+    try:
+        changed = opened.changed_outside()
+    except StudyError as error:
+        return Banner(f"{str(error)[:1].upper()}{str(error)[1:]}")
+    if not changed:
+        return None
+    if not opened.file.exists():
+        return Banner("Another program deleted or moved this file", (("keep", "Keep mine"),))
+    too = ", and it was edited here, too" if opened.edited else ""
+    return Banner(
+        f"Another program changed this file{too}",
+        (("keep", "Keep mine"), ("take", "Take the file's"), ("compare", "Compare")),
+    )
+
+
+def _changed_outside(opened: OpenStudy) -> bool:
+    """Return whether the file can be read and has another content than the one that is edited."""
+    try:
+        return opened.changed_outside()
+    except StudyError:
+        return False

@@ -76,10 +76,10 @@ def save(file: Path, text: str, base: str) -> str:
             keep_version(file, content, "found")
         elif base:
             raise ChangedOutsideError(f"{file} was deleted or moved by another program: save it as another study")
+        keep_version(file, source, "saved")  # first: what fails after the file is written would look as if it were not
         write_whole(target, source)
         if mode is not None:
             target.chmod(mode)
-    keep_version(file, source, "saved")
     return content_hash(source)
 
 

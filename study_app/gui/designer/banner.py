@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout
 
+from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
@@ -29,9 +30,13 @@ class BannerCard(Card):
     def show_banner(self, banner: Banner | None) -> None:
         """Show another banner; None hides it."""
         self.setVisible(banner is not None)
-        if banner is None or banner.words == self.words.text():
+        if banner is None:
+            self.words.clear()
+            return
+        if banner.words == self.words.text():
             return
         self.words.setText(banner.words)
+        say(self, banner.words)
         for button in self.buttons:
             take_away(button)
         self.buttons = []

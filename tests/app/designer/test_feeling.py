@@ -100,3 +100,11 @@ def test_a_study_that_ships_is_felt_and_takes_nothing_back(qtbot: Any, visit: Ma
     assert lab.bench.a.name == "Honey"
     qtbot.waitUntil(lambda: lab.place.view is not None and lab.place.view.workbench == lab.bench)
     assert not lab.place.form.back.isVisible()
+
+
+def test_the_lab_puts_nothing_back_once_another_study_is_open(qtbot: Any, visit: MainController) -> None:
+    lab = feel(qtbot, visit, "liquids", "thick")
+    qtbot.waitUntil(lab.place.form.back.isVisible)
+    visit.open_designer("demo")
+    visit.window.go("lab")
+    qtbot.waitUntil(lambda: not lab.place.form.back.isVisible(), timeout=OPENS_MS)

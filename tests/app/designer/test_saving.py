@@ -1,0 +1,145 @@
+"""What goes wrong while drafts and files are written, and what another program does meanwhile."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.authoring.drafts import draft_of
+from study_app.authoring.versions.contents import kept_content
+from study_app.errors import StoreError
+from study_app.protocol.source.files import protocol_hash
+from study_app.store.sessions.folder_lock import open_alone
+from study_app.viewmodels.designer.requests import SetText, SetValue
+
+VERSION = ("study", "version")
+TITLE = ("pages", "welcome", "title")
+
+
+@pytest.fixture
+def drafted(designer: Any) -> Any:
+    """The designer with an edited study whose draft is written."""
+    designer.controller.open("kitchen")
+    designer.editing.ask(SetValue(VERSION, "0.7"))
+    designer.saving.write_draft(at_once=True)
+    assert draft_of(designer.file) is not None
+    return designer
+
+
+@pytest.fixture
+def stuck(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Drafts that cannot be deleted; undo it and they can."""
+
+    def refuse(file: Path) -> None:
+        raise StoreError(f"the draft of {file} cannot be deleted: Permission denied")
+
+    monkeypatch.setattr("study_app.authoring.drafts.discard", refuse)
+    return monkeypatch
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What the banner has a screen reader say."""
+    found: list[str] = []
+    monkeypatch.setattr("study_app.gui.designer.banner.say", lambda _banner, words: found.append(words))
+    return found
+
+
+def test_a_draft_that_cannot_be_deleted_is_said_once_and_stops_no_step(drafted: Any, stuck: pytest.MonkeyPatch) -> None:
+    drafted.editing.undo()
+    assert drafted.text == drafted.file.read_text()
+    drafted.saving.write_draft()
+    drafted.saving.write_draft()
+    assert [title for title, _ in drafted.messages] == ["The draft is not up to date"]
+    assert "cannot be deleted: Permission denied" in drafted.messages[0][1]
+    stuck.undo()
+    drafted.saving.write_draft()
+    assert draft_of(drafted.file) is None
+
+
+def test_a_file_is_saved_though_its_draft_cannot_be_deleted(
+    drafted: Any, stuck: pytest.MonkeyPatch, qtbot: Any
+) -> None:
+    with qtbot.waitSignal(drafted.saving.saved, timeout=1000):
+        drafted.saving.save()
+    assert drafted.file.read_text() == drafted.text
+    assert "The study was not saved" not in dict(drafted.messages)
+
+
+def test_nothing_is_written_where_the_content_cannot_be_kept(drafted: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_content: bytes) -> None:
+        raise StoreError("the disk is full")
+
+    before = drafted.file.read_bytes()
+    with monkeypatch.context() as broken:
+        broken.setattr("study_app.app.designer.open_study.keep_content", full)
+        drafted.saving.save()
+    assert ("The study was not saved", "the disk is full.") in drafted.messages
+    assert drafted.file.read_bytes() == before
+    drafted.saving.save()
+    assert drafted.file.read_text() == drafted.text
+    assert kept_content(protocol_hash(drafted.file.read_bytes())) is not None
+
+
+def test_edits_of_a_read_only_study_whose_file_changed_are_asked_about_once_it_can_be_edited(drafted: Any) -> None:
+    session = drafted.results / "kitchen" / "data" / "sub-P001" / "ses-01"
+    session.mkdir(parents=True)
+    opening = open_alone(session)
+    drafted.file.write_text(drafted.file.read_text() + "# outside\n")
+    drafted.controller.enter()
+    assert "session of this study is under way" in drafted.place.banner_words.text()
+    assert [action for action, _ in drafted.place.view.banner.actions] == ["copy"]
+    assert 'version = "0.7"' in drafted.text
+    opening.release()
+    drafted.controller.enter()
+    assert [action for action, _ in drafted.place.view.banner.actions] == ["keep", "take", "compare"]
+
+
+def test_a_deleted_file_is_written_anew_where_mine_is_kept(drafted: Any) -> None:
+    drafted.file.unlink()
+    drafted.controller.enter()
+    assert drafted.place.banner_words.text() == "Another program deleted or moved this file"
+    drafted.place.banner.buttons[0].click()
+    assert not drafted.place.banner.isVisible()
+    drafted.saving.save()
+    assert drafted.file.read_text() == drafted.text
+
+
+def test_a_file_that_cannot_be_read_is_said_at_once_until_it_can_be(
+    designer: Any, said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unreadable(_opened: object) -> bool:
+        raise StoreError("kitchen.toml cannot be read: Input/output error")
+
+    designer.controller.open("kitchen")
+    for _ in range(2):
+        with monkeypatch.context() as broken:
+            broken.setattr("study_app.app.designer.open_study.OpenStudy.changed_outside", unreadable)
+            designer.saving.look_again()
+            designer.saving.look_again()
+            assert designer.place.banner_words.text() == "Kitchen.toml cannot be read: Input/output error"
+        designer.saving.look_again()
+        assert not designer.place.banner.isVisible()
+    assert said == ["Kitchen.toml cannot be read: Input/output error"] * 2
+
+
+def test_letters_typed_after_the_files_content_was_taken_are_a_step_of_their_own(drafted: Any) -> None:
+    drafted.editing.ask(SetText(TITLE, "en", "H"))
+    drafted.file.write_text(drafted.file.read_text() + "# outside\n")
+    drafted.saving.look_again()
+    drafted.saving.answer_banner("take")
+    taken = drafted.text
+    drafted.editing.ask(SetText(TITLE, "en", "He"))
+    drafted.editing.undo()
+    assert drafted.text == taken
+
+
+def test_letters_typed_after_saving_a_version_are_a_step_of_their_own(drafted: Any) -> None:
+    drafted.editing.ask(SetText(TITLE, "en", "H"))
+    drafted.editing.opened.set_version("0.8")
+    numbered = drafted.text
+    drafted.editing.ask(SetText(TITLE, "en", "He"))
+    drafted.editing.undo()
+    assert drafted.text == numbered
