@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -117,13 +117,22 @@ def duplicate(study: Study, asked: DuplicateElement) -> Step:
     copies: list[Path] = []
     now = study
     for path in _last_first((asked.path, *asked.also)):
-        made, copy = duplicated(now, path)
+        made, copy = _copied(now, path)
         made = _beside(now, made, path, copy)
         copies = [*(_after_insert(one, copy) for one in copies), copy]
         edits = (*edits, *made)
         now, _ = now.edited(*made)
     words = f"Duplicate {_titles(study, (asked.path, *asked.also))}"
     return Step(words, edits, copies[0] if len(copies) > 1 else copies[-1], several=tuple(copies))
+
+
+def _copied(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:
+    """Return the edits that copy an element, or a value of a list, right after itself, and the path of the copy."""
+    value = value_at(study.document, path)
+    if isinstance(value, Mapping) or not isinstance(path[-1], int):
+        return duplicated(study, path)
+    copy = (*path[:-1], path[-1] + 1)
+    return (Insert(copy, list(value) if isinstance(value, tuple) else value),), copy
 
 
 def _beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -> tuple[Edit, ...]:

@@ -36,8 +36,9 @@ from study_app.viewmodels.designer.requests import (
     ChangeLanguage,
     DeleteElement,
     DuplicateElement,
+    DuplicateEntries,
     MoveElement,
-    MoveEntry,
+    MoveEntries,
     MoveTo,
     Paste,
     RemoveKey,
@@ -84,9 +85,11 @@ class Steps:
             return Step(f"Add {label_of(asked.path[-1])}", (Set(asked.path, _first_value(study, asked.path)),))
         if isinstance(asked, AddEntry):
             return _add_entry(study, asked)
-        if isinstance(asked, MoveEntry):
-            to = asked.to + (asked.to > int(asked.path[-1]))
-            return replace(move_to(study, MoveTo((asked.path,), to)), select=None, several=())
+        if isinstance(asked, MoveEntries):
+            return replace(move_to(study, MoveTo(asked.entries, asked.to)), select=None, several=())
+        if isinstance(asked, DuplicateEntries):
+            step = duplicate(study, DuplicateElement(asked.entries[0], asked.entries[1:]))
+            return replace(step, select=None, several=())
         if isinstance(asked, RenameElement):
             edits = renamed(study.document, asked.path, asked.name)
             after = asked.path if isinstance(asked.path[-1], int) else (*asked.path[:-1], asked.name)

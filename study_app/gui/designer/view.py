@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from functools import partial
+
+from PySide6.QtCore import Qt, Signal, SignalInstance
 from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QFileDialog, QStackedWidget, QVBoxLayout, QWidget
 
@@ -64,20 +66,18 @@ class DesignerPlace(Place):
         self.view = DesignerView()
         self.prompt: Prompt | None = None
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
-        self.header = DesignerHeader()
-        self.banner = BannerCard()
+        self.header, self.banner = DesignerHeader(), BannerCard()
         self.banner_words = self.banner.words
-        self.outline = OutlineCard()
         self.form, self.file, self.problems = FormCard(), FileCard(), ProblemsCard()
-        self.new_page = NewStudyPage()
+        self.outline, self.new_page = OutlineCard(), NewStudyPage()
         self.pane = RightPane()
         self.measures = MeasuresPage()
         self.pane.add_page(PanePage("measures", "Measures", self.measures, self.measures.controls, with_facts=False))
         self.pane.add_page(PanePage("file", "File", self.file))
         self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
         self.sides = self.parts.sides
-        self.adding = AddList(self)
-        self.nothing = NoStudyCard()
+        self.adding, self.nothing = AddList(self), NoStudyCard()
+        self._steps = [partial(self._ask, asked) for asked in (self.undo_asked, self.redo_asked, self.save_asked)]
         self._lay_out()
         self._connect()
         self._take_keys()
@@ -101,14 +101,15 @@ class DesignerPlace(Place):
         page.addWidget(self.stack)
 
     def _connect(self) -> None:
+        undo, redo, save = self._steps
         header, outline, form = self.header, self.outline, self.form
         header.study_asked.connect(self.study_asked)
         header.new_asked.connect(self.new_asked)
         header.file_asked.connect(self._open_file)
         header.problems_asked.connect(lambda: self.problems.setVisible(not self.problems.isVisible()))
-        header.undo_asked.connect(self._undo)
-        header.redo_asked.connect(self._redo)
-        header.save_asked.connect(self._save)
+        header.undo_asked.connect(undo)
+        header.redo_asked.connect(redo)
+        header.save_asked.connect(save)
         self.nothing.new.clicked.connect(self.new_asked)
         self.nothing.study_asked.connect(self.study_asked)
         self.nothing.study_asked.connect(self._focus_form)
@@ -127,7 +128,12 @@ class DesignerPlace(Place):
         self.parts.path.open_asked.connect(self._select)
         form.asked.connect(self.asked)
         form.open_asked.connect(self._select)
-        form.delete_asked.connect(lambda path: self.delete_asked.emit(path, ()))
+        form.join_asked.connect(self._join)
+        form.head.up.clicked.connect(lambda: self._move_by(-1))
+        form.head.down.clicked.connect(lambda: self._move_by(1))
+        form.head.copy.clicked.connect(self._duplicate)
+        form.head.delete.clicked.connect(self._delete)
+        outline.several_changed.connect(lambda: form.show_selected(outline.selected))
         form.head.id_typed.connect(self.id_typed)
         form.copy_asked.connect(self.copy_asked)
         self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
@@ -139,8 +145,9 @@ class DesignerPlace(Place):
         self.new_page.given_up.connect(self.close_new)
 
     def _take_keys(self) -> None:
+        undo, redo, save = self._steps
         for keys, act in (
-            ("Ctrl+Z", self._undo), ("Ctrl+Shift+Z", self._redo), ("Ctrl+Y", self._redo), ("Ctrl+S", self._save),
+            ("Ctrl+Z", undo), ("Ctrl+Shift+Z", redo), ("Ctrl+Y", redo), ("Ctrl+S", save),
             ("F8", self._next_problem), ("Ctrl+D", self._duplicate), ("Ctrl+F", self.parts.focus_find),
             ("Alt+Up", lambda: self._move_by(-1)), ("Alt+Down", lambda: self._move_by(1)),
             ("Alt+Left", self.back_asked.emit), ("F2", self._rename), ("Ctrl+E", self._switch_to_file),
@@ -252,17 +259,9 @@ class DesignerPlace(Place):
         self.flush()
         self.selected.emit(path)
 
-    def _undo(self) -> None:
+    def _ask(self, asked: SignalInstance) -> None:
         self.flush()
-        self.undo_asked.emit()
-
-    def _redo(self) -> None:
-        self.flush()
-        self.redo_asked.emit()
-
-    def _save(self) -> None:
-        self.flush()
-        self.save_asked.emit()
+        asked.emit()
 
     def ask_to_add(self) -> None:
         """Ask what can be added."""
@@ -280,6 +279,17 @@ class DesignerPlace(Place):
         form = self.view.form
         path = () if form is None else form.path
         return path, tuple(one for one in self.outline.selected if one != path)
+
+    def _join(self, path: ElementPath, all_between: bool) -> None:
+        """Select a question with the one of the form, or no longer; where none is edited, open it."""
+        form = self.view.form
+        if form is None or form.path[:-1] != path[:-1]:
+            self._select(path)
+        elif all_between:
+            first, last = sorted((int(form.path[-1]), int(path[-1])))
+            self.outline.select_several(tuple((*path[:-1], at) for at in range(first, last + 1)))
+        else:
+            self.outline.select_several((path,), selects=path not in self.outline.selected)
 
     def _duplicate(self) -> None:
         path, also = self._several()

@@ -132,11 +132,18 @@ class Paste:
 
 
 @dataclass(frozen=True, slots=True)
-class MoveEntry:
-    """Move an entry of a list to a place, from 0."""
+class MoveEntries:
+    """Move entries of a list as `MoveTo` does; the form stays at its element."""
 
-    path: Path
+    entries: tuple[Path, ...]
     to: int
+
+
+@dataclass(frozen=True, slots=True)
+class DuplicateEntries:
+    """Copy entries of a list, each right after itself; the form stays at its element."""
+
+    entries: tuple[Path, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +184,7 @@ class Several:
 
 Request: TypeAlias = (
     SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | AddNamed | AddInstrument
-    | ChangeLanguage | DuplicateElement | MoveElement | MoveTo | MoveEntry | Paste | DeleteElement | RenameElement
+    | ChangeLanguage | DuplicateElement | MoveElement | MoveTo | MoveEntries | DuplicateEntries
+    | Paste | DeleteElement | RenameElement
     | RetypeFile | Several
 )  # fmt: skip

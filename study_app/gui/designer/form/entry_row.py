@@ -1,6 +1,8 @@
-"""One entry of a list in the form: dragged by its grip, or moved by keys."""
+"""One entry of a list in the form: selected, dragged by its grip, or moved by keys."""
 
 from __future__ import annotations
+
+from typing import Final
 
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QMouseEvent, QPainter, QPaintEvent, QPen
@@ -14,14 +16,23 @@ from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import Elided
 from study_app.viewmodels.designer.form_rows import Entry
 
+KEYS: Final = "Alt+Up and Alt+Down move it, Delete removes it, Shift and the arrows select several"
+
 
 class EntryRow(Themed, QWidget):
     """One entry in an outlined row: a grip where it can be dragged, title, id, and its buttons.
 
-    Signals: ``dragged`` (how far down its parent the pointer is; None cancels), ``dropped``, ``moved`` (by how many
-    places a key moves it), ``copy_asked``, ``pasted`` (a text).
+    Signals: ``pressed`` (whether it extends the selection, and whether it joins or leaves it), ``clicked``, ``stepped``
+    (by how many rows a key goes on, and whether it extends the selection); ``dragged`` (how far down its parent the
+    pointer is; None cancels), ``dropped``, ``moved`` (by how many places a key moves it); ``remove_asked``,
+    ``duplicate_asked``, ``copy_asked``, ``pasted`` (a text).
     """
 
+    pressed = Signal(bool, bool)
+    clicked = Signal()
+    stepped = Signal(int, bool)
+    remove_asked = Signal()
+    duplicate_asked = Signal()
     dragged = Signal(object)
     dropped = Signal()
     moved = Signal(int)
@@ -31,9 +42,10 @@ class EntryRow(Themed, QWidget):
     def __init__(self, entry: Entry, words: str, *, grip: bool = False) -> None:
         super().__init__()
         self.grip, self._pressed, self._dragging = grip, 0, False
+        self.chosen, self._words = False, words
         if grip:
             self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-            self.setAccessibleDescription("Alt+Up and Alt+Down move it")
+            self.setAccessibleDescription(KEYS)
         self.faulty = bool(entry.faults)
         self.title = Elided("label", "bad" if self.faulty else "text")
         self.title.show_text(entry.title)
@@ -55,25 +67,38 @@ class EntryRow(Themed, QWidget):
         self.row.addWidget(made)
         return made
 
+    def show_chosen(self, chosen: bool, count: int) -> None:
+        """Show whether it is selected, with how many."""
+        self.chosen = chosen
+        self.setAccessibleName(f"{self._words}, one of {count} selected" if chosen and count > 1 else self._words)
+        self.update()
+
     # moving
 
     def event(self, event: QEvent) -> bool:
         """Keep Alt and the arrows while the row has the keyboard; the place would move the whole element."""
         if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and self.grip:
             keys = (QKeySequence.StandardKey.Copy, QKeySequence.StandardKey.Paste)
-            if self._by(event) or any(event.matches(key) for key in keys):
+            if self._by(event) or _duplicates(event) or any(event.matches(key) for key in keys):
                 event.accept()
                 return True
         return super().event(event)
 
     def _by(self, event: QKeyEvent) -> int:
-        alone = event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier == Qt.KeyboardModifier.AltModifier
-        return {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}.get(Qt.Key(event.key()), 0) if alone and self.grip else 0
+        """Return by how many places a key moves the entry."""
+        return _arrow(event) if _held(event) == Qt.KeyboardModifier.AltModifier and self.grip else 0
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Move by Alt and the arrows; cancel a drag at Esc."""
+        """Go on by the arrows, with Alt move; cancel a drag at Esc."""
+        extends = _held(event) == Qt.KeyboardModifier.ShiftModifier
         if by := self._by(event):
             self.moved.emit(by)
+        elif (by := _arrow(event)) and (extends or not _held(event)):
+            self.stepped.emit(by, extends)
+        elif event.key() == Qt.Key.Key_Delete and self.grip:
+            self.remove_asked.emit()
+        elif _duplicates(event) and self.grip:
+            self.duplicate_asked.emit()
         elif event.matches(QKeySequence.StandardKey.Copy):
             self.copy_asked.emit()
         elif event.matches(QKeySequence.StandardKey.Paste):
@@ -86,8 +111,14 @@ class EntryRow(Themed, QWidget):
             super().keyPressEvent(event)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Note where a drag may begin."""
-        self._pressed = round(event.position().y()) if event.button() == Qt.MouseButton.LeftButton else 0
+        """Select the row, and note where a drag may begin."""
+        left = event.button() == Qt.MouseButton.LeftButton
+        self._pressed = max(1, round(event.position().y())) if left else 0
+        if left:
+            self.setFocus(Qt.FocusReason.MouseFocusReason)
+            held = event.modifiers()
+            shift, control = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
+            self.pressed.emit(bool(held & shift), bool(held & control))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
         """Drag."""
@@ -100,11 +131,14 @@ class EntryRow(Themed, QWidget):
         if self._dragging:
             self.dragged.emit(self.mapToParent(event.position().toPoint()).y())
 
-    def mouseReleaseEvent(self, _event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Drop."""
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        """Drop; where nothing was dragged, a plain click selects this row alone."""
         if self._dragging:
             self._let_go()
             self.dropped.emit()
+        elif self._pressed and not event.modifiers():
+            self.clicked.emit()
+        self._pressed = 0
 
     def _let_go(self) -> None:
         self._dragging, self._pressed = False, 0
@@ -114,9 +148,21 @@ class EntryRow(Themed, QWidget):
         """Paint the edge and the grip."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        if self.grip:
-            paint_grip(painter, QRectF(6, 0, 12, self.height()), self.theme.text2)
-        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setBrush(QColor(self.theme.selected) if self.chosen else Qt.BrushStyle.NoBrush)
         ink = self.theme.bad if self.faulty else self.theme.accent if self.hasFocus() else self.theme.ctl
         painter.setPen(QPen(QColor(ink), 2 if self.faulty or self.hasFocus() else 1))
         painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), RADIUS_CONTROL, RADIUS_CONTROL)
+        if self.grip:
+            paint_grip(painter, QRectF(6, 0, 12, self.height()), self.theme.text2)
+
+
+def _held(event: QKeyEvent) -> Qt.KeyboardModifier:
+    return event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+
+
+def _arrow(event: QKeyEvent) -> int:
+    return {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}.get(Qt.Key(event.key()), 0)
+
+
+def _duplicates(event: QKeyEvent) -> bool:
+    return event.key() == Qt.Key.Key_D and _held(event) == Qt.KeyboardModifier.ControlModifier

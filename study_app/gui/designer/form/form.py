@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
+from study_app.gui.designer.form.entry_list import EntryList
 from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.form_foot import FormFoot
 from study_app.gui.designer.form.form_head import LABEL_PX, FormHead
@@ -30,14 +31,14 @@ ACROSS = 2
 class FormCard(Card):
     """Draws a `Form`.
 
-    Signals: ``asked`` (a request), ``open_asked`` (path), ``delete_asked`` (path), ``copy_asked`` (paths),
-    ``repair_asked`` (problem, words).
+    Signals: ``asked`` (a request), ``open_asked`` (path), ``join_asked`` (path of a question that joins or leaves the
+    selection, and whether with all between), ``copy_asked`` (paths), ``repair_asked`` (problem, words).
     """
 
     asked = Signal(object)
     copy_asked = Signal(object)
     open_asked = Signal(object)
-    delete_asked = Signal(object)
+    join_asked = Signal(object, bool)
     repair_asked = Signal(object, str)
 
     def __init__(self) -> None:
@@ -49,9 +50,9 @@ class FormCard(Card):
         self.others: list[QuestionRow] = []
         self.adds: list[QWidget] = []
         self._focused: RowWidget | None = None
+        self._chosen: tuple[tuple[str | int, ...], tuple[int, ...]] | None = None
         self.head = FormHead()
         self.head.asked.connect(self.asked)
-        self.head.delete_asked.connect(self.delete_asked)
         self.own = label("", "label", "bad", wraps=True)
         self.inside = QWidget()
         self.sections = QVBoxLayout(self.inside)
@@ -143,8 +144,14 @@ class FormCard(Card):
     def _others(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...]) -> QuestionRows:
         made = QuestionRows(lines, languages)
         made.write_asked.connect(self.write)
+        made.join_asked.connect(self.join_asked)
         self.others += made.rows
         return made
+
+    def show_selected(self, paths: tuple[tuple[str | int, ...], ...]) -> None:
+        """Show which other questions are selected with the one that is edited."""
+        for row in self.others:
+            row.show_chosen(row.line.path in paths)
 
     def write(self, path: tuple[str | int, ...]) -> None:
         """Select a question and give the keyboard to its text."""
@@ -168,7 +175,12 @@ class FormCard(Card):
         made.repair_asked.connect(self.repair_asked)
         made.field.open_asked.connect(self.open_asked)
         made.field.write_asked.connect(self.write)
-        made.field.copy_asked.connect(lambda path: self.copy_asked.emit((path,)))
+        made.field.join_asked.connect(self.join_asked)
+        made.field.copy_asked.connect(self.copy_asked)
+        if isinstance(made.field, EntryList):
+            made.field.changes.connect(lambda asked, after: self._change_entries(row.row.path, asked, after))
+            if self._chosen is not None and self._chosen[0] == row.row.path:
+                made.field.choose(self._chosen[1])
         made.field.came.connect(lambda: self._come(made))
         made.field.setEnabled(not self.read_only or row.row.kind in {"list", "tables", "references", "reference"})
         made.remove.setEnabled(not self.read_only)
@@ -176,6 +188,12 @@ class FormCard(Card):
             entry.grip = entry.grip and not self.read_only
         self.rows.append(made)
         return made
+
+    def _change_entries(self, path: tuple[str | int, ...], asked: object, after: tuple[int, ...]) -> None:
+        """Ask for a step of a list's entries; those at ``after`` are selected where the list is made anew."""
+        self._chosen = (path, after)
+        self.asked.emit(asked)
+        self._chosen = None
 
     def flush(self) -> None:
         """Hand on what is being typed."""

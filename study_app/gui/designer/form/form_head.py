@@ -13,7 +13,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.designer.form_rows import Form
-from study_app.viewmodels.designer.requests import DuplicateElement, MoveElement, RenameElement, SetValue
+from study_app.viewmodels.designer.requests import RenameElement, SetValue
 
 TILE = 40
 LABEL_PX = 116
@@ -38,15 +38,15 @@ class Tile(Themed, QWidget):
 
 
 class FormHead(QWidget):
-    """Signals: ``asked`` (a request), ``delete_asked`` and ``feel_asked`` (path), ``id_typed`` (path, text so far).
+    """Signals: ``asked`` (a request), ``feel_asked`` (path), ``id_typed`` (path, text so far).
 
-    ``unlock_asked`` is emitted where a locked id is to be changed.
+    ``unlock_asked`` is emitted where a locked id is to be changed. What ``up``, ``down``, ``copy`` and ``delete`` do is
+    done to every selected element.
     """
 
     asked = Signal(object)
     id_typed = Signal(object, str)
     unlock_asked = Signal()
-    delete_asked = Signal(object)
     feel_asked = Signal(object)
 
     def __init__(self) -> None:
@@ -104,10 +104,6 @@ class FormHead(QWidget):
         self.id.typed.connect(self._rename)
         self.id.textEdited.connect(self._type_id)
         self.unlock.clicked.connect(self.unlock_asked)
-        self.up.clicked.connect(lambda: self.move_by(-1))
-        self.down.clicked.connect(lambda: self.move_by(1))
-        self.copy.clicked.connect(self.duplicate)
-        self.delete.clicked.connect(self.ask_to_delete)
         self.feel.clicked.connect(self._ask_to_feel)
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
@@ -167,21 +163,6 @@ class FormHead(QWidget):
         self.refusal.setText(sentence)
         self.refusal.setVisible(bool(sentence))
         self.id.show_refused(bool(sentence))
-
-    def move_by(self, by: int) -> None:
-        """Ask to move the element."""
-        if self.form is not None and (self.up if by < 0 else self.down).isEnabled():
-            self.asked.emit(MoveElement(self.form.path, by))
-
-    def duplicate(self) -> None:
-        """Ask for a copy of the element."""
-        if self.form is not None and self.copy.isEnabled():
-            self.asked.emit(DuplicateElement(self.form.path))
-
-    def ask_to_delete(self) -> None:
-        """Ask to delete the element."""
-        if self.form is not None and self.delete.isEnabled():
-            self.delete_asked.emit(self.form.path)
 
     def _type_id(self, name: str) -> None:
         if self.form is not None:

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QBoxLayout
 
+from study_app.gui.designer.form.entry_list import EntryList
 from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.language_list import LanguageListField
 from study_app.gui.designer.form.languages_field import LanguagesField
 from study_app.gui.designer.form.row_fields import (
+    NUMBERS_APART,
     ChecksField,
     ChoiceField,
     Field,
     LineField,
-    LinesField,
     SwitchField,
     UnknownField,
     add_button,
+    read_number,
+    written,
 )
-from study_app.gui.designer.form.typed_fields import FIELD_PX
+from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import Choice
 from study_app.viewmodels.designer.form_rows import STUDY_LANGUAGES, Entry, FormRow, new_words
-from study_app.viewmodels.designer.requests import AddElement, AddEntry, AddNamed, MoveEntry, Paste, RemoveKey
+from study_app.viewmodels.designer.requests import AddElement, AddEntry, AddNamed, SetValue, Several
 
 KINDS = {
     "numbers": "Numbers", "vector": "Numbers", "number": "One number", "whole number": "One number", "text": "Text",
@@ -36,36 +40,27 @@ KINDS = {
 """What the kinds of a value that may be of several are called."""
 
 
-class EntriesField(Field):
+class EntriesField(EntryList):
     """References, tables in a list, or tables by name."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
-        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        self.box.setSpacing(6)
-        self.rows: list[EntryRow] = []
         kind, count = row.row.kind, len(row.entries)
         for at, entry in enumerate(row.entries):
-            shown = self.entry_row(entry, f"{row.row.label}, {entry.title}, {at + 1} of {count}", grip=kind != "tables")
-            shown.dragged.connect(lambda y, at=at: self._drag(at, y))
-            shown.dropped.connect(lambda at=at: self._drop(at))
-            shown.copy_asked.connect(lambda path=entry.path: self.copy_asked.emit(path))
-            shown.pasted.connect(lambda text, path=entry.path: self.asked.emit(Paste(path, text)))
-            shown.moved.connect(lambda by, path=entry.path, at=at: self._move(path, at + by))
+            words = f"{row.row.label}, {entry.title}, {at + 1} of {count}"
+            shown = self.entry_row(entry, words, grip=kind != "tables")
             if kind != "tables":
                 for by, icon, word in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
                     button = shown.button(icon, f"Move {entry.title} {word}")
                     button.setEnabled(0 <= at + by < count)
-                    button.clicked.connect(
-                        lambda _checked=False, path=entry.path, to=at + by: self.asked.emit(MoveEntry(path, to))
-                    )
+                    to = at - 1 if by < 0 else at + 2
+                    button.clicked.connect(lambda _checked=False, at=at, to=to: self.move_entries((at,), to))
             opens = shown.button("arrow_right", f"Open {entry.title}")
             opens.clicked.connect(lambda _checked=False, path=entry.path: self.open_asked.emit(path))
             if kind != "tables":
                 away = shown.button("cross", f"Remove {entry.title} from {row.row.label}")
-                away.clicked.connect(lambda _checked=False, path=entry.path: self.asked.emit(RemoveKey(path)))
-            self.rows.append(shown)
-            self.box.addWidget(shown)
+                away.clicked.connect(lambda _checked=False, at=at: self.remove((at,)))
+            self.add_row(shown)
         self.add = add_button(f"Add to {row.row.label}", "Add")
         self.names = Choice()
         self.names.setProperty("dense", "true")
@@ -78,7 +73,6 @@ class EntriesField(Field):
         self.box.addWidget(self.names if chooses else self.add, 0, Qt.AlignmentFlag.AlignLeft)
         (self.add if chooses else self.names).setParent(None)
         self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.row.path)))
-        self._target: int | None = None
         if chooses:
             self.names.addItems([str(choice.value) for choice in row.row.choices])
             for section in row.row.sections:
@@ -92,8 +86,9 @@ class EntriesField(Field):
         """Return the row of an entry, to which its buttons are added."""
         return EntryRow(entry, words, grip=grip)
 
-    def show_value(self) -> None:
-        """Do nothing: other entries make another field."""
+    def place(self, at: int) -> tuple[str | int, ...]:
+        """Return the place of an entry in the study."""
+        return self.row.entries[at].path
 
     def _add_name(self, at: int) -> None:
         name, section = self.names.itemText(at), self.names.itemData(at)
@@ -101,28 +96,64 @@ class EntriesField(Field):
         path = self.row.row.path
         self.asked.emit(AddEntry(path, name) if section is None else AddNamed(path, section))
 
-    def _move(self, path: tuple[str | int, ...], to: int) -> None:
-        if 0 <= to < len(self.rows):
-            self.asked.emit(MoveEntry(path, to))
 
-    def _drag(self, _at: int, y: int | None) -> None:
-        """Show where a dragged entry would come; None cancels."""
-        self._target = None if y is None else sum(row.geometry().center().y() < y for row in self.rows)
-        self.update()
+class LinesField(EntryList):
+    """Texts, or points, one in each line, with a button that adds one."""
 
-    def _drop(self, at: int) -> None:
-        target, self._target = self._target, None
-        self.update()
-        if target is not None and target not in {at, at + 1}:
-            self._move(self.row.entries[at].path, target - (target > at))
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.lines: list[TypedLine] = []
+        count = len(row.row.value or ())
+        for at in range(count):
+            name = f"{row.row.label} {at + 1}"
+            shown = EntryRow(Entry((*row.row.path, at), ""), f"{name} of {count}", grip=True)
+            shown.title.hide()
+            line = TypedLine(name)
+            line.typed.connect(lambda text, at=at: self._take(at, text))
+            line.came.connect(self.came)
+            shown.row.addWidget(line, 1)
+            away = shown.button("cross", f"Remove {name}")
+            away.clicked.connect(lambda _checked=False, at=at: self.remove((at,)))
+            self.add_row(shown)
+            self.lines.append(line)
+        self.add = add_button(f"Add to {row.row.label}")
+        self.add.clicked.connect(lambda: self.asked.emit(AddEntry(self.row.row.path)))
+        self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
+        self.setFocusProxy(self.lines[0] if self.lines else self.add)
+        self.show_value()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the line where a dragged entry would come."""
-        if self._target is not None and self.rows:
-            last = self._target == len(self.rows)
-            row = self.rows[-1 if last else self._target].geometry()
-            y = row.bottom() + 3 if last else row.top() - 3
-            QPainter(self).fillRect(QRectF(0, y - 1, self.width(), 2), QColor(self.rows[0].theme.accent))
+    def show_value(self) -> None:
+        """Show each entry."""
+        for line, value in zip(self.lines, self.row.row.value or (), strict=False):
+            if not line.property("state"):
+                line.show_text(written(value))
+
+    def copy(self, indexes: tuple[int, ...]) -> None:
+        """Put entries on the clipboard, one in each line."""
+        QGuiApplication.clipboard().setText("\n".join(self.lines[at].words() for at in indexes))
+
+    def paste(self, at: int, text: str) -> None:
+        """Ask to add each line of a text after an entry."""
+        del at
+        added = tuple(AddEntry(self.row.row.path, self._value(line)) for line in text.splitlines() if line.strip())
+        if all(one.value is not None for one in added):
+            after = tuple(range(len(self.lines), len(self.lines) + len(added)))
+            self.changes.emit(Several(f"Paste into {self.row.row.label}", added), after)
+
+    def _value(self, text: str) -> Any:
+        """Return the value that a line says, None where it is not a point."""
+        if self.row.row.kind == "texts":
+            return text
+        numbers = [read_number(part) for part in NUMBERS_APART.split(text.strip())]
+        return None if None in numbers else numbers
+
+    def _take(self, at: int, text: str) -> None:
+        value = self._value(text)
+        self.refusal = f"“{text}” is not a point: write its numbers with spaces between." if value is None else ""
+        self.lines[at].show_refused(value is None)
+        self.came.emit()
+        if value is not None:
+            self.asked.emit(SetValue((*self.row.row.path, at), value, typing=True))
 
 
 class EitherField(Field):
@@ -137,6 +168,9 @@ class EitherField(Field):
         self.inner = field(self._chosen(row))
         self.inner.asked.connect(self.asked)
         self.inner.open_asked.connect(self.open_asked)
+        self.inner.copy_asked.connect(self.copy_asked)
+        if isinstance(self.inner, EntryList):
+            self.inner.changes.connect(lambda asked, _after: self.asked.emit(asked))
         self.inner.came.connect(self.came)
         self.box.addWidget(self.inner)
         self.setFocusProxy(self.inner)

@@ -17,14 +17,19 @@ NUMBER_PX, ICON_PX, OPEN_PX = 18, 18, 32
 INSET_PX = NUMBER_PX + ICON_PX + 2 * 8
 
 
-class QuestionRow(QWidget):
-    """One question; ``opened`` when it is clicked or its button is pressed."""
+class QuestionRow(Themed, QWidget):
+    """One question.
+
+    Signals: ``opened`` when it is clicked or its button is pressed, ``joined`` when it is clicked with Shift (True) or
+    Ctrl (False).
+    """
 
     opened = Signal()
+    joined = Signal(bool)
 
     def __init__(self, line: QuestionLine) -> None:
         super().__init__()
-        self.line = line
+        self.line, self.chosen = line, False
         title = next((text for text in line.texts if text), "without a text")
         self.setAccessibleName(f"Question {line.number}, {line.kind}: {title}")
         self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -75,9 +80,30 @@ class QuestionRow(QWidget):
         return made
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Open the question."""
-        if event.button() == Qt.MouseButton.LeftButton and self.rect().contains(event.position().toPoint()):
+        """Open the question, or select it with others."""
+        if event.button() != Qt.MouseButton.LeftButton or not self.rect().contains(event.position().toPoint()):
+            return
+        shift = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+        if shift or event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+            self.joined.emit(bool(shift))
+        else:
             self.opened.emit()
+
+    def show_chosen(self, chosen: bool) -> None:
+        """Show whether it is selected with the question that is edited."""
+        if chosen != self.chosen:
+            self.chosen = chosen
+            self.setAccessibleDescription("Selected" if chosen else "")
+            self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Tint the row where it is selected."""
+        if self.chosen:
+            painter = QPainter(self)
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(self.theme.selected))
+            painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
 
 
 def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
@@ -90,9 +116,13 @@ def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
 
 
 class QuestionRows(QWidget):
-    """Questions above or below the one that is edited; ``write_asked`` carries the path of one."""
+    """Questions above or below the one that is edited.
+
+    ``write_asked`` carries the path of one, ``join_asked`` also whether all between are selected with it.
+    """
 
     write_asked = Signal(object)
+    join_asked = Signal(object, bool)
 
     def __init__(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...] = ()) -> None:
         super().__init__()
@@ -105,6 +135,7 @@ class QuestionRows(QWidget):
         for line in lines:
             made = QuestionRow(line)
             made.opened.connect(lambda path=line.path: self.write_asked.emit(path))
+            made.joined.connect(lambda all_between, path=line.path: self.join_asked.emit(path, all_between))
             column.addWidget(made)
             column.addWidget(Rule())
             self.rows.append(made)

@@ -14,18 +14,19 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.designer.form_rows import FormRow, choice_words, new_words
-from study_app.viewmodels.designer.requests import AddEntry, AddNamed, RemoveKey, SetValue, SwitchKind
+from study_app.viewmodels.designer.requests import AddNamed, RemoveKey, SetValue, SwitchKind
 
 MOST_SEGMENTS, SEGMENT_LETTERS = 4, 34
 NUMBER_PX = 96
-_PARTS = re.compile(r",?[;\s]+")
+NUMBERS_APART = re.compile(r",?[;\s]+")
 
 
 class Field(QWidget):
     """Edits the value of one row.
 
-    ``asked`` carries a request, ``open_asked`` the path of an element to select, ``copy_asked`` that of one to copy,
-    ``write_asked`` that of one whose text is to be written; ``came`` says that it is focused; ``caption`` stands above
+    ``asked`` carries a request, ``open_asked`` the path of an element to select, ``copy_asked`` those to copy,
+    ``write_asked`` that of one whose text is to be written, ``join_asked`` that of one that joins or leaves the
+    selection, and whether with all between; ``came`` says that it is focused; ``caption`` stands above
     an editor that takes the width of the form.
     """
 
@@ -33,6 +34,7 @@ class Field(QWidget):
     copy_asked = Signal(object)
     open_asked = Signal(object)
     write_asked = Signal(object)
+    join_asked = Signal(object, bool)
     came = Signal()
     caption = ""
 
@@ -66,7 +68,7 @@ class Field(QWidget):
         default = self.row.row.default
         if default in (None, "", [], {}):
             return ""
-        return f"{_written(default)} (default)"
+        return f"{written(default)} (default)"
 
 
 class LineField(Field):
@@ -109,7 +111,7 @@ class LineField(Field):
         value = self.row.row.value
         self.line.setPlaceholderText(self.placeholder())
         if not self.refusal:
-            self.line.show_text("" if value is None else _written(value))
+            self.line.show_text("" if value is None else written(value))
 
     def _take(self, text: str) -> None:
         row, before = self.row.row, self.refusal
@@ -123,7 +125,7 @@ class LineField(Field):
                 wanted = "a whole number" if row.kind == "whole number" else "a number"
                 self.refusal = f"“{text}” is not {wanted}: the study keeps the last value."
         elif row.kind in {"numbers", "vector"}:
-            parts = [read_number(part) for part in _PARTS.split(text.strip())]
+            parts = [read_number(part) for part in NUMBERS_APART.split(text.strip())]
             value = parts
             if None in parts:
                 self.refusal = f"“{text}” is not a list of numbers: write them with spaces between."
@@ -268,49 +270,6 @@ class ChecksField(Field):
         self.set_value(there)
 
 
-class LinesField(Field):
-    """Texts, or points, one in each line, with a button that adds one."""
-
-    def __init__(self, row: FormRow) -> None:
-        super().__init__(row)
-        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        self.lines: list[TypedLine] = []
-        self.refusals: set[int] = set()
-        for at in range(len(row.row.value or ())):
-            line = TypedLine(f"{row.row.label} {at + 1}")
-            line.typed.connect(lambda text, at=at: self._take(at, text))
-            line.came.connect(self.came)
-            away = IconButton("cross", f"Remove {row.row.label} {at + 1}", size=FIELD_PX, role="plain")
-            away.clicked.connect(lambda _checked=False, at=at: self.asked.emit(RemoveKey((*self.row.row.path, at))))
-            across = QHBoxLayout()
-            across.addWidget(line)
-            across.addWidget(away)
-            self.box.addLayout(across)
-            self.lines.append(line)
-        self.add = add_button(f"Add to {row.row.label}")
-        self.add.clicked.connect(lambda: self.asked.emit(AddEntry(self.row.row.path)))
-        self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
-        self.setFocusProxy(self.lines[0] if self.lines else self.add)
-        self.show_value()
-
-    def show_value(self) -> None:
-        """Show each entry."""
-        for line, value in zip(self.lines, self.row.row.value or (), strict=False):
-            if not line.property("state"):
-                line.show_text(_written(value))
-
-    def _take(self, at: int, text: str) -> None:
-        value: Any = text
-        if self.row.row.kind != "texts":
-            value = [read_number(part) for part in _PARTS.split(text.strip())]
-        wrong = isinstance(value, list) and None in value
-        self.refusal = f"“{text}” is not a point: write its numbers with spaces between." if wrong else ""
-        self.lines[at].show_refused(wrong)
-        self.came.emit()
-        if not wrong:
-            self.asked.emit(SetValue((*self.row.row.path, at), value, typing=True))
-
-
 class UnknownField(Field):
     """A key that does not belong to the table: its value, which can only be removed here."""
 
@@ -322,7 +281,7 @@ class UnknownField(Field):
 
     def show_value(self) -> None:
         """Show the value as it would be written."""
-        self.value.show_text(_written(self.row.row.value))
+        self.value.show_text(written(self.row.row.value))
 
 
 def add_button(name: str, words: str = "") -> ActionButton:
@@ -348,10 +307,10 @@ def read_number(text: str) -> int | float | None:
     return value if abs(value) != float("inf") and value == value else None  # noqa: PLR0124 - NaN
 
 
-def _written(value: Any) -> str:
+def written(value: Any) -> str:
     """Return a value as it is typed: numbers of a list with spaces between."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple | list):
-        return "  ".join(_written(part) for part in value)
+        return "  ".join(written(part) for part in value)
     return str(value)

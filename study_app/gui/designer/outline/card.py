@@ -20,7 +20,8 @@ class OutlineCard(Card):
 
     Signals: ``chosen`` (path), ``settled`` (an element was clicked), ``find_changed`` (words), ``add_asked``,
     ``duplicate_asked``, ``delete_asked``, ``copy_asked``, ``paste_asked``, ``rename_asked``, ``move_asked`` (by how
-    many places), ``dropped`` (entries of a list, and the index of the one that they come before).
+    many places), ``dropped`` (entries of a list, and the index of the one that they come before), ``several_changed``
+    (what else is selected).
     """
 
     chosen = Signal(object)
@@ -34,6 +35,7 @@ class OutlineCard(Card):
     rename_asked = Signal()
     move_asked = Signal(int)
     dropped = Signal(object, int)
+    several_changed = Signal()
 
     def __init__(self) -> None:
         super().__init__(padding=12, gap=8)
@@ -70,6 +72,7 @@ class OutlineCard(Card):
         self.column.addLayout(buttons)
         self.words.textChanged.connect(self.find_changed)
         self.tree.selectionModel().currentChanged.connect(self._choose)
+        self.tree.selectionModel().selectionChanged.connect(lambda _now, _before: self.several_changed.emit())
         self.tree.clicked.connect(self._click)
         self.tree.expanded.connect(lambda index: self._opened.add(self._key(index)))
         self.tree.collapsed.connect(lambda index: self._opened.discard(self._key(index)))
@@ -95,15 +98,16 @@ class OutlineCard(Card):
         found = {row.path for row in self.tree.selected_rows()}
         return tuple(sorted(found, key=lambda path: order.get(path, 0)))
 
-    def select_several(self, paths: tuple[ElementPath, ...]) -> None:
-        """Select elements together, beside the current one."""
+    def select_several(self, paths: tuple[ElementPath, ...], *, selects: bool = True) -> None:
+        """Select elements together with the current one, or no longer."""
         flags = QItemSelectionModel.SelectionFlag
+        flag = flags.Select if selects else flags.Deselect
         self._filling = True
         for index in self._indexes():
             if index.data(ROW_ROLE).path in paths and index.data(ROW_ROLE).path:
                 if index.parent().isValid():
                     self.tree.expand(index.parent())
-                self.tree.selectionModel().select(index, flags.Select)
+                self.tree.selectionModel().select(index, flag)
         self._filling = False
 
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:

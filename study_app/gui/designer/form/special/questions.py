@@ -22,6 +22,7 @@ class QuestionsField(Field):
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.rows = QuestionRows(row.facts.lines, row.facts.languages)
         self.rows.write_asked.connect(self.write_asked)
+        self.rows.join_asked.connect(self.join_asked)
         self.add = add_button(f"Add to {row.row.label}", "Question")
         self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.row.path)))
         self.box.addWidget(self.rows)
