@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, Final
 
 from study_app.authoring.changes.initial_values import LETTER, initial, singular
 from study_app.authoring.fields import label_of, row_at, rows
-from study_app.authoring.names import free_name
-from study_app.authoring.repairs import repairs
+from study_app.authoring.names import check_id, free_name, sections_at
+from study_app.authoring.repairs import Repair, is_unknown_name, removes, repairs
 from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Set
 from study_app.authoring.writer.refused import Refused
@@ -77,6 +78,19 @@ def added(
         else:
             others += _outside(after, fault)
     return (first, *others), path
+
+
+def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
+    """Return the repairs of a text that names nothing: each adds an element of that name."""
+    name = value_at(study.document, fault.path)
+    if not is_unknown_name(fault) or not isinstance(name, str):
+        return ()
+    found: list[Repair] = []
+    for section in sections_at(fault.path):
+        with suppress(Refused):
+            check_id(name)
+            found.append(Repair(f'Add {singular(section)} "{name}"', added(study, (section,), name=name)[0]))
+    return tuple(one for one in found if removes(study, fault, one))
 
 
 def duplicated(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:

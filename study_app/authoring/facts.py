@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Final
 
+from study_app.authoring.measures.texts import missing_texts
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study import Study
 from study_app.haptics.model.steady_state import HAND_MPS, steady
@@ -52,10 +53,7 @@ class Facts:
 @lru_cache(maxsize=2)
 def facts(study: Study) -> Facts:
     """Return the facts of a study."""
-    missing: dict[str, int] = {}
-    for fault in study.faults:
-        if (code := fault.missing_language) is not None:
-            missing[code] = missing.get(code, 0) + 1
+    missing = missing_texts(study)
     valid = valid_part(study)
     if (protocol := valid.protocol) is None:
         return Facts(missing=missing)

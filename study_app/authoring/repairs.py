@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -10,12 +11,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from study_app.authoring.changes.initial_values import initial
+from study_app.authoring.names import choices_at
 from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Insert, Rename, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.checks.pace import paced
 from study_app.protocol.source.document import value_at
 from study_app.protocol.source.problems import Fault, shown
+from study_app.protocol.wording.languages import language_name
 
 _MEANT: Final = re.compile(r'did you mean "([^"]+)"\?')
 _BOUND: Final = re.compile(r"must be (?:at least |at most )?([\d.e+-]+)(?: |$)")
@@ -35,10 +38,11 @@ class Repair:
 def repairs(study: Study, fault: Fault) -> tuple[Repair, ...]:
     """Return the repairs of a fault: after each of them it is gone."""
     offered = (repair for kind in _KINDS for repair in kind(study, fault))
-    return tuple(repair for repair in offered if _removes(study, fault, repair))
+    return tuple(repair for repair in offered if removes(study, fault, repair))
 
 
-def _removes(study: Study, fault: Fault, repair: Repair) -> bool:
+def removes(study: Study, fault: Fault, repair: Repair) -> bool:
+    """Return whether a fault is gone after a repair, and there are not more than before."""
     try:
         after, _ = study.edited(*repair.edits)
     except Refused:
@@ -54,6 +58,19 @@ def _meant(study: Study, fault: Fault) -> Iterator[Repair]:
         word = found[1]
         edit = Rename(fault.path, word) if fault.message == "unknown key" else Set(fault.path, word)
         yield Repair(f'Use "{word}"', (edit,))
+
+
+def _named(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the nearest name for one that names nothing."""
+    name, choices = value_at(study.document, fault.path), choices_at(study.document, fault.path)
+    if is_unknown_name(fault) and isinstance(name, str) and choices and not _MEANT.search(fault.hint):
+        nearest = difflib.get_close_matches(name, choices, n=1, cutoff=0.0)[0]
+        yield Repair(f'Use "{nearest}"', (Set(fault.path, nearest),))
+
+
+def is_unknown_name(fault: Fault) -> bool:
+    """Return whether a text names something that is not in the study."""
+    return fault.message.startswith("there is no ")
 
 
 def _missing(study: Study, fault: Fault) -> Iterator[Repair]:
@@ -106,7 +123,7 @@ def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
     text = value_at(study.document, fault.path)
     if (lacking := fault.missing_language) and isinstance(text, Mapping) and text:
         first = next(iter(text))
-        yield Repair(f'Copy the text in "{first}"', (Set((*fault.path, lacking), text[first]),))
+        yield Repair(f"Copy the {language_name(first)} text", (Set((*fault.path, lacking), text[first]),))
     elif fault.in_one_language and isinstance(text, str) and languages:
         copies = dict.fromkeys(languages, text)
         yield Repair("Use this text in every language", (Set(fault.path, copies),))
@@ -161,5 +178,5 @@ def _exponent(value: float, digits: int) -> int:
 
 
 _KINDS: Final[tuple[Callable[[Study, Fault], Iterator[Repair]], ...]] = (
-    _meant, _within_bounds, _levels, _targets, _texts, _steps, _constrained, _missing, _surplus,
+    _meant, _named, _within_bounds, _levels, _targets, _texts, _steps, _constrained, _missing, _surplus,
 )  # fmt: skip

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import pytest
 
+from study_app.authoring.additions import additions_for
 from study_app.authoring.repairs import repairs
 from study_app.authoring.study import Study, read
 from tests.authoring.grown import PROTOCOLS
@@ -49,7 +50,7 @@ def _repaired(case: Case) -> int:
         (
             "rek2024",
             ('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'),
-            'Copy the text in "en"',
+            "Copy the English text",
         ),
         ("rek2024", ('title = { en = "Welcome", nl = "Welkom" }', 'title = "Hi"'), "Use this text in every language"),
     ],
@@ -61,6 +62,34 @@ def test_repairs_make_a_study_sound_again(name: str, change: tuple[str, str], wo
     (repair, *_) = repairs(study, fault)
     assert repair.words == words
     assert study.edited(*repair.edits)[0].protocol is not None
+
+
+@pytest.mark.parametrize(
+    ("change", "nearest", "added"),
+    [
+        (('liquid = "thick"', 'liquid = "syrup"'), None, 'Add liquid "syrup"'),
+        (('conditions = ["thin", "thick"]', 'conditions = ["thin", "syrup"]'), None, 'Add condition "syrup"'),
+        (('task = "reach"', 'task = "xyz"'), 'Use "', 'Add task "xyz"'),
+    ],
+)
+def test_a_name_of_nothing_is_replaced_by_the_nearest_or_added(
+    change: tuple[str, str], nearest: str | None, added: str
+) -> None:
+    study = study_of("demo", change)
+    fault = next(one for one in study.faults if one.message.startswith("there is no "))
+    words = [one.words for one in repairs(study, fault)]
+    assert any(one.startswith(nearest or 'Use "') for one in words)
+    (repair,) = additions_for(study, fault)
+    assert repair.words == added
+    after, _ = study.edited(*repair.edits)
+    assert len(after.faults) <= len(study.faults)
+    assert fault not in after.faults
+
+
+def test_nothing_is_added_for_a_name_that_is_not_an_id() -> None:
+    study = study_of("demo", ('liquid = "thick"', 'liquid = "Thick syrup"'))
+    fault = next(one for one in study.faults if one.message.startswith("there is no "))
+    assert additions_for(study, fault) == ()
 
 
 @pytest.mark.slow

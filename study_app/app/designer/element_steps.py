@@ -19,7 +19,7 @@ from study_app.authoring.writer.edits import Edit, Insert, Move, Set
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.instruments.instrument import instrument
 from study_app.protocol.source.document import Path, names, value_at
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.wording.languages import language_name
 from study_app.viewmodels.designer.form_rows import step_of
 from study_app.viewmodels.designer.problem_rows import element_of
 from study_app.viewmodels.designer.prompts import DeletePrompt
@@ -108,7 +108,7 @@ def change_language(study: Study, asked: ChangeLanguage) -> Step:
     code = asked.language
     words = {"add": "Add", "copy": "Fill in", "remove": "Remove"}[asked.how]
     edits = {"add": with_language, "copy": filled_in, "remove": without_language}[asked.how](study, code)
-    return Step(f"{words} {LANGUAGES[code].name if code in LANGUAGES else code}", edits)
+    return Step(f"{words} {language_name(code)}", edits)
 
 
 def duplicate(study: Study, asked: DuplicateElement) -> Step:

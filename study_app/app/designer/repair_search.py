@@ -6,6 +6,7 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from study_app.authoring.additions import additions_for
 from study_app.authoring.repairs import Repair, repairs
 from study_app.authoring.study import Study
 from study_app.viewmodels.designer.problem_rows import ProblemRow
@@ -47,7 +48,7 @@ class RepairSearch(QObject):
         if self._study is None or not self._waiting:
             return
         row = self._waiting.pop(0)
-        self._known[row] = repairs(self._study, row.fault)
+        self._known[row] = (*repairs(self._study, row.fault), *additions_for(self._study, row.fault))
         self.found.emit(row, tuple(one.words for one in self._known[row]))
         if self._waiting:
             self._timer.start(0)

@@ -32,7 +32,7 @@ def with_language(study: Study, code: str) -> tuple[Edit, ...]:
         raise Refused(f"the study is in {LANGUAGES[code].name} already")
     if code not in LANGUAGES:
         raise Refused(f'the program has no words in "{code}": there are {", ".join(LANGUAGES)}')
-    tables = (Set(path, {there[0]: text}) for path, text in _texts(study) if isinstance(text, str))
+    tables = (Set(path, {there[0]: text}) for path, text in texts_of(study) if isinstance(text, str))
     return (Set(("study", "languages"), [*there, code]), *tables)
 
 
@@ -47,7 +47,7 @@ def without_language(study: Study, code: str) -> tuple[Edit, ...]:
     there = languages_of(study)
     if code not in there or len(there) == 1:
         raise Refused("a study has at least one language")
-    gone = (Unset((*path, code)) for path, text in _texts(study) if isinstance(text, Mapping) and code in text)
+    gone = (Unset((*path, code)) for path, text in texts_of(study) if isinstance(text, Mapping) and code in text)
     return (*gone, Set(("study", "languages"), [one for one in there if one != code]))
 
 
@@ -55,7 +55,7 @@ def filled_in(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that copy the first language's texts where a language has none."""
     first = languages_of(study)[0]
     found: list[Edit] = []
-    for path, text in _texts(study):
+    for path, text in texts_of(study):
         if isinstance(text, Mapping) and code not in text and first in text:
             found.append(Set((*path, code), _plain(text[first])))
         elif isinstance(text, str):
@@ -63,7 +63,8 @@ def filled_in(study: Study, code: str) -> tuple[Edit, ...]:
     return tuple(found)
 
 
-def _texts(study: Study) -> Iterator[tuple[Path, Any]]:
+def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:
+    """Yield every text that is in the languages of a study, labels of scales included, with its place."""
     for pattern in TEXTS:
         yield from entries(study.document, pattern)
 

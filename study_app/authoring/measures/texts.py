@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
-from study_app.authoring.changes.languages import languages_of
+from study_app.authoring.changes.languages import languages_of, texts_of
 from study_app.authoring.fields import is_localised, label_of
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import alternatives
@@ -37,12 +37,17 @@ def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
     """Return for each language how many texts it has, and how many it should have."""
     languages = languages_of(study)
     counted = {code: [0, 0] for code in languages}
-    for _, value in _texts(study.document):
+    for _, value in texts_of(study):
         for place, code in enumerate(languages):
             counted[code][1] += 1
-            text = value.get(code) if isinstance(value, Mapping) else value if place == 0 or len(languages) == 1 else ""
-            counted[code][0] += bool(isinstance(text, str) and text.strip())
+            text = value.get(code) if isinstance(value, Mapping) else value if place == 0 else ""
+            counted[code][0] += bool(text.strip() if isinstance(text, str) else text)
     return {code: (there, wanted) for code, (there, wanted) in counted.items()}
+
+
+def missing_texts(study: Study) -> dict[str, int]:
+    """Return how many texts each language lacks; none where it lacks none."""
+    return {code: wanted - there for code, (there, wanted) in texts_by_language(study).items() if there < wanted}
 
 
 def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:

@@ -74,7 +74,7 @@ def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]
     A key that is wrong only because another element was left out (``of_others``) is left out before its own element.
     """
     path = fault.path
-    if (missing := fault.missing_language) is not None and path and path[-1] != missing:
+    if (missing := fault.missing_language) and path and path[-1] != missing:
         known = value_at(document, path)
         others = known.values() if isinstance(known, Mapping) else ()
         return (*path, missing), next(iter(others), TEXT)

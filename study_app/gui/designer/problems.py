@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
@@ -142,7 +142,8 @@ class ProblemsCard(Card):
         self.heading.setText(f"{len(rows)} problem{'s' * (len(rows) != 1)}" if rows else "No problems")
         self.limit.show_values(((False, "All"), (True, "Here only")), self._here_only)
         self.next.setEnabled(bool(rows))
-        self.setFixedHeight(min(HIGHEST, HEAD_PX + (ROW_PX + 1) * max(1, len(rows))))
+        wanted = min(HIGHEST, HEAD_PX + (ROW_PX + 1) * max(1, len(rows)))
+        self.setFixedHeight(max(wanted, self.height()) if self.under_pointer else wanted)
         if unchanged and self.lines:
             return
         inside = QWidget()
@@ -163,6 +164,18 @@ class ProblemsCard(Card):
         column.addStretch()
         dress(inside, self.theme)
         self.area.setWidget(inside)
+
+    @property
+    def under_pointer(self) -> bool:
+        """Whether the pointer is over the list: it keeps its height then, else a click would hit what is below."""
+        return self.isVisible() and self.underMouse()
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+        """Take the height that the problems need; without any the list is closed."""
+        super().leaveEvent(event)
+        self.show_problems(self.rows, self._element, {})
+        if not self.rows:
+            self.close_asked.emit()
 
     def show_repairs(self, row: ProblemRow, repairs: tuple[str, ...]) -> None:
         """Offer the repairs of a problem."""

@@ -181,7 +181,7 @@ class DesignerPlace(Place):
         self.problems.show_problems(view.problems, view.form.path, self._repairs)
         self.outline.duplicate.setEnabled(self.form.head.copy.isEnabled())
         self.outline.add.setEnabled(not view.header.read_only)
-        if not view.problems and before.problems:
+        if not view.problems and before.problems and not self.problems.under_pointer:
             self.problems.hide()
         self.outline.tree.rows.movable = not view.header.read_only
         self.parts.path.show_form(view.form)

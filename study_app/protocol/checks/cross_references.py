@@ -11,8 +11,8 @@ from typing import Any
 
 from study_app.protocol.groups.group import SEQUENCES, sequences_in
 from study_app.protocol.source.document import Path, entries, names
-from study_app.protocol.source.problems import MISSING_TEXT, ONE_LANGUAGE, Fault, did_you_mean
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.source.problems import ONE_LANGUAGE, Fault, did_you_mean
+from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 REFERENCES = {
     "conditions.*.liquid": "liquids",
@@ -203,7 +203,8 @@ def _translations(path: Path, text: Any, wanted: tuple[str, ...]) -> Iterator[Fa
     elif isinstance(text, Mapping):
         for language in wanted:
             if language not in text:
-                yield Fault(path, MISSING_TEXT.format(language), "every text exists in every language of the study")
+                hint = f"add {language}: every text exists in every language of the study"
+                yield Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language)
         for language in text:
             if language not in wanted:
                 yield Fault((*path, language), "is not a language of the study", f"these are: {', '.join(wanted)}")

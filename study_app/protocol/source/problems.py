@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
@@ -18,24 +17,20 @@ from study_app.protocol.source.line_numbers import Places
 Schema = Mapping[str, Any]
 
 
-MISSING_TEXT: Final = 'is missing in "{}"'
 ONE_LANGUAGE: Final = "is in one language, the study in several"
-_MISSING: Final = re.compile(MISSING_TEXT.format("([a-z]{2})"))
 
 
 class Fault(NamedTuple):
-    """A problem before its line is known; indices in ``path`` count from 0."""
+    """A problem before its line is known; indices in ``path`` count from 0.
+
+    ``missing_language`` is the code of the language that a text lacks, "" where another thing is wrong.
+    """
 
     path: Path
     message: str
     hint: str = ""
     counts_entries: bool = False
-
-    @property
-    def missing_language(self) -> str | None:
-        """The language that a text lacks; None where another thing is wrong."""
-        found = _MISSING.fullmatch(self.message)
-        return None if found is None else found[1]
+    missing_language: str = ""
 
     @property
     def in_one_language(self) -> bool:

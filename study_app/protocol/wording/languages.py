@@ -11,9 +11,14 @@ from study_app.protocol.wording.french import FRENCH
 from study_app.protocol.wording.german import GERMAN
 from study_app.protocol.wording.words import Words
 
-__all__ = ["LANGUAGES", "Words", "words"]
+__all__ = ["LANGUAGES", "Words", "language_name", "words"]
 
 LANGUAGES = {words.language: words for words in (ENGLISH, DUTCH, GERMAN, FRENCH, ARABIC)}
+
+
+def language_name(code: str) -> str:
+    """Return the name of a language, its code where the program has no words in it."""
+    return LANGUAGES[code].name if code in LANGUAGES else code
 
 
 def words(language: str) -> Words:

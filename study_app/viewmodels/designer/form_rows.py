@@ -8,13 +8,14 @@ from typing import Any, Final
 
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
+from study_app.authoring.measures.texts import missing_texts
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.protocol.groups.group import sequences_in
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.line_numbers import Places, places_of
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.wording.languages import LANGUAGES, language_name
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
 from study_app.viewmodels.designer.special import FACTS
 from study_app.viewmodels.designer.special.questions import QuestionLines, question_lines
@@ -295,7 +296,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         _sentence(study, fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path
     )
     if path == STUDY_LANGUAGES:
-        row = replace(row, choices=tuple(Choice(code, _language(code)) for code in LANGUAGES))
+        row = replace(row, choices=tuple(Choice(code, language_name(code)) for code in LANGUAGES))
     codes = [str(code) for _, code in entries(document, "study.languages.*")] or ["en"]
     number = None
     if row.kind == "either":
@@ -304,7 +305,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         row,
         place,
         faults,
-        tuple((code, _language(code)) for code in codes) if row.kind in {"localised", "paragraphs"} else (),
+        tuple((code, language_name(code)) for code in codes) if row.kind in {"localised", "paragraphs"} else (),
         tuple(_entries(study, row)),
         named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
         number,
@@ -314,10 +315,11 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
 
 def _entries(study: Study, row: Row) -> Iterator[Entry]:
     if row.path == STUDY_LANGUAGES:
+        lacking = missing_texts(study)
         for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
-            missing = sum(fault.missing_language == code for fault in study.faults)
+            missing = lacking.get(code, 0)
             note = f"{missing} missing" if missing else "every text"
-            yield Entry((*row.path, at), _language(str(code)), note, missing)
+            yield Entry((*row.path, at), language_name(str(code)), note, missing)
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))
         for key in keys:
@@ -352,10 +354,6 @@ def _sentence(_study: Study, message: str, hint: str) -> str:
 def is_right_to_left(code: str) -> bool:
     """Return whether a language is written from right to left."""
     return code in LANGUAGES and LANGUAGES[code].right_to_left
-
-
-def _language(code: str) -> str:
-    return LANGUAGES[code].name if code in LANGUAGES else code
 
 
 def new_words(section: str) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from study_app.protocol.orders.schedule import PageStep, Step, Trial
-from study_app.protocol.wording.languages import LANGUAGES, Words, words
+from study_app.protocol.wording.languages import Words, language_name, words
 from study_app.session.pages import Page
 from study_app.session.simulated.preview import Preview
 from study_app.session.transitions.previewed_pages import Moment
@@ -78,7 +78,7 @@ class ParticipantView:
     @property
     def name(self) -> str:
         """What the page is called for a screen reader."""
-        named = LANGUAGES[self.language].name if self.language in LANGUAGES else self.language
+        named = language_name(self.language)
         return f"Participant's page, {named}"
 
 

@@ -196,7 +196,7 @@ def test_a_language_is_added_everywhere_filled_in_and_taken_away(qtbot: Any, des
     field = designer.row("study", "languages").field
     field.names.activated.emit(field.names.findData("ar"))
     study = designer.editing.opened.study
-    missing = [fault for fault in study.faults if fault.message == 'is missing in "ar"']
+    missing = [fault for fault in study.faults if fault.missing_language == "ar"]
     assert missing
     assert study.document["pages"]["welcome"]["title"].keys() == {"en"}
     field = designer.row("study", "languages").field

@@ -71,6 +71,10 @@ def test_texts_are_counted_by_language() -> None:
     assert dutch == (there, wanted)
     lacking, _ = study.edited(Unset(("blocks", "liquids", "title", "nl")))
     assert texts_by_language(lacking)["nl"] == (wanted - 1, wanted)
+    (labels, _), plain = texts_by_language(study)["nl"], Set(("blocks", "liquids", "title"), "Hi")
+    without, _ = study.edited(Unset(("scales", "agreement", "labels", "nl")), plain)
+    assert texts_by_language(without) == {"en": (wanted, wanted), "nl": (labels - 2, wanted)}
+    assert facts(without).missing == {"nl": 2}
     assert {"title", "body", "setting_label", "instruction"} <= text_keys()
 
 

@@ -20,7 +20,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.orders.durations import answering_s
 from study_app.protocol.source.document import Path
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.wording.languages import language_name
 from study_app.viewmodels.designer.measures.cards import (
     UNKNOWN,
     BalanceCard,
@@ -114,9 +114,9 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
 
 def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     """Return whether texts are missing, and whether a text reveals a condition."""
-    missing = ", ".join(f"{count} in {_language(code)}" for code, count in facts.missing.items())
+    missing = ", ".join(f"{count} in {language_name(code)}" for code, count in facts.missing.items())
     codes = tuple(texts_by_language(study))
-    languages = " and ".join(_language(code) for code in codes) if len(codes) < 3 else f"{len(codes)} languages"
+    languages = " and ".join(language_name(code) for code in codes) if len(codes) < 3 else f"{len(codes)} languages"
     found: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
     if not missing:
         found = [("ok", "check", f"Every text in {languages}")]
@@ -196,7 +196,7 @@ def texts_card(study: Study) -> TextsCard:
     lines = []
     for code, (there, wanted) in texts_by_language(study).items():
         verdict: Verdict = ("ok", "check", "complete") if there == wanted else ("bad", "warning", "texts are missing")
-        lines.append(Line(_language(code), f"{there} of {wanted}", there / max(1, wanted), verdict))
+        lines.append(Line(language_name(code), f"{there} of {wanted}", there / max(1, wanted), verdict))
     protocol = valid_part(study).protocol
     found = () if protocol is None else revealing(study, protocol)
     revealed = tuple((f"{one.element}, {one.key.lower()}: “{one.word}”", one.path) for one in found)
@@ -235,10 +235,6 @@ def _title(study: Study, name: str, section: str = "") -> str:
     sections = (section,) if section else ("blocks", "pages", "questionnaires")
     inside = next((one for one in sections if name in study.document.get(one, {})), "blocks")
     return title_of(study.document, (inside, name))
-
-
-def _language(code: str) -> str:
-    return LANGUAGES[code].name if code in LANGUAGES else code
 
 
 def _sentence(words: str) -> str:

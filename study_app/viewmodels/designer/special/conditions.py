@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from study_app.authoring.fields import Row
+from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.haptics.model.steady_state import HAND_MPS, steady
@@ -61,8 +62,8 @@ def _line(study: Study, name: Any) -> ConditionLine:
     delay_ms = table.get("delay_ms", 0)
     if isinstance(delay_ms, int | float):
         words.append(f"{delay_ms:g} ms late")
-    protocol = study.protocol
-    if protocol is None or liquid is None:
+    protocol = valid_part(study).protocol
+    if protocol is None or liquid is None or name not in protocol.conditions:
         return ConditionLine(liquid, ", ".join(words), UNKNOWN)
     found = steady(protocol.scene_for(str(name)))
     return ConditionLine(liquid, ", ".join(words), f"{found.force_n:.2f} N", found.limit is not None)

@@ -9,7 +9,7 @@ from typing import Final
 from study_app.authoring.fields import Row
 from study_app.authoring.study import Study
 from study_app.protocol.source.document import entries
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.wording.languages import language_name
 from study_app.viewmodels.designer.row_facts import RowFacts
 
 
@@ -29,7 +29,7 @@ def scale_points(study: Study, row: Row) -> ScalePoints:
     columns = [labels[code] if isinstance(labels.get(code), tuple) else () for code in codes]
     count = max(map(len, columns), default=0)
     points = tuple(tuple(str(column[at]) if at < len(column) else "" for column in columns) for at in range(count))
-    return ScalePoints(tuple((code, LANGUAGES[code].name if code in LANGUAGES else code) for code in codes), points)
+    return ScalePoints(tuple((code, language_name(code)) for code in codes), points)
 
 
 FACTS: Final = RowFacts((("Scale", "labels"),), scale_points)

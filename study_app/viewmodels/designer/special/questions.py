@@ -9,7 +9,7 @@ from typing import Any, Final
 from study_app.authoring.fields import Row, label_of
 from study_app.authoring.study import Study
 from study_app.protocol.source.document import Path, entries, value_at
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.wording.languages import language_name
 from study_app.viewmodels.designer.row_facts import RowFacts
 
 ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}
@@ -62,7 +62,7 @@ def question_lines(study: Study, path: Path) -> QuestionLines:
     lines = tuple(
         _line(study, (*path, at), item, codes, numbers) for at, item in enumerate(items) if isinstance(item, Mapping)
     )
-    return QuestionLines(tuple(LANGUAGES[code].name if code in LANGUAGES else code for code in codes), lines)
+    return QuestionLines(tuple(language_name(code) for code in codes), lines)
 
 
 def _line(

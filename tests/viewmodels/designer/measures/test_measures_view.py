@@ -90,7 +90,7 @@ def test_a_questionnaire_shows_each_time_it_is_asked_and_its_languages() -> None
     assert asked.figures == (("0:59", "min"), ("9", "answers"))
     assert [words for _, _, words in asked.verdicts] == ["2 pages at 1366 × 768", "27 answers a session, asked 3 times"]
     assert isinstance(texts, TextsCard)
-    assert [line.number for line in texts.languages] == ["59 of 59", "59 of 59"]
+    assert [line.number for line in texts.languages] == ["60 of 60", "60 of 60"]
 
 
 def test_a_force_that_a_limit_clips_is_said_and_sums_of_a_broken_study_are_not_known() -> None:

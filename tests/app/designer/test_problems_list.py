@@ -1,0 +1,58 @@
+"""The list of problems under the pointer, and what is shown of a study whose only problems are missing texts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtCore import QEvent, QPointF
+from PySide6.QtGui import QEnterEvent
+from PySide6.QtWidgets import QApplication, QWidget
+
+from study_app.authoring.facts import facts
+from study_app.protocol.source.files import shipped_file
+from study_app.viewmodels.designer.requests import SetValue
+
+
+def enter(part: QWidget) -> None:
+    QApplication.sendEvent(part, QEnterEvent(QPointF(5, 5), QPointF(5, 5), QPointF(5, 5)))
+
+
+def leave(part: QWidget) -> None:
+    QApplication.sendEvent(part, QEvent(QEvent.Type.Leave))
+
+
+def test_the_list_keeps_its_height_and_stays_while_the_pointer_is_over_it(designer: Any) -> None:
+    text = designer.file.read_text()
+    broken = text.replace("force_limit_n = 6", "force_limit_n = 60").replace('liquid = "thick"', 'liquid = "thik"', 1)
+    designer.file.write_text(broken.replace("[blocks.liquids]\n", "[blocks.liquids]\nnonsense = 1\n"))
+    designer.controller.open("kitchen")
+    designer.place.header.problems.click()
+    problems, count = designer.place.problems, len(designer.place.view.problems)
+    assert count >= 2
+    enter(problems)
+    high = problems.height()
+    designer.editing.ask(SetValue(("device", "force_limit_n"), 6))
+    assert len(designer.place.view.problems) < count
+    assert problems.height() == high
+    leave(problems)
+    assert problems.height() < high
+    enter(problems)
+    designer.editing.type_text("Correct the file", text)
+    assert designer.place.view.problems == ()
+    assert problems.isVisible()
+    leave(problems)
+    assert not problems.isVisible()
+
+
+def test_a_text_that_is_missing_hides_no_force_and_is_counted_the_same_everywhere(designer: Any) -> None:
+    text = shipped_file("rek2024").read_text().replace('name = "rek2024"', 'name = "kitchen"')
+    designer.file.write_text(text.replace('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'))
+    designer.controller.open("kitchen")
+    designer.editing.select(("blocks", "liquids"))
+    lines = designer.row("blocks", "liquids", "conditions").row.facts
+    assert all(line.force.endswith(" N") for line in lines)
+    designer.editing.select(("study",))
+    languages = designer.row("study", "languages").field.row.entries
+    assert [entry.note for entry in languages] == ["every text", "1 missing"]
+    assert facts(designer.editing.opened.study).missing == {"nl": 1}
+    assert [problem.message for problem in designer.place.view.problems] == ["Is missing in Nederlands"]
