@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.gui.theme.theme import font
 
 HAND_ON_MS = 150
 """What is typed is handed on so long after the first key [ms]: typing without a rest is kept as well."""
+CLICK_MS = 10
+"""How often it is looked whether the click is done that the keyboard left a field by [ms]."""
 FIELD_PX = 34
 KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
 
@@ -34,7 +36,7 @@ class _Typed(_Base):
         self._before = ""
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)
-        self._rest.timeout.connect(self.flush)
+        self._rest.timeout.connect(self._flush_after_click)
 
     def note(self) -> None:
         """Note that something was typed."""
@@ -48,6 +50,13 @@ class _Typed(_Base):
         if self.pending:
             self.pending = False
             self.typed.emit(self.words())
+
+    def _flush_after_click(self) -> None:
+        """Hand on what was typed, once no button is pressed and no list is open: another form would take it away."""
+        if QApplication.mouseButtons() == Qt.MouseButton.NoButton and QApplication.activePopupWidget() is None:
+            self.flush()
+        else:
+            self._rest.start(CLICK_MS)
 
     def accept(self) -> None:
         """Hand on what was typed; Esc restores it from now on, unless it is refused."""
@@ -99,9 +108,12 @@ class _Typed(_Base):
         self.came.emit()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Hand on what was typed."""
+        """Hand on what was typed; after a click elsewhere once that is done."""
         super().focusOutEvent(event)
-        self.flush()
+        if event.reason() != Qt.FocusReason.MouseFocusReason:
+            self.flush()
+        elif self.pending:
+            self._rest.start(CLICK_MS)
 
 
 class TypedLine(_Typed, QLineEdit):

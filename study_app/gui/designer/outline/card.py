@@ -200,9 +200,10 @@ class OutlineCard(Card):
             self.chosen.emit(index.data(ROW_ROLE).path)
 
     def _click(self, index: QModelIndex) -> None:
-        if self.items.hasChildren(index):
+        inner = self.items.hasChildren(index)
+        if inner:
             self.tree.setExpanded(index, not self.tree.isExpanded(index))
-        elif index.data(ROW_ROLE).path:
+        if len(index.data(ROW_ROLE).path) > int(inner):  # not the heading of several
             self.settled.emit()
 
     def _key_pressed(self, key: int) -> None:

@@ -1,0 +1,45 @@
+"""Clicks that follow typing, and clicks in the drawer of a small window."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
+from shiboken6 import isValid
+
+from study_app.gui.designer.outline.rows import ROW_ROLE
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+def test_a_list_that_is_clicked_after_an_id_was_typed_stays_open(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("conditions", "thick"))
+    name = designer.place.form.head.id
+    qtbot.mouseClick(name, LEFT)
+    name.selectAll()
+    qtbot.keyClicks(name, "honey")
+    liquids = designer.row("conditions", "thick", "liquid").field.list
+    qtbot.mouseClick(liquids, LEFT)
+    qtbot.wait(100)
+    assert isValid(liquids)
+    assert liquids.view().isVisible()
+    assert "[conditions.thick]" in designer.text
+    liquids.hidePopup()
+    qtbot.waitUntil(lambda: "[conditions.honey]" in designer.text)
+    assert designer.place.view.form.path == ("conditions", "honey")
+
+
+def test_a_click_on_a_block_in_the_drawer_closes_it(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.window.resize(1366, 768)
+    outline, tree = designer.place.outline, designer.place.outline.tree
+    for path, closes in ((("blocks", "liquids"), True), (("conditions",), False)):
+        designer.place.parts.focus_outline()
+        QApplication.processEvents()
+        index = next(one for one in outline._indexes() if one.data(ROW_ROLE).path == path)
+        tree.scrollTo(index)
+        qtbot.mouseClick(tree.viewport(), LEFT, pos=tree.visualRect(index).center())
+        assert designer.place.view.form.path == path
+        assert outline.isVisible() is not closes
