@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, Final
@@ -17,6 +18,7 @@ from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.protocol.source.problems import Fault, rule_of
 
 _ROUNDS: Final = 12
+_KNOWN: Final = re.compile(r"known: (.+)")
 
 
 def added(
@@ -69,12 +71,20 @@ def added(
         if fault is None:
             break
         tried.add((fault.path, fault.message))
-        if (
-            fault.path[: len(path)] == path
-            and value_at(after.document, fault.path) is None
-            and len(fault.path) > len(path)
-        ):
-            _put(value, fault.path[len(path) :], initial(after.document, fault.path))
+        inner = fault.path[len(path) :] if fault.path[: len(path)] == path else ()
+        if inner and value_at(after.document, fault.path) is None:
+            asked = row_at(after.document, fault.path)
+            if asked is not None and asked.kind == "reference" and asked.sections and not asked.choices:
+                named, made = added(after, asked.sections[:1])
+                others += named
+                _put(value, inner, made[-1])
+            else:
+                _put(value, inner, initial(after.document, fault.path))
+        elif inner and (known := _KNOWN.match(fault.hint)):
+            for word in known[1].split(", "):
+                _put(value, inner, word)
+                if fault.path not in {one.path for one in study.edited(first, *others)[0].faults}:
+                    break
         else:
             others += _outside(after, fault)
     return (first, *others), path

@@ -4,6 +4,7 @@ import pytest
 
 from study_app.authoring.additions import added, duplicated
 from study_app.authoring.fields import row_at
+from study_app.authoring.new_study import template
 from study_app.authoring.study import read
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path
@@ -43,6 +44,22 @@ def test_a_new_task_of_each_kind_passes_check(kind: str) -> None:
     before = read((PROTOCOLS / "slime.toml").read_bytes(), PROTOCOLS)
     edits, _ = added(before, ("tasks",), {"kind": kind})
     assert before.edited(*edits)[0].faults == ()
+
+
+@pytest.mark.parametrize("section", [*SECTIONS[:-1], ("stimuli",), ("designs",), ("methods",)], ids=".".join)
+def test_a_new_element_of_the_empty_study_passes_check(section: Path) -> None:
+    before = template("empty")
+    edits, path = added(before, section)
+    after, _ = before.edited(*edits)
+    assert row_at(after.document, path) is not None
+    assert after.faults == (), after.faults
+
+
+def test_a_new_questionnaire_of_the_empty_study_has_a_scale_and_texts_in_words() -> None:
+    before = template("empty")
+    after, _ = before.edited(*added(before, ("questionnaires",))[0])
+    assert after.document["questionnaires"]["questionnaire"]["scale"] in after.document["scales"]
+    assert [item["short"] for item in after.document["questionnaires"]["questionnaire"]["items"]] == ["New question"]
 
 
 def test_nothing_is_added_to_what_holds_no_elements() -> None:

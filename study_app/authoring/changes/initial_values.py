@@ -92,7 +92,7 @@ def _text(document: Mapping[str, Any], path: Path, node: Node, *, localised: boo
         used = {letter for _, letter in entries(document, f"{path[0]}.*.{path[-1]}")}
         return next((letter for letter in string.ascii_uppercase if letter not in used), "Z")
     name = around.get("id", path[-2]) if isinstance(around, Mapping) else path[-2]
-    words = f"New {label_of(str(name)).lower()}"
+    words = f"New {singular(path[-3]) if isinstance(name, int) else label_of(str(name)).lower()}"
     return _in_languages(document, words) if localised else words
 
 
