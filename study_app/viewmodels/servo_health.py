@@ -177,7 +177,7 @@ def health_tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, 
             "–" if rate is None else f"{rate:.1f}",
             "Hz",
             "open" if rate is None else _verdict(abs(rate - rate_hz) <= 0.01 * rate_hz),
-            f"requested: {rate_hz:.0f} Hz",
+            f"of {rate_hz:.0f} Hz",
         ),
         Tile(
             "Lateness, p99",

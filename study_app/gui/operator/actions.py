@@ -72,7 +72,9 @@ class Actions(Card):
         self.repeat.setEnabled(view.may_repeat)
         for button in (self.pause, self.repeat, self.end):
             button.setVisible(not view.over)
-        self.close_session.setVisible(view.over)
+        if view.over and self.close_session.isHidden():
+            self.close_session.show()
+            self.close_session.setFocus()
         self.hint.setText(_hint(view))
 
     def _pause_or_resume(self) -> None:
@@ -172,6 +174,7 @@ class EndQuestion(Question):
             self.choices.addButton(choice, index)
             self.column.addWidget(choice)
         self.choices.button(1).setChecked(True)
+        self.choices.button(1).setFocus()
         self.reason = QLineEdit()
         self.reason.setFont(font("body"))
         self.reason.setPlaceholderText("Reason (optional)")

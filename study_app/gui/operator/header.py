@@ -24,6 +24,7 @@ STATES: dict[State, tuple[Tone, str]] = {
     "trouble": ("bad", "warning"),
     "ended": ("ok", "check"),
 }
+OTHER_WINDOW = "F6"  # not every desktop has a key for it, above all not in full screen
 BLINDINGS = {"double": ("lock", "Double-blind"), "single": ("eye", "Single-blind")}
 SAVED_RECENTLY_S = 2.0
 PARTS_WIDTH = 120
@@ -110,7 +111,7 @@ class Header(Themed, QWidget):
         self.trials = figures("", "small", "text2")
         self.theme_button = ThemeButton()
         self.theme_button.clicked.connect(self.theme_asked)
-        self.page = ActionButton("", "Participant's window", height=40)
+        self.page = ActionButton("", "Participant's window", key=OTHER_WINDOW, height=40)
         self.page.clicked.connect(self.page_asked)
         self.page.hide()
         self._lay_out()
@@ -121,7 +122,7 @@ class Header(Themed, QWidget):
         row.setSpacing(12)
         row.addWidget(Logo())
         row.addLayout(_column(self.study, self.who))
-        row.addSpacing(28)
+        row.addSpacing(8)
         for chip in (self.state, self.blind, self.saved):
             row.addWidget(chip)
         row.addStretch(1)

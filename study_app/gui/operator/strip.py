@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from study_app.gui.operator.header import shown_state
+from study_app.gui.operator.header import OTHER_WINDOW, shown_state
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.gui.theme.themed import Themed, dress
 from study_app.gui.widgets.cards import Chip
@@ -29,7 +29,7 @@ class Strip(Themed, QWidget):
         self.setFixedHeight(HEIGHT)
         self.state = Chip("neutral", "clock", "Preparing")
         self.where = Elided("label", "text2")
-        self.operator = ActionButton("", "Operator's window", height=40)
+        self.operator = ActionButton("", "Operator's window", key=OTHER_WINDOW, height=40)
         self.stop = CompactStop()
         self.operator.clicked.connect(self.operator_asked)
         self.stop.pressed.connect(self.stop_asked)

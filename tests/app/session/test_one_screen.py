@@ -60,6 +60,17 @@ def test_each_window_leads_to_the_other(one_screen, world, qtbot):
     qtbot.waitUntil(lambda: in_front(one_screen) is one_screen.participant)
 
 
+def test_f6_leads_from_each_window_to_the_other_and_back(one_screen, world, qtbot):
+    begin_trial(one_screen, world)
+    windows = one_screen.participant, one_screen.operator
+    one_screen.participant.come_forward()
+    for here, there in (windows, windows[::-1]):
+        qtbot.waitUntil(lambda here=here: in_front(one_screen) is here)
+        qtbot.keyClick(here, Qt.Key.Key_F6)
+        qtbot.waitUntil(lambda there=there: in_front(one_screen) is there)
+    assert world.force_is_on
+
+
 def test_trouble_brings_the_operators_window_to_the_front_once(one_screen, world, qtbot, caplog):
     begin_trial(one_screen, world)
     one_screen.participant.come_forward()

@@ -202,6 +202,22 @@ def test_ending_asks_first_and_says_status_and_reason(running, qtbot):
     assert asked.args == ["withdrawn", "felt unwell"]
 
 
+def test_end_question_gives_the_keyboard_to_the_choice_that_is_made(running, qtbot):
+    running.ask_to_end()
+    qtbot.waitUntil(lambda: running.question.focusWidget() is not None)
+    assert running.question.focusWidget() is running.question.choices.checkedButton()
+
+
+def test_keyboard_is_on_close_session_once_the_session_is_over(running, told, health, qtbot):
+    running.header.page.show()  # as where both windows share a screen
+    running.buttons.end.setFocus()
+    told.tell("session_ended", status="aborted", reason="", fingerprint="wwww-mmmm-wwww")
+    running.show_view(told.view(health, force_on=False))
+    assert running.focusWidget() is running.buttons.close_session
+    with qtbot.waitSignal(running.close_asked):
+        qtbot.keyClick(running.focusWidget(), Qt.Key.Key_Return)
+
+
 def test_leaving_out_asks_what_and_why(running, qtbot):
     running.buttons.exclude.click()
     question = running.question
