@@ -90,6 +90,7 @@ class NewSessionDialog(QDialog):
         self.verdict_icon = Icon("check", "ok", 18)
         self.verdict = label("", "label", "ok", wraps=True)
         self._free = 1, ""
+        self._windowed_without_pilot = False
         self.ways = [ActionButton("", "", height=34) for _ in range(2)]
         self.begin = ActionButton("play", "Begin", role="primary", height=46)
         self.cancel = ActionButton("", "Cancel", height=46)
@@ -262,8 +263,10 @@ class NewSessionDialog(QDialog):
             self.results.setText(self._suggested)
 
     def _choose_pilot(self, pilot: bool) -> None:
-        """Hold a pilot in a window of its own look, under ids that the data never use."""
-        self.windowed.setChecked(pilot or self.windowed.isChecked())
+        """Hold a pilot in a window of its own look, under ids that the data never use; without it all is as before."""
+        if pilot:
+            self._windowed_without_pilot = self.windowed.isChecked()
+        self.windowed.setChecked(pilot or self._windowed_without_pilot)
         self.windowed.setEnabled(not pilot)
         self._suggest_folder()
         self._check()

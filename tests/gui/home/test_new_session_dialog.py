@@ -137,6 +137,15 @@ def test_a_pilot_is_in_a_window_apart_and_may_have_an_id_kept_for_it(dialog, res
     assert not dialog.begin.isEnabled()
 
 
+@pytest.mark.parametrize("windowed", [True, False])
+def test_without_pilot_the_window_is_again_what_it_was_before(dialog, windowed):
+    dialog.windowed.setChecked(windowed)
+    dialog.pilot.click()
+    dialog.pilot.click()
+    assert dialog.windowed.isEnabled()
+    assert dialog.chosen().windowed is windowed
+
+
 def test_a_study_whose_conditions_were_changed_since_is_refused_with_what_to_do(qtbot, results):
     facts = study_facts("demo")
     (results / "demo" / "data" / "sub-P001" / "ses-01").mkdir(parents=True)
