@@ -27,7 +27,7 @@ from study_app.lab.ab_comparison import Setting
 from study_app.viewmodels.lab import LabView
 from study_app.workspace import workspace
 
-FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 380, 300
+FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 388, 300
 PLOTS_STRETCH = 39
 LEAST = QSize(928, 560)
 WIDE, ONE_ROW = 1240, 1460

@@ -338,6 +338,15 @@ def test_everything_fits(place: Any, moved: LabView, size: tuple[int, int]) -> N
             assert it.fontMetrics().horizontalAdvance(it.text()) <= it.width() + 1, it.text()
 
 
+@pytest.mark.parametrize("width", [980, 1280, 1528])
+def test_parameters_do_not_move_sideways_when_tab_goes_through_them(place: Any, still: LabView, width: int) -> None:
+    place.resize(width, 700)
+    place.show_view(still)
+    QApplication.processEvents()
+    assert place.form.area.verticalScrollBar().maximum() > 0
+    assert place.form.area.horizontalScrollBar().maximum() == 0
+
+
 def test_everything_that_takes_the_keyboard_has_a_name_and_is_reached_by_tab(place: Any, still: LabView) -> None:
     place.show_view(still)
     kinds = (QAbstractButton, QComboBox, QLineEdit, QSlider)
