@@ -303,8 +303,7 @@ class LabController(QObject):
     def feel(self, bench: Workbench, *, anew: bool = False) -> None:
         """Let a workbench be felt at once, and be appraised once it has rested for a while."""
         before, self.bench, self._refused = self.bench, bench, None
-        if self.live is not None:  # else it says why there is none
-            self.trouble = ""
+        self._forget_trouble()
         if bench.in_hand.scene != before.in_hand.scene:
             self._prices.forget()
             self._price_due.start()
@@ -355,11 +354,13 @@ class LabController(QObject):
         if self.bench.blind:
             self.trouble = "no preset can be saved during a blind comparison: end it first"
             return
+        self._forget_trouble()
         self._saving.save(path, setting)
 
     @guarded
     def _use(self, study: Path, setting: Setting) -> None:
         """Name a setting's liquid file in a study."""
+        self._forget_trouble()
         self._saving.use(study, setting)
 
     @guarded
@@ -378,6 +379,11 @@ class LabController(QObject):
         if not isinstance(error, StudyError):
             raise error
         self.trouble = str(error)
+
+    def _forget_trouble(self) -> None:
+        """Let what went wrong before be over, unless it says why no device is open."""
+        if self.live is not None:
+            self.trouble = ""
 
     def _let_go(self) -> None:
         """End with the device in the order of safety."""

@@ -54,6 +54,24 @@ def test_a_preset_is_saved_opened_again_and_used_in_a_study(felt: LabController,
     assert felt.live is not None
 
 
+def test_what_was_refused_is_no_longer_shown_once_a_file_is_written(
+    felt: LabController, qtbot: Any, tmp_path: Path
+) -> None:
+    setting, study = felt.bench.in_hand, tmp_path / "study.toml"
+    felt.place.save_asked.emit(tmp_path / "syrup.toml", setting)
+    qtbot.waitUntil(lambda: felt.view().said.startswith("Saved as syrup.toml"), timeout=SOON_MS)
+    study.write_bytes(source_bytes("demo"))
+    for asked, path, said in (
+        (felt.place.use_asked, study, "Added to study.toml"),
+        (felt.place.save_asked, tmp_path / "again.toml", "Saved as again.toml"),
+    ):
+        felt.place.use_asked.emit(tmp_path / "syrup.toml", setting)
+        qtbot.waitUntil(lambda: "syrup.toml is not a study file" in felt.view().trouble, timeout=SOON_MS)
+        asked.emit(path, setting)
+        qtbot.waitUntil(lambda said=said: felt.view().said.startswith(said), timeout=SOON_MS)
+        assert felt.view().trouble == ""
+
+
 def test_a_preset_is_on_the_disk_before_the_program_ends(
     visit: LabController, monkeypatch: Any, tmp_path: Path
 ) -> None:
