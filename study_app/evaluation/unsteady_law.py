@@ -20,16 +20,17 @@ WEIGHTS_RPS: Final = np.array([0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3
 
 
 class Constants(NamedTuple):
-    """The constants of the law that ``liquid-study cfd --refit`` fits to the fluid solver: c_m, c_y, c_z, β and R₀."""
+    """The constants that ``liquid-study cfd --refit`` fits to the fluid solver: c_m, c_y, c_z, c_s, β and R₀."""
 
     c_m: float
     c_y: float
     c_z: float
+    c_s: float
     beta: float
     r_0: float
 
 
-CONSTANTS: Final = Constants(c_m=0.281, c_y=0.873, c_z=3.29, beta=2.86, r_0=12.8)
+CONSTANTS: Final = Constants(c_m=0.268, c_y=0.756, c_z=3.15, c_s=0.972, beta=2.96, r_0=11.0)
 
 
 @workings
@@ -73,19 +74,21 @@ def late_mps(
 ) -> Floats:
     """Return y + h (n, d) [m/s]: the excess drag and the history over Stokes drag per speed, in d dimensions."""
     found = np.empty_like(w_mps)
-    z = w_mps[0].copy()
+    z, s = w_mps[0].copy(), w_mps[0].copy()
     y = (over_stokes(math.sqrt((z**2).sum()) * diameter_m / nu_m2ps) - 1) * z
     m = np.zeros((len(RATES_PER_S), len(z)))
     for k in range(len(w_mps)):
         w, dw, dt = w_mps[k], acceleration_mps2[k], interval_s[k]
-        z2 = (z**2).sum()
+        z2, s2 = (z**2).sum(), (s**2).sum()
         u_mps = math.sqrt((w**2).sum() + z2)
         overtaking = min(max(1 - (w * z).sum() / z2, 0.0), 1.0) if z2 > 0 else 0.0
+        back = min(max(-(w * s).sum() / s2, 0.0), 1.0) if s2 > 0 else 0.0
         re_u = u_mps * diameter_m / nu_m2ps
-        e = w - of.beta * re_u / (re_u + of.r_0) * overtaking * z
+        e = w - re_u / (re_u + of.r_0) * (of.beta * overtaking * z + back * s)
         phi = over_stokes(math.sqrt((e**2).sum()) * diameter_m / nu_m2ps)
         y = y - math.expm1(-of.c_y * u_mps / diameter_m * dt) * (phi * e - w - y)
         z = z - math.expm1(-of.c_z * u_mps / diameter_m * dt) * (w - z)
+        s = s - math.expm1(-of.c_s * u_mps / diameter_m * dt) * (w - s)
         remembered = 2 * math.sqrt(dt) * dw
         for i in range(len(RATES_PER_S)):
             decay_per_s = RATES_PER_S[i] + of.c_m * u_mps / diameter_m

@@ -14,6 +14,7 @@ from study_app.validation.cfd.profiles import (
     MULTI_SINE,
     OSCILLATION_KC4,
     OSCILLATION_KC5,
+    RETURN,
     REVERSAL,
     STOPPING,
     VelocityProfile,
@@ -40,13 +41,20 @@ They are added to those of `cases`, which alone do not determine the constants: 
 wake.
 """
 HELD_OUT: Final = (
+    (MULTI_SINE, "tar", 0.16),
     (OSCILLATION_KC4, "honey", 3.0),
     (OSCILLATION_KC5, "gear_oil", 60.0),
     (REVERSAL, "honey", 2.0),
+    (REVERSAL, "glycerin", 30.0),
     (REVERSAL, "gear_oil", 60.0),
+    (REVERSAL, "gear_oil", 100.0),
+    (RETURN, "glycerin", 30.0),
     (STOPPING, "gear_oil", 60.0),
 )
-"""Motions as those of `TRAINING` that no fit uses: the constants are tested by them."""
+"""Motions as those of `TRAINING`, and a return after a pause, that no fit uses: the constants are tested by them.
+
+The reversal at Re 60 and the return also served to choose the form of the law.
+"""
 
 
 @dataclass(frozen=True, slots=True)

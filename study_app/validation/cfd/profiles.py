@@ -143,6 +143,9 @@ def _oscillation(keulegan_carpenter: float) -> VelocityProfile:
 
 STOPPING: Final = VelocityProfile("stop", "stop", (Step(0.0, 1.0), Step(STOP, -1.0)))
 REVERSAL: Final = VelocityProfile("reversal", "reversal", (Step(0.0, 1.0), Step(STOP, -2.0)))
+RETURN: Final = VelocityProfile(
+    "return", "return after a pause", (Step(0.0, 1.0), Step(STOP, -1.0), Step(13.0, -1.0)), end=23.0
+)
 MULTI_SINE: Final = VelocityProfile(
     "multi-sine",
     "multi-sine",
@@ -152,4 +155,4 @@ MULTI_SINE: Final = VelocityProfile(
 )
 OSCILLATION_KC4: Final = _oscillation(4.0)
 OSCILLATION_KC5: Final = _oscillation(5.0)
-PROFILES: Final = {it.name: it for it in (STOPPING, REVERSAL, MULTI_SINE, OSCILLATION_KC4, OSCILLATION_KC5)}
+PROFILES: Final = {it.name: it for it in (STOPPING, REVERSAL, RETURN, MULTI_SINE, OSCILLATION_KC4, OSCILLATION_KC5)}

@@ -299,8 +299,8 @@ def test_cases_are_solved_by_an_executor_and_stored_under_their_names(monkeypatc
     of_cases = {f"{it.name}.csv": f"{it.name} ball 0.1 ball 0.14 {_step(it)}" for it in CASES}
     assert {path.name: path.read_text("utf-8") for path in written} == {**of_cases, "steady.csv": "steady"}
     folders = [path.parent.relative_to(tmp_path / "new").as_posix() for path in written]
-    assert folders == ["."] * 4 + ["training"] * 8 + ["held_out"] * 5 + ["."]
-    assert said[0] == f"{NAMES[0]}.csv, 1 of 18 ..."
+    assert folders == ["."] * 4 + ["training"] * 8 + ["held_out"] * len(cases.HELD_OUT) + ["."]
+    assert said[0] == f"{NAMES[0]}.csv, 1 of {len(written)} ..."
 
 
 def _step(case):

@@ -1,7 +1,5 @@
 """The constants of unsteady drag: those of the program are what the command fits to the stored motions."""
 
-import math
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -20,11 +18,11 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code"),
 ]
-PLANTED = Constants(c_m=0.5, c_y=1.4, c_z=5.0, beta=2.0, r_0=8.0)
+PLANTED = Constants(c_m=0.5, c_y=1.4, c_z=5.0, c_s=1.5, beta=2.0, r_0=8.0)
 
 
 def test_the_programs_constants_are_those_of_the_letter():
-    names = ("MEMORY_LOSS", "EXCESS_GAIN", "WAKE_GAIN", "OVERTAKING", "OVERTAKING_REYNOLDS")
+    names = ("MEMORY_LOSS", "EXCESS_GAIN", "WAKE_GAIN", "FAR_WAKE_GAIN", "OVERTAKING", "OVERTAKING_REYNOLDS")
     assert tuple(getattr(unsteady_drag, name) for name in names) == tuple(CONSTANTS)
 
 
@@ -56,7 +54,7 @@ def test_planted_constants_are_found_and_a_motion_left_out_is_met():
     assert max(it.left_out[0] for it in found.errors) < 0.02
     assert min(it.program[0] for it in found.errors) > 0.01
     text = law_fit.refit_markdown(found)
-    assert "| c_z | 5 | 3.29 |" in text
+    assert "| c_z | 5 | 3.15 |" in text
     assert text.count("gear_oil | ") == len(tables)
 
 
@@ -78,7 +76,8 @@ def test_the_program_meets_motions_that_no_fit_used():
     shares = {it.case.name: fits.judge(model, it, {}).share for it in stored_flows.held_out()}
     assert not set(shares) & {it.case.name for it in (*stored_flows.stored(), *stored_flows.training())}
     assert sum(shares.values()) <= 0.04 * len(shares)
-    assert shares.pop("reversal-gear_oil-347mmps") <= 0.08  # through its own wake the law is least true
+    assert shares.pop("reversal-gear_oil-578mmps") <= 0.082  # through its own wake the law is least true
+    assert shares.pop("reversal-gear_oil-347mmps") <= 0.062
     assert max(shares.values()) <= 0.05
 
 
@@ -90,15 +89,13 @@ def test_one_motion_is_too_few():
 @pytest.mark.nightly
 @pytest.mark.timeout(900)
 def test_each_motion_left_out_of_the_fit_is_met():
-    """Within 5.1 %, but for reversals at Re 10 and 60 and for the only stop at Re 100."""
+    """Within 5.1 %; motions that no fit uses within 6 %, but for the reversal at Re 100."""
     done = CliRunner().invoke(commands, ["cfd", "--refit"])
     assert done.exit_code == 0, done.output
     rows = [line.split(" | ") for line in done.stdout.splitlines() if "m/s |" in line]
     assert len(rows) == len(TRAINING) + len(stored_flows.stored()) + len(HELD_OUT)
     assert sum(row[3] == "held out" for row in rows) == len(HELD_OUT)
-    left_out = {(row[0].strip("| "), row[1]): float(row[4].split("%")[0]) for row in rows}
-    needed = {name for name, percent in left_out.items() if not percent <= 5.1}
-    reversals = {("reversal at 0.164 m/s", "glycerin"), ("reversal at 0.347 m/s", "gear_oil")}
-    assert needed == {*reversals, ("stop at 0.578 m/s", "gear_oil")}
-    assert max(left_out.values()) < 8
-    assert all(math.isfinite(percent) for percent in left_out.values())
+    held_out = {row[0].strip("| "): float(row[4].split("%")[0]) for row in rows if row[3] == "held out"}
+    assert all(float(row[4].split("%")[0]) <= 5.1 for row in rows if row[3] != "held out")
+    assert held_out.pop("reversal at 0.578 m/s") <= 7.5
+    assert all(percent <= 6 for percent in held_out.values())

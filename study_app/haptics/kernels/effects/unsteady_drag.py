@@ -1,12 +1,14 @@
 """Unsteady drag: drag, added mass and history of a ball in one law that holds at finite Reynolds numbers, too.
 
-With w the velocity relative to the liquid, ν = µ/ρ, and vectors w, y, z, e, h, m_i::
+With w the velocity relative to the liquid, ν = µ/ρ, and vectors w, y, z, s, e, h, m_i::
 
     F  = −3πµD (w + y + h) − ½ρV dw/dt
     u  = √(|w|² + |z|²)                                 speed of convection: of the ball, or of its wake after a stop
     z' = c_z u/D (w − z)                                velocity of the wake behind the ball
-    e  = w − β Re_u/(Re_u + R₀) o z                     velocity that the ball meets, Re_u = uD/ν, with
+    s' = c_s u/D (w − s)                                velocity of the wake farther behind
+    e  = w − Re_u/(Re_u + R₀) (β o z + p s)             velocity that the ball meets, Re_u = uD/ν, with
     o  = min(max(1 − w·z/|z|², 0), 1)                   how far the wake overtakes it or meets it; 0 where z = 0
+    p  = min(max(−w·s/|s|², 0), 1)                      how far it goes back through its wake; 0 where s = 0
     y' = c_y u/D (φ(|e|) e − w − y)                     drag beyond Stokes', built up over a way; φ: `finite_reynolds`
     h  = D/(2√(πν)) Σ b_i m_i,  m_i' = dw/dt − (k_i + c_m u/D) m_i   history, carried away with the flow
 
@@ -27,11 +29,12 @@ from study_app.haptics.model.effects.unsteady_drag import EXPONENTIALS, LATE_SHA
 from study_app.haptics.model.laws import drag as laws
 from study_app.haptics.model.layout import GROWS_AS_SPEED, Record
 
-MEMORY_LOSS = 0.281  # c_m
-EXCESS_GAIN = 0.873  # c_y
-WAKE_GAIN = 3.29  # c_z
-OVERTAKING = 2.86  # β
-OVERTAKING_REYNOLDS = 12.8  # R₀
+MEMORY_LOSS = 0.268  # c_m
+EXCESS_GAIN = 0.756  # c_y
+WAKE_GAIN = 3.15  # c_z
+FAR_WAKE_GAIN = 0.972  # c_s
+OVERTAKING = 2.96  # β
+OVERTAKING_REYNOLDS = 11.0  # R₀
 RATES_PER_S = (0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902)  # k_i
 WEIGHTS_RPS = (0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937)  # b_i [1/√s]
 SHORT = 4.0  # up to here `_mean` needs no exp
@@ -89,6 +92,7 @@ def _begin(law: Any, tracks: Record, w: Any) -> None:
     clear(tracks.acceleration_mps2)
     clear(tracks.remembered_mps2)
     copy(w, tracks.wake_mps)
+    copy(w, tracks.far_wake_mps)
     for axis in range(3):
         tracks.excess_mps[axis] = excess * w[axis]
         for i in range(EXPONENTIALS):
@@ -97,12 +101,18 @@ def _begin(law: Any, tracks: Record, w: Any) -> None:
 
 @part
 def _follow(law: Any, tracks: Record, w: Any, u_mps: float, wake2: float, interval_s: float) -> None:
-    """Move y, then z, toward what they follow."""
-    wake, excess = tracks.wake_mps, tracks.excess_mps
+    """Move y, then z and s, toward what they follow."""
+    wake, far, excess = tracks.wake_mps, tracks.far_wake_mps, tracks.excess_mps
+    far2 = square(far)
     overtaking = min(max(1.0 - dot(w, wake) / wake2, 0.0), 1.0) if wake2 > 0.0 else 0.0
+    back = min(max(-dot(w, far) / far2, 0.0), 1.0) if far2 > 0.0 else 0.0
     reynolds = law.reynolds_spm * u_mps
-    overtaking *= OVERTAKING * reynolds / (reynolds + OVERTAKING_REYNOLDS)
-    ex, ey, ez = w[0] - overtaking * wake[0], w[1] - overtaking * wake[1], w[2] - overtaking * wake[2]
+    inertial = reynolds / (reynolds + OVERTAKING_REYNOLDS)
+    overtaking *= inertial * OVERTAKING
+    back *= inertial
+    ex = w[0] - overtaking * wake[0] - back * far[0]
+    ey = w[1] - overtaking * wake[1] - back * far[1]
+    ez = w[2] - overtaking * wake[2] - back * far[2]
     ratio = _over_stokes(law.reynolds_spm * math.sqrt(ex * ex + ey * ey + ez * ez))
     x = u_mps * law.per_m * interval_s
     toward = EXCESS_GAIN * x * _mean(EXCESS_GAIN * x)
@@ -110,8 +120,10 @@ def _follow(law: Any, tracks: Record, w: Any, u_mps: float, wake2: float, interv
     excess[1] += toward * (ratio * ey - w[1] - excess[1])
     excess[2] += toward * (ratio * ez - w[2] - excess[2])
     toward = WAKE_GAIN * x * _mean(WAKE_GAIN * x)
+    toward_far = FAR_WAKE_GAIN * x * _mean(FAR_WAKE_GAIN * x)
     for axis in range(3):
         wake[axis] += toward * (w[axis] - wake[axis])
+        far[axis] += toward_far * (w[axis] - far[axis])
 
 
 @part

@@ -91,6 +91,7 @@ STATE: Fields = (
     ("acceleration_mps2", FLOAT, (3,)),  # dw/dt for the added mass, smoothed
     ("remembered_mps2", FLOAT, (3,)),  # dw/dt for the history, smoothed
     ("wake_mps", FLOAT, (3,)),  # z
+    ("far_wake_mps", FLOAT, (3,)),  # s
     ("excess_mps", FLOAT, (3,)),  # y
     ("memory_mps", FLOAT, (EXPONENTIALS, 3)),  # m
 )
