@@ -246,6 +246,7 @@ def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int)
     assert RECOGNITION.of(liquids).found.undecided == 33
 
 
+@pytest.mark.nightly
 def test_levels_that_nobody_chose_change_nothing(rek: Folder, tmp_path: Path) -> None:
     other = make_results(tmp_path / "other", rek.protocol)
     for number in range(1, 8):

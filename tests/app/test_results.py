@@ -340,6 +340,7 @@ def nobody_left() -> bool:
     return not any(child.name == "analysis" for child in multiprocessing.active_children())
 
 
+@pytest.mark.nightly
 def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_left(
     qtbot: QtBot, results: Path, tmp_path: Path
 ) -> None:

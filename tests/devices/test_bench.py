@@ -62,7 +62,9 @@ def found_of():
     return measured
 
 
-@pytest.mark.parametrize(("name", "delay_ms"), [("scripted", 0.0), ("falcon-emulated", 1.0)])
+@pytest.mark.parametrize(
+    ("name", "delay_ms"), [pytest.param("scripted", 0.0, marks=pytest.mark.nightly), ("falcon-emulated", 1.0)]
+)
 def test_numbers_of_the_simulated_handle_are_found(found_of, name, delay_ms):
     found = found_of(name)
     for motion in found.motions:

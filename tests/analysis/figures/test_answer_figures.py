@@ -166,8 +166,8 @@ def test_a_missing_answer_breaks_a_line_and_shows_in_n(rek: Results) -> None:
 
 
 @pytest.mark.parametrize("fonts", [style.screen_fonts(), style.PRINT_FONTS], ids=["screen", "print"])
-@pytest.mark.parametrize("opened", [False, True], ids=["blinded", "opened"])
-@pytest.mark.parametrize("people", [1, 30])
+@pytest.mark.parametrize("opened", [pytest.param(False, marks=pytest.mark.nightly), True], ids=["blinded", "opened"])
+@pytest.mark.parametrize("people", [pytest.param(1, marks=pytest.mark.nightly), 30])
 def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opened: bool, people: int) -> None:
     twelve(rek, people=people)
     if opened:

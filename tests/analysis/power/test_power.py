@@ -257,6 +257,7 @@ def test_tables_and_figures_are_written_and_say_simulated(found: Powers, tmp_pat
     assert "SIMULATED participants" in (tmp_path / "power" / "power-delays.svg").read_text(encoding="utf-8")
 
 
+@pytest.mark.nightly
 def test_the_same_numbers_give_the_same_files(found: Powers, tmp_path: Path) -> None:
     one, other = (write(found, tmp_path / name) for name in ("one", "other"))
     assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]

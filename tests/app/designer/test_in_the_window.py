@@ -170,7 +170,7 @@ def test_esc_restores_what_was_accepted_last(qtbot: Any, designer: Any) -> None:
 
 
 @pytest.mark.usefixtures("editors")
-@pytest.mark.parametrize("width", [1600, 1366])
+@pytest.mark.parametrize("width", [pytest.param(1600, marks=pytest.mark.nightly), 1366])
 def test_every_form_fits_its_width(designer: Any, width: int) -> None:
     designer.window.resize(width, 768)
     designer.controller.open("kitchen")
@@ -283,6 +283,7 @@ for count in range(100000):
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(os.name != "posix", reason="SIGKILL")
 def test_a_kill_while_typing_loses_at_most_the_last_second(designer: Any, tmp_path: Path) -> None:
     before = designer.file.read_bytes()

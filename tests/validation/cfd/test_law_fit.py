@@ -26,6 +26,7 @@ def test_the_programs_constants_are_those_of_the_letter():
     assert tuple(getattr(unsteady_drag, name) for name in names) == tuple(CONSTANTS)
 
 
+@pytest.mark.nightly
 def test_a_fit_to_the_stored_motions_gives_the_programs_constants_within_half_a_percent():
     fitted = law_fit.fit_constants((*stored_flows.stored(), *stored_flows.training()))
     assert tuple(fitted) == pytest.approx(tuple(CONSTANTS), rel=5e-3)

@@ -89,6 +89,7 @@ def test_verdicts_do_not_depend_on_the_executor(all_workers):
     assert all(verdicts == found[0] for verdicts in found)
 
 
+@pytest.mark.nightly
 @compiled
 def test_limits_and_shares_do_not_depend_on_the_executor():
     with open_executor(Workers(2)) as executor:
@@ -299,6 +300,7 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     assert {parse(line).plant for line in lines} == {"handle", "arm", "falcon"}
 
 
+@pytest.mark.nightly
 @compiled
 def test_the_command_judges_only_the_groups_that_are_named():
     ran = command("--group", "non-Newtonian", "--cases", "2")

@@ -160,7 +160,14 @@ def people_who_notice(rng: np.random.Generator, n: int, spread_ms: float, never:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("n", "spread_ms", "never"), [(5, 0, 0), (12, 0, 0), (12, 35, 0), (12, 60, 0), (12, 15, 1 / 6)]
+    ("n", "spread_ms", "never"),
+    [
+        pytest.param(5, 0, 0, marks=pytest.mark.nightly),
+        pytest.param(12, 0, 0, marks=pytest.mark.nightly),
+        pytest.param(12, 35, 0, marks=pytest.mark.nightly),
+        pytest.param(12, 60, 0, marks=pytest.mark.nightly),
+        (12, 15, 1 / 6),
+    ],
 )
 def test_the_interval_covers_the_threshold_of_people_who_differ(n: int, spread_ms: float, never: float) -> None:
     rng = np.random.default_rng(3)
