@@ -126,7 +126,7 @@ def test_excluded_session_counts_in_no_form(folder: Path, tmp_path: Path) -> Non
     assert len(left.answers_to(asked)) == PEOPLE - 1
 
 
-@pytest.mark.parametrize("opened", [False, True])
+@pytest.mark.parametrize("opened", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_report_has_a_table_a_figure_and_the_texts_of_every_question(
     folder: Path, tmp_path: Path, opened: bool
 ) -> None:
