@@ -57,6 +57,7 @@ from study_app.haptics.kernels.c_functions import (
 )
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.vector import clear, copy
+from study_app.haptics.kernels.vector import square as square_of
 from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, records
 
 TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
@@ -64,11 +65,13 @@ TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
 
 LONGEST_GAP_NS: Final = 20_000_000
 MOST_UNANSWERED: Final = 4
-"""No further force is sent while so many commands wait for their replies: they would only queue up."""
+"""While so many commands wait for their replies, only weaker forces are sent: others would queue up."""
+MOST_WEAKER: Final = 60
+"""While so many wait, none but zero is: the servo's fade takes 45 ticks."""
 INBOX: Final = 1 << 16
 _OUTBOX = 512
 _TEXT = 384
-_LOG = 64  # commands whose time is kept
+_LOG = 64  # commands whose time is kept, more than ever wait
 _RECEIVES = 8  # a tick asks the socket at most so often
 _NORM_SLACK = 1.001
 
@@ -300,9 +303,9 @@ def _command(device: Any, context: int, x_n: float, y_n: float, z_n: float) -> N
     most_n = _NORM_SLACK * device.force_limit_n
     if not square <= most_n * most_n:  # nor NaN: the servo sends neither
         x_n = y_n = z_n = square = 0.0
-    held = device.sent_n[0] != 0.0 or device.sent_n[1] != 0.0 or device.sent_n[2] != 0.0
-    ends_force = square == 0.0 and held
-    if device.sent - device.answered >= MOST_UNANSWERED and not ends_force:
+    unanswered = device.sent - device.answered
+    weaker = square < square_of(device.sent_n) and (square == 0.0 or unanswered < MOST_WEAKER)
+    if unanswered >= MOST_UNANSWERED and not weaker:
         device.skipped += 1
         return
     if not _flush(device, context):

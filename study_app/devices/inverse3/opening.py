@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,11 +25,14 @@ from study_app.devices.inverse3.settings import (
     recorded,
     zero_force,
 )
+from study_app.errors import DeviceError
 
 REPLY_S: Final = 2.0
 ROUND_TRIPS: Final = 50
 _MAGIC: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # RFC 6455 §1.3
 _LONGEST_HEAD: Final = 8192
+_ID: Final = re.compile(r"[!#-\[\]-~]{1,64}")
+"""An id goes into each command as it is: printable ASCII but spaces, quotes and backslashes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +184,8 @@ def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: b
     ------
     DeviceFailure
         The message is of an older version, or lists no such device.
+    DeviceError
+        The id of the device does not fit into a command.
     """
     listed = message.get("inverse3", [])
     if not isinstance(listed, list):
@@ -187,6 +193,11 @@ def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: b
     entries = {str(entry["device_id"]): entry for entry in listed if isinstance(entry, dict) and "device_id" in entry}
     for name, entry in entries.items():
         if not wanted_id or name == wanted_id:
+            if not _ID.fullmatch(name):
+                raise DeviceError(
+                    f"the Inverse Service lists a device whose id {name[:16]!r} has {len(name)} characters; 1 to 64 "
+                    "printable ASCII characters are permitted, no spaces, quotes or backslashes: update this program"
+                )
             if inventory and "filters" not in (entry.get("config") or {}):
                 raise FAILURES.failure("version", "format 3.1")
             return entry

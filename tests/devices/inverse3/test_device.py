@@ -16,7 +16,7 @@ from study_app.devices.inverse3.device import Inverse3Device, address
 from study_app.devices.inverse3.doctor import examine
 from study_app.devices.inverse3.emulated import EmulatedInverse3, EmulatedLink
 from study_app.devices.inverse3.emulator.service import Service
-from study_app.devices.inverse3.exchange import MOST_UNANSWERED
+from study_app.devices.inverse3.exchange import MOST_UNANSWERED, MOST_WEAKER, new_exchange
 from study_app.devices.inverse3.opening import find_device
 from study_app.devices.registry import open_device
 from study_app.errors import DeviceError, DeviceNotFound
@@ -112,6 +112,27 @@ class TestOpening:
         with EmulatedInverse3(progress=lines.append) as device:
             assert device.describe()["service_settings"]["confirmed"] is False
         assert lines == ["The service did not confirm its settings: compare them in Haply Hub."]
+
+    @pytest.mark.parametrize("device_id", ["A" * 65, "A" * 4000, "", 'A"B', "A\\B", "A B", "é1"])
+    def test_an_id_that_does_not_fit_into_a_command_is_refused_in_a_line(
+        self, device_id: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        service = Service()
+        message = service.inventory()
+        message["inverse3"][0]["device_id"] = device_id
+        monkeypatch.setattr(service, "inventory", lambda: message)
+        with pytest.raises(
+            DeviceError, match=rf"id .* has {len(device_id)} characters; 1 to 64 .* permitted"
+        ) as refused:
+            EmulatedInverse3(service=service).open()
+        assert "\n" not in str(refused.value)
+        assert len(str(refused.value)) < 250
+        assert service.state.ended == 1
+        assert service.state.commands == 0
+
+    def test_the_longest_id_fits_into_a_command(self) -> None:
+        memory = new_exchange("A" * 64, 8.0, 1)
+        assert memory[0].prefix_size + 80 < memory[0].text.size
 
     def test_entries_without_an_id_are_passed_over(self) -> None:
         mine = {"device_id": "049D", "config": {"filters": {}}}
@@ -212,6 +233,20 @@ class TestTicks:
             assert sent_n[0] == service.force_n[0]  # it says which force still acts
             assert ticks.take((0.0, 0.0, 0.0))[1][0] == 0.0
             assert service.force_n == (0.0, 0.0, 0.0)
+
+    def test_weaker_forces_are_sent_while_replies_stay_out(self) -> None:
+        service = Service()
+        with EmulatedInverse3(service=service) as device:
+            ticks = Ticks(device)
+            ticks.take((4.0, 0.0, 0.0))
+            service.take("silent")
+            for k in range(45):
+                force_n = (4.0 - 0.08 * (k + 1), 0.0, 0.0)
+                assert ticks.take(force_n)[1][0] == force_n[0] == pytest.approx(service.force_n[0])
+            for k in range(100):
+                ticks.take((0.4 - 0.001 * k, 0.0, 0.0))
+            assert device.exchange.sent - device.exchange.answered == MOST_WEAKER
+            assert ticks.take()[1][0] == service.force_n[0] == 0.0
 
     def test_a_state_that_waited_for_longer_than_20_ms_is_not_given(self) -> None:
         with EmulatedInverse3() as device:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import pytest
@@ -118,6 +119,24 @@ def test_a_fault_in_a_stroke_ends_in_its_message_zero_force_and_silence(fault: s
     assert service.state.pushes == pushes
     assert mode.id == "no-reply" or service.state.commands == commands  # the driver had ended the stream: silence
     assert size_n(service.force_n) == 0.0
+
+
+def test_the_force_fades_at_the_handle_while_replies_stay_out() -> None:
+    service = Service(tremor_m=0.0)
+    with EmulatedInverse3(service=service) as device:
+        servo = Servo(device, clock=VirtualClock())
+        stroke(servo, service)
+        before_n = size_n(service.force_n)
+        service.take("silent")
+        sizes_n = []
+        while servo.advance(1):
+            sizes_n.append(size_n(service.force_n))
+        assert 45 < len(sizes_n) < 60
+        assert sizes_n[4] == pytest.approx(before_n, rel=0.2)
+        assert all(after <= before for before, after in itertools.pairwise(sizes_n[4:]))
+        assert sizes_n[25] < 0.7 * before_n
+        assert sizes_n[44] < 0.2 * before_n
+        servo.stop()
 
 
 @pytest.mark.parametrize("fault", HARMLESS)
