@@ -14,6 +14,7 @@ from study_app.haptics.kernels.c_functions import NOW, READ, READ_LOST, READ_NEW
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.passivity import log_delivery
 from study_app.haptics.kernels.safety import begin_scene
+from study_app.haptics.kernels.sample_validation import FAULT_NS
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.layout import (
@@ -49,6 +50,7 @@ CONTROL = np.dtype(
         ("ticks", np.int64),  # how many were taken
         ("overruns", np.int64),  # deadlines passed over because a tick did not fit
         ("began_ns", np.int64),  # when the last tick began
+        ("hung", np.int64),  # 1 where the last tick took 50 ms or more
         ("worst_gap_ns", np.int64),  # the longest time between two ticks since the scene in force was handed over
         ("status", np.int64),  # STATUS_* of the last tick; any but STATUS_OK ended the loop
     ],
@@ -111,6 +113,8 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
 
     Notes
     -----
+    A tick that takes 50 ms or more, in the device or because its thread did not run, sends zero force after its own,
+    and the next one sends zero: then the force fades in as at a start.
     After ``ticks`` it only pauses, and the device goes on holding the last force; all other ways out write zero.
     """
     first, second = slots
@@ -132,15 +136,15 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
         host.worst_gap_ns = max(host.worst_gap_ns, began_ns - host.began_ns)
         host.began_ns = began_ns
         if sample.status == STATUS_OK:
-            safety[0].stop = host.stop
+            safety[0].stop = 1 if host.hung != 0 else host.stop  # the sample says so: a replay repeats it
             if host.taken % 2 == 0:
                 tick(first, safety[0], sample)
             else:
                 tick(second, safety[0], sample)
-        if _send(sample, safety[0], exchanged.command, device) == READ_LOST:
+        if _send(sample, safety[0], exchanged.command, device, clock, began_ns) == READ_LOST:
             sample.status = STATUS_DEVICE_LOST
-        ended_ns = _now(clock.now, clock.context)
-        sample.busy_ns = ended_ns - began_ns
+        ended_ns = began_ns + sample.busy_ns
+        host.hung = 1 if sample.busy_ns >= FAULT_NS else 0
         host.status = sample.status
         fence()
         written[0] += 1
@@ -208,14 +212,17 @@ def follow_delay(safety: Any, sample: Any, measured: int) -> None:
 
 
 @kernel
-def _send(sample: Any, safety: Any, command: Any, device: Any) -> int:
-    """Command the device to send the force, and log what it sent instead, if it did."""
+def _send(sample: Any, safety: Any, command: Any, device: Any, clock: Any, began_ns: int) -> int:
+    """Command the device to send the force, zero after a tick that hung; log what it sent instead, if it did."""
     row = command[0]
     for axis in range(3):
         row.force_n[axis] = row.sent_n[axis] = sample.device_force_n[axis]
     answer = _write(device.write, device.context, np.intp(command.ctypes.data))
+    sample.busy_ns = _now(clock.now, clock.context) - began_ns
+    if sample.busy_ns >= FAULT_NS:
+        let_go(command, device)
     for axis in range(3):
-        if row.sent_n[axis] != row.force_n[axis]:
+        if row.sent_n[axis] != sample.device_force_n[axis]:
             log_delivery(safety, sample, row.sent_n)
             break
     return int(answer)

@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.sample_validation import FAULT_NS
 from study_app.haptics.model.layout import (
     BUTTON_STOP,
     LIMITER_ENERGY,
@@ -165,7 +166,8 @@ def _look_at_force(counts: Any, sample: Any) -> None:
     if size_n > counts.limit_n + TOLERANCE_N:
         counts.excess += 1
         _break_promise(counts, sample)
-    stopped = sample.limiters & LIMITER_STOP != 0 or sample.status == STATUS_STALE_FAULT
+    hung = sample.busy_ns >= FAULT_NS and sample.status == STATUS_OK
+    stopped = hung or sample.limiters & LIMITER_STOP != 0 or sample.status == STATUS_STALE_FAULT
     if stopped and size_n != 0.0:
         counts.unstopped += 1
         _break_promise(counts, sample)

@@ -14,10 +14,10 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import ServoFault
 from study_app.haptics.kernels.safety import begin_scene, new_safety
-from study_app.haptics.kernels.tick import tick
-from study_app.haptics.model.layout import LIMITER_STALE, STATUS_OK
+from study_app.haptics.model.layout import LIMITER_STALE, LIMITER_STOP, STATUS_OK
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import pack
+from study_app.haptics.runtime.recompute import take_sample
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.probe import Probe
 from tests.haptics.running import felt, force_n, is_zero, wait_until
@@ -97,6 +97,32 @@ def test_after_fifty_milliseconds_without_a_tick_the_force_is_zero_and_returns_a
     assert bench.servo.fault is None
 
 
+@pytest.mark.parametrize(("hang_ms", "sent"), [(49, True), (50, False), (300, False)])
+def test_a_tick_of_50_ms_or_more_ends_with_zero_force(bench, hang_ms, sent):
+    felt(bench.servo)
+    assert np.linalg.norm(bench.probe.forces_n[-1]) > 1.0
+    bench.probe.stall(bench.clock, int(bench.probe.state.reads) + 1, hang_ms * MS)
+    bench.reader.read()
+    bench.servo.advance(1)
+    assert (np.linalg.norm(bench.probe.forces_n[-1]) > 1.0) == sent
+    assert is_zero(bench.reader.read().device_force_n) != sent  # a recording says what was sent last
+    if not sent:
+        bench.servo.advance(250)
+        assert bench.servo.fault is None
+        forces_n = np.linalg.norm(bench.probe.forces_n[-251:], axis=1)
+        assert (forces_n <= 8 * np.maximum(np.arange(251) - 1, 0) / 500 + 1e-9).all()  # it returns as at a start
+        assert forces_n[-1] > 1.0
+
+
+def test_a_tick_that_hung_in_its_device_is_replayed_to_the_bit(bench):
+    felt(bench.servo)
+    bench.probe.stall(bench.clock, int(bench.probe.state.reads) + 1, 80 * MS)
+    bench.servo.advance(300)
+    samples = bench.reader.read()
+    assert np.flatnonzero(samples.limiters & LIMITER_STOP).tolist() == [1001]
+    assert np.array_equal(replayed(samples, HONEY), samples.device_force_n)
+
+
 @pytest.mark.slow
 def test_a_servo_that_hangs_in_its_device_says_so_and_has_let_go_when_it_returns():
     probe = Probe()
@@ -115,22 +141,24 @@ def test_a_servo_that_hangs_in_its_device_says_so_and_has_let_go_when_it_returns
             servo.check()
         probe.state.hangs = 0
         wait_until(lambda: probe.state.writes >= writes + 5)
-        after_n = np.linalg.norm(probe.forces_n[writes + 1 : writes + 5], axis=1)  # the first is the tick that hung
-        assert (after_n <= 8 * np.arange(1, 5) / 500).all(), "0.5 s from zero to the whole force, of at most 8 N"
+        after_n = np.linalg.norm(
+            probe.forces_n[writes + 1 : writes + 5], axis=1
+        )  # after the force of the tick that hung
+        assert (after_n <= 8 * np.array([0, 0, 1, 2]) / 500).all(), "0.5 s from zero to the whole force, of at most 8 N"
     finally:
         probe.state.hangs = 0
         servo.stop()
 
 
 def replayed(samples, scene):
-    """Return the forces (n, 3) [N] of readings at their times, by the tick alone: no thread, no clock, no windows."""
+    """Return the forces (n, 3) [N] of readings at their times, as a replay computes them: no thread, no clock."""
     again = samples.copy()
     rest, model, safety = pack(scene.model_copy(update={"liquids": ()})), pack(scene), new_safety(8.0)
     for i in range(len(again)):
         if i > 0 and again[i].scene != again[i - 1].scene:
             begin_scene(safety[0])
         safety[0].delay_ticks = again[i].delay_ticks
-        tick(model if again[i].scene else rest, safety[0], again[i])
+        take_sample(model if again[i].scene else rest, safety[0], again[i], True)
     return again.device_force_n
 
 
@@ -143,8 +171,9 @@ def test_five_seconds_in_which_python_stands_still_change_no_force():
     device = ScriptedDevice(Random(5))  # noqa: S311
     t_s = np.arange(0, 20, 0.005)
     device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.01 * np.cos(5 * t_s), 0.03 * np.cos(6 * t_s))))
-    with device, Servo(device) as servo:
-        reader = servo.telemetry.reader()
+    servo = Servo(device)
+    reader = servo.telemetry.reader()  # before the first tick: a replay begins there
+    with device, servo:
         servo.load(WATER)
         wait_until(lambda: force_n(servo.telemetry) > 0.5)
         frozen_ns = servo.now_ns()
