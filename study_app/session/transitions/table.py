@@ -61,6 +61,9 @@ from study_app.session.transitions.state import Phase, Plan, SessionState
 
 Move: TypeAlias = Callable[[SessionState, Any], tuple[SessionState, tuple[Command, ...]]]
 
+RUNNING = (Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK)
+OPEN = (Phase.OPENING, *RUNNING, Phase.PAUSED, Phase.TROUBLE)
+
 TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     # phase           event           what happens              next phase
     (Phase.OPENING, Begin): moves.begin,  # → reading, task; paused before a trial of a session that goes on
@@ -78,54 +81,21 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     (Phase.ANSWERING, Retracted): answers.retract,  # stays
     (Phase.ANSWERING, Submitted): answers.submit,  # → reading, task, resting, feedback, complete, ended
     # Pausing: esc, the operator, or a force stop.
-    (Phase.READING, PauseAsked): moves.pause,  # → paused
-    (Phase.TASK, PauseAsked): moves.pause,  # → paused; the attempt is over
-    (Phase.RESTING, PauseAsked): moves.pause,  # → paused; the attempt is over
-    (Phase.ANSWERING, PauseAsked): moves.pause,  # → paused
-    (Phase.FEEDBACK, PauseAsked): moves.pause,  # → paused
+    **{(phase, PauseAsked): moves.pause for phase in RUNNING},  # → paused; the attempt at a trial is over
     (Phase.PAUSED, PauseAsked): moves.pause_again,  # stays
-    (
-        Phase.PAUSED,
-        ResumeAsked,
-    ): moves.resume,  # → reading, answering; task as the next attempt; after feedback the next step
+    (Phase.PAUSED, ResumeAsked): moves.resume,  # → reading, answering; task, again; after feedback the next step
     # The force: off at once, wherever we are.
-    (Phase.READING, ForceStopped): moves.stop_force,  # → paused
-    (Phase.TASK, ForceStopped): moves.stop_force,  # → paused; the attempt is over
-    (Phase.RESTING, ForceStopped): moves.stop_force,  # → paused; the attempt is over
-    (Phase.ANSWERING, ForceStopped): moves.stop_force,  # → paused
-    (Phase.FEEDBACK, ForceStopped): moves.stop_force,  # → paused
+    **{(phase, ForceStopped): moves.stop_force for phase in RUNNING},  # → paused; the attempt at a trial is over
     (Phase.PAUSED, ForceStopped): moves.stop_force,  # stays
     (Phase.TROUBLE, ForceStopped): moves.stop_force_again,  # stays
     (Phase.COMPLETE, ForceStopped): moves.stop_force_after_end,  # stays
     (Phase.ENDED, ForceStopped): moves.stop_force_after_end,  # stays
     # The operator.
-    (Phase.TASK, RepeatAsked): moves.repeat,  # → task, as the next attempt
-    (Phase.RESTING, RepeatAsked): moves.repeat,  # → task, as the next attempt
-    (Phase.ANSWERING, RepeatAsked): moves.repeat,  # → task, as the next attempt
-    (Phase.READING, Note): moves.note,  # stays
-    (Phase.TASK, Note): moves.note,
-    (Phase.RESTING, Note): moves.note,
-    (Phase.ANSWERING, Note): moves.note,
-    (Phase.FEEDBACK, Note): moves.note,
-    (Phase.PAUSED, Note): moves.note,
-    (Phase.TROUBLE, Note): moves.note,
-    (Phase.OPENING, EndAsked): moves.end,  # → ended
-    (Phase.READING, EndAsked): moves.end,
-    (Phase.TASK, EndAsked): moves.end,
-    (Phase.RESTING, EndAsked): moves.end,
-    (Phase.ANSWERING, EndAsked): moves.end,
-    (Phase.FEEDBACK, EndAsked): moves.end,
-    (Phase.PAUSED, EndAsked): moves.end,
-    (Phase.TROUBLE, EndAsked): moves.end,
+    **{(phase, RepeatAsked): moves.repeat for phase in (Phase.TASK, Phase.RESTING, Phase.ANSWERING)},  # → task, again
+    **{(phase, Note): moves.note for phase in (*RUNNING, Phase.PAUSED, Phase.TROUBLE)},  # stays
+    **{(phase, EndAsked): moves.end for phase in OPEN},  # → ended
     # What breaks.
-    (Phase.OPENING, Broke): moves.call_operator,  # → trouble
-    (Phase.READING, Broke): moves.call_operator,
-    (Phase.TASK, Broke): moves.call_operator,
-    (Phase.RESTING, Broke): moves.call_operator,
-    (Phase.ANSWERING, Broke): moves.call_operator,
-    (Phase.FEEDBACK, Broke): moves.call_operator,
-    (Phase.PAUSED, Broke): moves.call_operator,
-    (Phase.TROUBLE, Broke): moves.call_operator,
+    **{(phase, Broke): moves.call_operator for phase in OPEN},  # → trouble
     (Phase.TROUBLE, Reconnected): moves.reconnect,  # → paused, without force; only after a failure of the device
     # The disk takes nothing: whatever else happens is refused until it does.
     **{(phase, WriteFailed): moves.stall for phase in Phase},  # → stalled
