@@ -11,10 +11,7 @@ from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.designs.questions import questions_found
 from study_app.analysis.figures import captions
 from study_app.analysis.figures.answer_figures import KINDS, render
-from study_app.analysis.figures.levels.level_figure import level_pictures
-from study_app.analysis.figures.levels.settings_figure import setting_pictures
-from study_app.analysis.figures.levels.track_figure import track_pictures
-from study_app.analysis.figures.levels.weber_figure import weber_pictures
+from study_app.analysis.figures.levels.level_pictures import level_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.results.section_failures import Failures
@@ -62,8 +59,6 @@ def _of_statements(study: Study) -> Iterator[Picture]:
 def _of_others(study: Study) -> Iterator[Picture]:
     failures = Failures()
     yield from question_pictures(study, questions_found(study), failures=failures)
-    levels = levels_found(study)
-    for pictures_of in (level_pictures, track_pictures, weber_pictures, setting_pictures):
-        yield from pictures_of(study, levels, failures=failures)
+    yield from level_pictures(study, levels_found(study), failures=failures)
     if failures.found:
         raise AnalysisError(f"a figure cannot be drawn: {failures.found[0]}")

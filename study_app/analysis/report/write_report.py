@@ -13,10 +13,7 @@ from study_app import __version__
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import table_files
 from study_app.analysis.export.typed_tables import deliver
-from study_app.analysis.figures.levels.level_figure import level_pictures
-from study_app.analysis.figures.levels.settings_figure import setting_pictures
-from study_app.analysis.figures.levels.track_figure import track_pictures
-from study_app.analysis.figures.levels.weber_figure import weber_pictures
+from study_app.analysis.figures.levels.level_pictures import level_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.report_figures import pictures
@@ -107,8 +104,7 @@ def _of_questions(study: Study, results: Results, failures: Failures) -> Iterato
     if results.questions:
         yield from question_pictures(study, results.questions, failures=failures)
     if results.levels:
-        for pictures_of in (level_pictures, track_pictures, weber_pictures, setting_pictures):
-            yield from pictures_of(study, results.levels, failures=failures)
+        yield from level_pictures(study, results.levels, failures=failures)
 
 
 def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: Failures) -> dict[str, bytes]:

@@ -13,8 +13,7 @@ import pytest
 from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.designs.psychometric_bands import psychometric_bands
 from study_app.analysis.designs.track_courses import courses
-from study_app.analysis.figures.levels.level_figure import level_pictures
-from study_app.analysis.figures.levels.track_figure import track_pictures
+from study_app.analysis.figures.levels.level_pictures import level_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.results.levels import LevelsFound
 from study_app.analysis.tables.study import Study, load_study
@@ -90,10 +89,10 @@ def test_courses_know_their_catch_trials(study: Study, opened: pd.DataFrame) -> 
 def test_figures_mark_catch_trials_by_crosses(study: Study, staircase: LevelsFound, opened: pd.DataFrame) -> None:
     own = opened[opened["block"] == "staircase"]
     caught = own["catch"].astype(bool)
-    (tracks_drawn,) = track_pictures(study, [staircase], ["svg"])
+    pictures = {picture.name: picture for picture in level_pictures(study, [staircase], ["svg"])}
+    tracks_drawn, levels_drawn = pictures["tracks-staircase"], pictures["levels-staircase"]
     assert "× and +: catch trials, answered correctly and not." in tracks_drawn.caption
     assert _crosses(tracks_drawn) == caught.sum()
-    (levels_drawn,) = level_pictures(study, [staircase], ["svg"])
     assert "crosses: catch trials" in levels_drawn.caption
     assert _crosses(levels_drawn) == len({(one.participant, one.standard) for one in staircase.own_thresholds})
 
@@ -110,8 +109,9 @@ def test_a_block_of_one_standard_has_a_band_around_each_function(
         psi = success("weibull", u, np.log10(one.threshold), one.width or 1, 1 / 3, one.lapse or 0)
         assert (low <= high).all()
         assert ((low <= psi + 0.02) & (psi - 0.02 <= high)).all()
-    captions = [picture.caption for picture in level_pictures(study, [quest, staircase], ["svg"])]
-    assert ["with the 95 % band" in caption for caption in captions] == [True, False]
+    captions = {picture.name: picture.caption for picture in level_pictures(study, [quest, staircase], ["svg"])}
+    assert "with the 95 % band" in captions["levels-quest"]
+    assert "with the 95 % band" not in captions["levels-staircase"]
 
 
 def _crosses(picture: Picture) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, Final, cast
 
@@ -12,11 +12,10 @@ from matplotlib.axes import Axes
 
 from study_app import figure_style as style
 from study_app.analysis.designs.psychometric_bands import psychometric_bands
-from study_app.analysis.figures import answer_figures
+from study_app.analysis.figures.levels.panels import draw_panels, sheet_of_panels
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
-from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
+from study_app.analysis.figures.picture import Picture, files_of, sample_words
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound, ThresholdFound
-from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.tables.study import Study
@@ -25,12 +24,6 @@ from study_app.psychophysics.families import Family, success
 
 MOST_PEOPLE: Final = 23
 """Participants with a panel of their own; the others are in the first panel and in the table."""
-COLUMNS: Final = 4
-PANEL_PT: Final = 84.0
-LEFT_PT: Final = 40.0
-GAP_PT: Final = 16.0
-HEAD_PT: Final = 42.0
-ROW_GAP_PT: Final = 36.0
 FOOT_PT: Final = 26.0
 MOST_TICKS: Final = 5
 FEWEST_TICKS: Final = 2
@@ -45,23 +38,8 @@ LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "diffe
 UNITLESS: Final = "weber"
 
 
-def level_pictures(
-    study: Study,
-    levels: Sequence[LevelsFound],
-    forms: Sequence[str] = style.FORMATS,
-    failures: Failures | None = None,
-) -> Iterator[Picture]:
-    """Draw the answers over levels of every block that has any, in each of ``forms``.
-
-    A figure that fails is left out, and kept in ``failures``.
-    """
-    shown = [found for found in levels if found.answers]
-    yield from attempted(
-        ((found.block, f"levels-{found.block}", partial(_picture, study, found, forms)) for found in shown), failures
-    )
-
-
-def _picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+def picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+    """Draw the answers over levels of a block."""
     bands = _bands(study, found)
     files = files_of(partial(_draw, study, found, bands), forms, f"{study.name}: {found.title}")
     own = len(found.people) - MOST_PEOPLE
@@ -129,31 +107,23 @@ def _chance(found: LevelsFound) -> str:
 @style.own_settings()
 def _draw(study: Study, found: LevelsFound, bands: Mapping[str, Array], fonts: Sequence[str]) -> Sheet:
     people = found.people[:MOST_PEOPLE]
-    rows = math.ceil((1 + len(people)) / COLUMNS)
-    height = HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + FOOT_PT + 14
-    sheet = Sheet(style.PAGE_WIDTH_PT, height, fonts)
-    sheet.heading(found.title, answer_figures.marks(study), (counted(study.n, "participant"),))
+    words = summary_words(found)
+    above = words[:1].upper() + words[1:]
+    sheet = sheet_of_panels(study, found.title, above, 1 + len(people), fonts, foot_pt=FOOT_PT)
     _keys(sheet, found)
-    width = (sheet.width_pt - LEFT_PT - MARGIN_PT - (COLUMNS - 1) * GAP_PT) / COLUMNS
-    for number, person in enumerate((None, *people)):
-        row, column = divmod(number, COLUMNS)
-        x, y = LEFT_PT + column * (width + GAP_PT), HEAD_PT + row * (PANEL_PT + ROW_GAP_PT)
-        sheet.text(x, y - 4, "All" if person is None else person, size=7, weight="bold")
-        axes = sheet.axes(x, y, width, PANEL_PT)
-        _panel(axes, found, person, first=column == 0)
+
+    def draw(axes: Axes, place: int, first: bool) -> None:
+        person = people[place - 1] if place else None
+        _panel(axes, found, person, first=first)
         if person is not None and person in bands:
             u, lower, upper = bands[person]
             axes.fill_between(u, lower, upper, color=style.BAND, linewidth=0, zorder=1)
-        for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
-            label.set_fontproperties(sheet.font(6.5))
-    sheet.text(LEFT_PT, height - 10, level_words(found), size=7, colour=style.TEXT_SOFT)
-    return sheet
+
+    return draw_panels(sheet, [(name, "") for name in ("All", *people)], draw, level_words(found))
 
 
 def _keys(sheet: Sheet, found: LevelsFound) -> None:
-    """Write what the vertical axis shows, and which colour is which standard."""
-    words = summary_words(found)
-    sheet.text(MARGIN_PT, 28, words[:1].upper() + words[1:], size=7, colour=style.TEXT_SOFT)
+    """Write which colour is which standard."""
     standards = _standards(found)
     if len(standards) < 2:
         return

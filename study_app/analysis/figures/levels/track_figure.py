@@ -2,73 +2,36 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 
 from study_app import figure_style as style
 from study_app.analysis.designs.track_courses import Flags, TrackCourse, courses
-from study_app.analysis.figures import answer_figures
-from study_app.analysis.figures.levels.level_figure import (
-    COLOURS,
-    COLUMNS,
-    GAP_PT,
-    HEAD_PT,
-    LEFT_PT,
-    ROW_GAP_PT,
-    level_words,
-)
-from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
-from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
+from study_app.analysis.figures.levels.level_figure import COLOURS, level_words
+from study_app.analysis.figures.levels.panels import draw_panels, over_trials, sheet_of_panels
+from study_app.analysis.figures.page_layout import Sheet
+from study_app.analysis.figures.picture import Picture, files_of, sample_words
 from study_app.analysis.results.levels import LevelsFound
-from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.statistics.outcome import Array
-from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study import Study
 from study_app.analysis.tables.tracks import tracks
 
 MOST_PANELS: Final = 24
-PANEL_PT: Final = 84.0
-FOOT_PT: Final = 28.0
 MARK_PT2: Final = 7.0
 RING_PT2: Final = 26.0
 CROSS_PT2: Final = 11.0
 """Areas of the marks of answers, reversals and catch trials."""
-LEAST_LEVELS: Final = 3
-"""Ticks at 1, 2 and 5 in each decade, as long as so many lie within the axis."""
 
 
-def track_pictures(
-    study: Study,
-    levels: Sequence[LevelsFound],
-    forms: Sequence[str] = style.FORMATS,
-    failures: Failures | None = None,
-) -> Iterator[Picture]:
-    """Draw the tracks of every block whose levels answers chose, once the key is open, in each of ``forms``.
-
-    A figure that fails is left out, and kept in ``failures``.
-    """
-    adaptive = [found for found in levels if found.adaptive and found.own_thresholds]
-    if not adaptive:
-        return
-    opened, blocks = tracks(study), {block.id: block for block in study.levels}
-    make = partial(_picture, study, opened, forms)
-    yield from attempted(
-        ((found.block, f"tracks-{found.block}", partial(make, found, blocks[found.block])) for found in adaptive),
-        failures,
-    )
-
-
-def _picture(
-    study: Study, opened: pd.DataFrame, forms: Sequence[str], found: LevelsFound, block: LevelBlock, name: str
-) -> Picture:
-    shown = list(courses(block, opened, MOST_PANELS))
+def picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+    """Draw the tracks of a block whose levels answers chose, once the key is open."""
+    block = next(block for block in study.levels if block.id == found.block)
+    shown = list(courses(block, tracks(study), MOST_PANELS))
     files = files_of(partial(_draw, study, found, shown), forms, f"{study.name}: {found.title}, tracks")
     rest = len(found.own_thresholds) - len(shown)
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
@@ -85,28 +48,18 @@ def _picture(
 
 @style.own_settings()
 def _draw(study: Study, found: LevelsFound, shown: Sequence[TrackCourse], fonts: Sequence[str]) -> Sheet:
-    rows = math.ceil(len(shown) / COLUMNS)
-    height = HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + FOOT_PT + 14
-    sheet = Sheet(style.PAGE_WIDTH_PT, height, fonts)
-    sheet.heading(f"{found.title}: tracks", answer_figures.marks(study), (counted(study.n, "participant"),))
-    sheet.text(MARGIN_PT, 28, level_words(found), size=7, colour=style.TEXT_SOFT)
-    width = (sheet.width_pt - LEFT_PT - MARGIN_PT - (COLUMNS - 1) * GAP_PT) / COLUMNS
+    sheet = sheet_of_panels(study, f"{found.title}: tracks", level_words(found), len(shown), fonts)
     standards = len({one.standard for one in shown}) > 1
+    names = [(one.participant, f"standard {one.standard:g}" if standards else "") for one in shown]
     ends = _ends(found, shown)
-    for number, course in enumerate(shown):
-        row, column = divmod(number, COLUMNS)
-        x, y = LEFT_PT + column * (width + GAP_PT), HEAD_PT + row * (PANEL_PT + ROW_GAP_PT)
-        sheet.text(x, y - 4, course.participant, size=7, weight="bold")
-        if standards:
-            aside = sheet.text_width(course.participant, 7, "bold") + 6
-            sheet.text(x + aside, y - 4, f"standard {course.standard:g}", size=7, colour=style.TEXT_SOFT)
-        axes = sheet.axes(x, y, width, PANEL_PT)
-        _frame(axes, found, course, ends, first=column == 0)
-        _panel(axes, course)
-        for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
-            label.set_fontproperties(sheet.font(6.5))
-    sheet.text(LEFT_PT, height - 10, "Trial at the standard" if standards else "Trial", size=7, colour=style.TEXT_SOFT)
-    return sheet
+
+    def draw(axes: Axes, place: int, first: bool) -> None:
+        n = len(shown[place].levels)
+        axes.set_xlim(0.5 - 0.02 * n, n + 0.5 + 0.02 * n)
+        over_trials(axes, found, n, ends, first=first)
+        _panel(axes, shown[place])
+
+    return draw_panels(sheet, names, draw, "Trial at the standard" if standards else "Trial")
 
 
 def _ends(found: LevelsFound, shown: Sequence[TrackCourse]) -> tuple[float, float]:
@@ -119,35 +72,6 @@ def _ends(found: LevelsFound, shown: Sequence[TrackCourse]) -> tuple[float, floa
         return low / factor, high * factor
     margin = 0.06 * ((high - low) or 1.0)
     return low - margin, high + margin
-
-
-def _frame(axes: Axes, found: LevelsFound, course: TrackCourse, ends: tuple[float, float], *, first: bool) -> None:
-    n = len(course.levels)
-    axes.set_xlim(0.5 - 0.02 * n, n + 0.5 + 0.02 * n)
-    axes.set_xticks([1, *(place for place in (round(n / 2), n) if place > 1)])
-    if found.spacing == "log":
-        axes.set_yscale("log")
-        axes.minorticks_off()
-    axes.set_ylim(*ends)
-    ticks = level_ticks(found, ends)
-    axes.set_yticks(ticks, [f"{tick:g}" if first else "" for tick in ticks])
-    axes.hlines(ticks, *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
-
-
-def level_ticks(found: LevelsFound, ends: tuple[float, float]) -> list[float]:
-    """Return round levels between the ends of an axis: from 1, 2 and 5, in decades where levels are spaced so."""
-    low, high = ends
-    if found.spacing == "linear":
-        step = 10.0 ** math.floor(math.log10(high - low))
-        step *= next(times for times in (0.1, 0.2, 0.5, 1.0, 2.0) if (high - low) / (step * times) <= 6)
-        return [float(f"{number * step:.12g}") for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    for digits in ((1,), (1, 3), (1, 2, 5), tuple(range(1, 10))):
-        found_ = [float(f"{digit}e{decade}") for decade in decades for digit in digits]
-        inside = [tick for tick in found_ if low <= tick <= high]
-        if len(inside) >= LEAST_LEVELS:
-            return inside
-    return inside
 
 
 def _panel(axes: Axes, course: TrackCourse) -> None:

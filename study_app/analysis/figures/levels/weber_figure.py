@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
@@ -11,9 +11,8 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
-from study_app.analysis.figures.picture import Picture, attempted, files_of, sample_words
+from study_app.analysis.figures.picture import Picture, files_of, sample_words
 from study_app.analysis.results.levels import LevelsFound
-from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study import Study
 
@@ -25,22 +24,6 @@ HEIGHT_PT: Final = 190.0
 FRACTIONS: Final = tuple(digit * 10.0**decade for decade in range(-4, 4) for digit in (1, 2, 5))
 Point = tuple[float, float, float | None, float | None]
 """Standard, Weber fraction, and the ends of its interval."""
-
-
-def weber_pictures(
-    study: Study,
-    levels: Sequence[LevelsFound],
-    forms: Sequence[str] = style.FORMATS,
-    failures: Failures | None = None,
-) -> Iterator[Picture]:
-    """Draw the Weber fractions of every block with thresholds at two standards or more, in each of ``forms``.
-
-    A figure that fails is left out, and kept in ``failures``.
-    """
-    shown = [found for found in levels if len(weber_fractions(found, None)) >= 2]
-    yield from attempted(
-        ((found.block, f"weber-{found.block}", partial(_picture, study, found, forms)) for found in shown), failures
-    )
 
 
 def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
@@ -60,7 +43,8 @@ def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
     return points
 
 
-def _picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+def picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+    """Draw the Weber fractions of a block with thresholds at two standards or more."""
     files = files_of(partial(_draw, study, found), forms, f"{study.name}: {found.title}, Weber fractions")
     caption = (
         f"{found.title}: Weber fraction of {found.quantity} at the threshold, over the standard. Thin: participants; "
