@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, TypeAlias
 
 from pydantic import AfterValidator, BeforeValidator, Field, StringConstraints
@@ -82,6 +83,6 @@ Body: TypeAlias = Annotated[_Text, _not_longer(MAX_BODY), Field(json_schema_extr
 """What fills a page or several; its schema says so to the study designer."""
 
 
-def text_in(value: str | dict[str, str], language: str) -> str:
+def text_in(value: str | Mapping[str, str], language: str) -> str:
     """Return a localised text in one of the study's languages (KeyError in any other)."""
     return value if isinstance(value, str) else value[language]

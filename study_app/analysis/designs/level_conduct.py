@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Any
 
 import pandas as pd
 
 from study_app.analysis.results.levels import CatchAnswers, LevelConduct
 from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.analysis.tables.measures import number_or_none
 
 TRIAL = ["participant", "session", "trial"]
 
@@ -37,15 +37,15 @@ def level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFra
         errors = (rows["level_delivered"] - rows["level"])[rows["level"] != 0].dropna().astype(float)
         reasons = Counter(word for words in here["invalid_reasons"].dropna() for word in set(str(words).split()))
         yield LevelConduct(
-            standard=_number(standard),
+            standard=number_or_none(standard),
             trials=len(rows),
             repeated=len(attempts) - attempts[TRIAL].drop_duplicates().shape[0],
             reasons=dict(sorted(reasons.items())),
             measured=len(errors),
-            error_mean=_number(errors.mean()),
-            error_largest=_number(errors.abs().max()),
-            pace_mps=_number(last["pace_mps"].mean()),
-            apparent_mass_kg=_number(last["apparent_mass_kg"].mean()),
+            error_mean=number_or_none(errors.mean()),
+            error_largest=number_or_none(errors.abs().max()),
+            pace_mps=number_or_none(last["pace_mps"].mean()),
+            apparent_mass_kg=number_or_none(last["apparent_mass_kg"].mean()),
         )
 
 
@@ -58,7 +58,3 @@ def catch_answers(block: LevelBlock, opened: pd.DataFrame) -> Iterator[CatchAnsw
         wrong = int((~rows["right"].astype(bool)).sum())
         person, session = str(rows["participant"].iloc[0]), int(rows["session"].iloc[0])
         yield CatchAnswers(person, session, len(rows), wrong, block.wrong_most)
-
-
-def _number(value: Any) -> float | None:
-    return None if pd.isna(value) else float(value)

@@ -29,7 +29,7 @@ from study_app.analysis.statistics.outcome import Array, clopper_pearson
 from study_app.analysis.statistics.student_interval import student_interval
 from study_app.analysis.tables.compared_blocks import setting_name
 from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.analysis.tables.measures import quartiles_or_none
+from study_app.analysis.tables.measures import number_or_none, quartiles_or_none
 from study_app.analysis.tables.study import Study
 from study_app.analysis.tables.tracks import answers_timed, tracks
 from study_app.protocol.quantities import quantity, quantity_words
@@ -134,7 +134,9 @@ def _level_times(block: LevelBlock, opened: pd.DataFrame) -> Iterator[LevelTimes
             here = at_standard[at_standard["level"].astype(float).between(some[0], some[-1])]
             seconds, right = here["response_s"].to_numpy(dtype=float), here["right"].to_numpy(dtype=bool)
             (right_n, right_s), (wrong_n, wrong_s) = _median(seconds[right]), _median(seconds[~right])
-            yield LevelTimes(_number(standard), float(some[0]), float(some[-1]), right_n, right_s, wrong_n, wrong_s)
+            yield LevelTimes(
+                number_or_none(standard), float(some[0]), float(some[-1]), right_n, right_s, wrong_n, wrong_s
+            )
 
 
 def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[WithheldForce]:
@@ -148,7 +150,7 @@ def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[WithheldFo
             here = at_standard[at_standard["level"].astype(float).between(some[0], some[-1])]
             percent = 100 * here["withheld_share"].to_numpy(dtype=float)
             mean, most = float(percent.mean()), float(percent.max())
-            yield WithheldForce(_number(standard), float(some[0]), float(some[-1]), len(percent), mean, most)
+            yield WithheldForce(number_or_none(standard), float(some[0]), float(some[-1]), len(percent), mean, most)
 
 
 def _ranges(levels: Array) -> list[Array]:
@@ -189,9 +191,9 @@ def _at_level(block: LevelBlock, rows: pd.DataFrame, bounds: tuple[float, float]
     first = rows.iloc[0]
     make = partial(
         LevelAnswers,
-        standard=_number(first["standard"]),
-        level=_number(first["level"]),
-        comparison=first["comparison"] if isinstance(first["comparison"], str) else _number(first["comparison"]),
+        standard=number_or_none(first["standard"]),
+        level=number_or_none(first["level"]),
+        comparison=first["comparison"] if isinstance(first["comparison"], str) else number_or_none(first["comparison"]),
         catch=block.stimulus is not None and bool(first["catch"]),
     )
     people = rows["participant"].to_numpy()
@@ -221,7 +223,3 @@ def _summarised(
     if bounds is not None and low is not None and high is not None:
         low, high = max(low, bounds[0]), min(high, bounds[1])
     return float(values.mean()), low, high
-
-
-def _number(value: Any) -> float | None:
-    return None if pd.isna(value) else float(value)

@@ -19,6 +19,7 @@ import pandas as pd
 from study_app.analysis.results.levels import SensitivityFound
 from study_app.analysis.statistics.student_interval import student_interval
 from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.analysis.tables.measures import number_or_none
 from study_app.protocol.trials.presentation import arrangement_of
 from study_app.psychophysics.detection import Sensitivity, rating
 
@@ -40,7 +41,7 @@ def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Sensitivi
         case "choice":
             by = "standard" if block.stimulus is not None else "track"
             for which, some in rows.groupby(by, dropna=False, sort=True):
-                where = {"standard": _number(which)} if by == "standard" else {"comparison": str(which)}
+                where = {"standard": number_or_none(which)} if by == "standard" else {"comparison": str(which)}
                 yield from _with_group([_of_choices(block, person, one, where) for person, one in _people(some)])
         case "rating":
             levels = sorted(rows["level"].dropna().unique())
@@ -126,7 +127,3 @@ def _known(own: Sequence[SensitivityFound], name: str) -> Any:
 def _mean(own: Sequence[SensitivityFound], name: str) -> float | None:
     values = _known(own, name)
     return float(values.mean()) if len(values) else None
-
-
-def _number(value: Any) -> float | None:
-    return None if pd.isna(value) else float(value)

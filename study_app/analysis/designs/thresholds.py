@@ -21,6 +21,7 @@ from study_app.analysis.statistics.psychometrics.goodness import drift, p_of_fit
 from study_app.analysis.statistics.psychometrics.posterior import fitted
 from study_app.analysis.statistics.random_effects import group_mean
 from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.analysis.tables.measures import number_or_none
 from study_app.analysis.tables.tracks import TRACK, answers_of, setting_of
 from study_app.protocol.trials.psychometric import analysis_grid
 from study_app.protocol.trials.stimuli import Stimulus
@@ -97,7 +98,7 @@ def _own(
     psi = np.clip(psi, CLIP, 1 - CLIP)
     return ThresholdFound(
         participant=str(person),
-        standard=_number(standard),
+        standard=number_or_none(standard),
         n=found.n,
         threshold=level_of(found.threshold),
         low=level_of(found.low),
@@ -130,8 +131,4 @@ def _reversal_mean(block: LevelBlock, stimulus: Stimulus, heard: pd.DataFrame) -
 def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdFound]) -> ThresholdFound:
     mean = group_mean([stimulus.coordinate(one.threshold) for one in own], [one.variance or 0.0 for one in own])
     low, high = (None if end is None else stimulus.level_of(end) for end in (mean.low, mean.high))
-    return ThresholdFound(None, _number(standard), mean.n, stimulus.level_of(mean.mean), low, high)
-
-
-def _number(value: Any) -> float | None:
-    return None if pd.isna(value) else float(value)
+    return ThresholdFound(None, number_or_none(standard), mean.n, stimulus.level_of(mean.mean), low, high)

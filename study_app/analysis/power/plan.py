@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from study_app.analysis.tables import planned_analysis as decided
-from study_app.analysis.tables.compared_blocks import Item, Kind, spoken, text_in
+from study_app.analysis.tables.compared_blocks import Item, Kind, spoken
 from study_app.analysis.tables.planned_analysis import Decided
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
@@ -16,6 +16,7 @@ from study_app.protocol.forms.simulated_observer import OPINIONS, Felt
 from study_app.protocol.groups.steps import groups_with
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions.question import Question
+from study_app.protocol.texts import text_in
 
 Feelings: TypeAlias = Mapping[tuple[str, str], Sequence[Felt]]
 """(Block, condition) → what was felt there in rehearsed trials."""

@@ -9,10 +9,11 @@ from study_app.analysis.power.plan import compares_statements
 from study_app.analysis.preregistration.commitment import Commitment, commitment, written
 from study_app.analysis.preregistration.questions import analyses, hypotheses
 from study_app.analysis.results.words import counted
-from study_app.analysis.tables.compared_blocks import spoken, text_in
+from study_app.analysis.tables.compared_blocks import spoken
 from study_app.protocol.checks.expected_precision import expected, precision_rows, threshold_plan
 from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.model import Protocol
+from study_app.protocol.texts import text_in
 
 
 def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = None) -> str:

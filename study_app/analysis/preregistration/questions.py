@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from typing import Final
 
 from study_app.analysis.results.words import listed
-from study_app.analysis.tables.compared_blocks import text_in
 from study_app.protocol.analysis_plan import Analysis
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity, quantity_words
+from study_app.protocol.texts import text_in
 from study_app.protocol.trials.psychometric import Family, family_of
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
 

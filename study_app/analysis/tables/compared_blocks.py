@@ -12,6 +12,7 @@ from typing import Any, Final, TypeAlias
 
 from study_app.protocol.blocks import Compared
 from study_app.protocol.orders.block_orders import every_step_of
+from study_app.protocol.texts import text_in
 from study_app.protocol.trials.presentation import link_words
 from study_app.protocol.trials.stimuli import OF_LINK
 from study_app.store.blinded.blinding import Key
@@ -147,11 +148,6 @@ def spoken(protocol: Mapping[str, Any]) -> str:
     """Return the language of figures and tables: English where the study has it, otherwise its first."""
     languages = list(protocol["study"]["languages"])
     return "en" if "en" in languages else str(languages[0])
-
-
-def text_in(value: str | Mapping[str, str], language: str) -> str:
-    """Return a text of a receipt in ``language``."""
-    return value if isinstance(value, str) else value[language]
 
 
 def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str, key: Key | None) -> Block:

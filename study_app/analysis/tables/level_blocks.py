@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from study_app.analysis.tables.compared_blocks import Setting, settings_in, spoken, text_in
+from study_app.analysis.tables.compared_blocks import Setting, settings_in, spoken
 from study_app.protocol.analysis_plan import Published
 from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import every_step_of
+from study_app.protocol.texts import text_in
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design
 from study_app.protocol.trials.method import Method

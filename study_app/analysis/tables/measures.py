@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -22,20 +22,9 @@ AGREEMENT: Final = (5, 6, 7)
 QUARTILES: Final = "linear (Hyndman & Fan type 7)"
 COUNT_COLUMNS: Final = tuple(f"count_{level}" for level in LEVELS)
 COLUMNS: Final = (
-    "code",
-    "item",
-    "participants",
-    "presented",
-    "presented_excluded",
-    "n",
-    "cannot_judge",
-    "missing",
-    *COUNT_COLUMNS,
-    "median",
-    "q1",
-    "q3",
-    "agree_percent",
-)
+    "code", "item", "participants", "presented", "presented_excluded", "n", "cannot_judge", "missing",
+    *COUNT_COLUMNS, "median", "q1", "q3", "agree_percent",
+)  # fmt: skip
 
 
 def aggregate(
@@ -111,6 +100,11 @@ def quartiles_or_none(values: Array) -> tuple[float | None, float | None, float 
     """Return what `quartiles` does, with None in the place of NaN."""
     low, middle, high = quartiles(values)
     return (None, None, None) if np.isnan(middle) else (low, middle, high)
+
+
+def number_or_none(value: Any) -> float | None:
+    """Return a cell of a table as a number, None where it is missing."""
+    return None if pd.isna(value) else float(value)
 
 
 def presentations(

@@ -13,8 +13,9 @@ from typing import Final
 
 import numpy as np
 
+from study_app.evaluation.hand_motions import vectors_x
 from study_app.evaluation.identify.estimates import Estimates, estimate, following
-from study_app.evaluation.identify.measured_force import Measured, along_x
+from study_app.evaluation.identify.measured_force import Measured
 from study_app.evaluation.identify.parameters import find
 from study_app.evaluation.identify.search import ForceProblem
 from study_app.haptics.model.gate import resolve
@@ -74,7 +75,7 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
     StudyError
         No such liquid or parameter, or too little was measured.
     """
-    measured = Measured(motion, along_x(force_n) if force_n.ndim == 1 else force_n)
+    measured = Measured(motion, vectors_x(force_n) if force_n.ndim == 1 else force_n)
     scene = resolve(scene)
     problem = ForceProblem(scene, liquid_id, find(scene, liquid_id, names), measured)
     z, fields = estimate(problem, liquid_id, names, float(np.linalg.norm(measured.force_n)))

@@ -13,6 +13,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.signal import savgol_filter
 
 from study_app.errors import StudyError
+from study_app.evaluation.hand_motions import vectors_x
 from study_app.haptics.model.motion import PLACES, VELOCITIES, Floats, Motion
 
 FORCES: Final = ("fx_n", "fy_n", "fz_n")
@@ -124,13 +125,7 @@ def _measured(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:
 def along_a_line(t_s: Floats, velocity_mps: Floats, force_n: Floats) -> Measured:
     """Return a motion along x from its velocities (n,), and the force (n,) along x."""
     way_m = np.concatenate([[0.0], np.cumsum((velocity_mps[1:] + velocity_mps[:-1]) / 2 * np.diff(t_s))])
-    return Measured(Motion(t_s, along_x(way_m), along_x(velocity_mps)), along_x(force_n))
-
-
-def along_x(values: Floats) -> Floats:
-    """Return vectors (n, 3) along x."""
-    zero = np.zeros_like(values)
-    return np.column_stack([values, zero, zero])
+    return Measured(Motion(t_s, vectors_x(way_m), vectors_x(velocity_mps)), vectors_x(force_n))
 
 
 def centred(motion: Motion) -> Motion:

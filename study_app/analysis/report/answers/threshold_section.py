@@ -104,8 +104,8 @@ def _exponents(found: LevelsFound) -> str:
             [
                 one.participant or f"group of {one.n}",
                 "–" if one.participant is None else str(one.n),
-                _decimal(one.exponent),
-                "–" if one.low is None or one.high is None else f"{_decimal(one.low)} – {_decimal(one.high)}",
+                number(one.exponent),
+                "–" if one.low is None or one.high is None else f"{number(one.low)} – {number(one.high)}",
             ]
             for one in found.exponents
         ],
@@ -191,8 +191,8 @@ def _sensitivities(found: LevelsFound) -> str:
                 *((_where(one),) if wheres else ()),
                 one.participant or f"group of {one.n}",
                 "–" if one.participant is None else str(one.n),
-                *((_decimal(one.d_prime), _interval(one)) if measured else ()),
-                *((_decimal(one.criterion),) if biased else ()),
+                *((number(one.d_prime), _interval(one)) if measured else ()),
+                *((number(one.criterion),) if biased else ()),
                 *(f"{100 * one.shares[answer]:.0f} %" for answer in (answers[:1] if len(answers) == 2 else answers)),
             ]
             for one in ones
@@ -239,12 +239,8 @@ def _criterion_name(found: LevelsFound) -> str:
     return "k" if found.design == "samedifferent" else "c"
 
 
-def _decimal(value: float | None) -> str:
-    return number(value)
-
-
 def _interval(one: SensitivityFound) -> str:
-    return "–" if one.low is None or one.high is None else f"{_decimal(one.low)} – {_decimal(one.high)}"
+    return "–" if one.low is None or one.high is None else f"{number(one.low)} – {number(one.high)}"
 
 
 def _sensitivity_words(found: LevelsFound) -> str:
