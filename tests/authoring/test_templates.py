@@ -75,7 +75,7 @@ def test_the_answers_are_edits_of_the_template() -> None:
     assert document["study"]["languages"] == ("en", "de")
     assert document["stimuli"]["damping"]["standards"] == (4, 8)
     assert document["methods"]["adaptive"]["trials"] == 60
-    assert {fault.message for fault in after.faults} == {"is missing in Deutsch"}
+    assert {fault.message for fault in after.faults} == {"is missing in German"}
     assert after.text.count("#") == before.text.count("#")
     assert answered(before, Answers(languages=("en",))).text == before.text
     with pytest.raises(Refused, match="must be at least"):

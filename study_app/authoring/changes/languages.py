@@ -10,7 +10,7 @@ from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.checks.cross_references import TEXTS
 from study_app.protocol.source.document import Path, entries
-from study_app.protocol.wording.languages import LANGUAGES
+from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 
 def languages_of(study: Study) -> tuple[str, ...]:
@@ -29,7 +29,7 @@ def with_language(study: Study, code: str) -> tuple[Edit, ...]:
     """
     there = languages_of(study)
     if code in there:
-        raise Refused(f"the study is in {LANGUAGES[code].name} already")
+        raise Refused(f"the study is in {language_name(code)} already")
     if code not in LANGUAGES:
         raise Refused(f'the program has no words in "{code}": there are {", ".join(LANGUAGES)}')
     tables = (Set(path, {there[0]: text}) for path, text in texts_of(study) if isinstance(text, str))

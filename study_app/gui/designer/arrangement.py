@@ -20,6 +20,8 @@ from study_app.viewmodels.designer.form_rows import Form
 OUTLINE_PX, DRAWER_PX = 284, 320
 DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
 GAP = 14 - 2 * SHADOW
+FORM_SHARE = 44
+"""Percent of the width that the form takes beside the views."""
 
 
 class Crumb(PressedByEnter):
@@ -110,13 +112,13 @@ class Arrangement(QWidget):
         self.sides = Segments("Side")
         self.sides.chosen.connect(lambda side: self.show_side(str(side)))
         self.prompts = QVBoxLayout()
-        across = QHBoxLayout()
+        self._across = across = QHBoxLayout()
         across.setSpacing(GAP)
         self._left = QVBoxLayout()
         self._left.setSpacing(12 - 2 * SHADOW)
         self._left.addWidget(form, 1)
-        across.addLayout(self._left, 44)
-        across.addWidget(pane, 56)
+        across.addLayout(self._left, FORM_SHARE)
+        across.addWidget(pane, 100 - FORM_SHARE)
         self.top = QWidget()
         top = QHBoxLayout(self.top)
         top.setContentsMargins(SHADOW, 0, SHADOW, 0)
@@ -168,6 +170,7 @@ class Arrangement(QWidget):
         self.sides.setVisible(one)
         self.sides.show_values((("form", "Form"), ("pane", "Views")), self.side)
         self.form.setVisible(not one or self.side == "form")
+        self._across.setStretch(0, FORM_SHARE if self.form.isVisibleTo(self) else 0)  # an empty layout would take room
         self.pane.setVisible(not one or self.side == "pane")
         self.pane.make_room()
 

@@ -5,6 +5,7 @@ from study_app.protocol.wording.words import Words
 ARABIC = Words(
     language="ar",
     name="العربية",
+    english_name="Arabic",
     choose_language="اللغة",
     part="الجزء {part} من {parts}",
     setting="{label} من {of}",

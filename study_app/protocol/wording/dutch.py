@@ -5,6 +5,7 @@ from study_app.protocol.wording.words import Words
 DUTCH = Words(
     language="nl",
     name="Nederlands",
+    english_name="Dutch",
     choose_language="Taal",
     part="Deel {part} van {parts}",
     setting="{label} van {of}",

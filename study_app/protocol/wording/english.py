@@ -5,6 +5,7 @@ from study_app.protocol.wording.words import Words
 ENGLISH = Words(
     language="en",
     name="English",
+    english_name="English",
     choose_language="Language",
     part="Part {part} of {parts}",
     setting="{label} of {of}",

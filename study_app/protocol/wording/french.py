@@ -5,6 +5,7 @@ from study_app.protocol.wording.words import Words
 FRENCH = Words(
     language="fr",
     name="Français",
+    english_name="French",
     choose_language="Langue",
     part="Partie {part} sur {parts}",
     setting="{label} sur {of}",

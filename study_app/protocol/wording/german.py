@@ -5,6 +5,7 @@ from study_app.protocol.wording.words import Words
 GERMAN = Words(
     language="de",
     name="Deutsch",
+    english_name="German",
     choose_language="Sprache",
     part="Teil {part} von {parts}",
     setting="{label} von {of}",

@@ -17,8 +17,8 @@ LANGUAGES = {words.language: words for words in (ENGLISH, DUTCH, GERMAN, FRENCH,
 
 
 def language_name(code: str) -> str:
-    """Return the name of a language, its code where the program has no words in it."""
-    return LANGUAGES[code].name if code in LANGUAGES else code
+    """Return the English name of a language, its code where the program has no words in it."""
+    return LANGUAGES[code].english_name if code in LANGUAGES else code
 
 
 def words(language: str) -> Words:

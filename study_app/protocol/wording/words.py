@@ -17,6 +17,7 @@ class Words:
 
     language: str
     name: str  # of the language, in itself
+    english_name: str
     choose_language: str
 
     # progress, at the top of every page of a part

@@ -48,7 +48,7 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
     found += _instruments() if second else ()
     there = languages_of(study)
     found += [
-        Addable(f"Language: {words.name}", "info", ChangeLanguage("add", code), "To every text of the study")
+        Addable(f"Language: {words.english_name}", "info", ChangeLanguage("add", code), "To every text of the study")
         for code, words in LANGUAGES.items()
         if code not in there
     ]

@@ -133,7 +133,7 @@ class TemplateChoice:
 
 def languages_offered() -> tuple[tuple[str, str], ...]:
     """Return code and name of each language that participants can be addressed in."""
-    return tuple((code, language.name) for code, language in LANGUAGES.items())
+    return tuple((code, language.english_name) for code, language in LANGUAGES.items())
 
 
 def proposed_name(title: str) -> str:

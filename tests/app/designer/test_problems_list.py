@@ -55,4 +55,4 @@ def test_a_text_that_is_missing_hides_no_force_and_is_counted_the_same_everywher
     languages = designer.row("study", "languages").field.row.entries
     assert [entry.note for entry in languages] == ["every text", "1 missing"]
     assert facts(designer.editing.opened.study).missing == {"nl": 1}
-    assert [problem.message for problem in designer.place.view.problems] == ["Is missing in Nederlands"]
+    assert [problem.message for problem in designer.place.view.problems] == ["Is missing in Dutch"]

@@ -10,9 +10,9 @@ from study_app.gui.designer.measures.page import NumbersRow
 from study_app.gui.designer.measures.parts import CardGrid
 from study_app.viewmodels.designer.measures.cards import MeasuresView
 
-HIGH, LOW = 366, 190
-HIGH_FROM = 940
-"""In windows as high as this two rows of cards are shown whole."""
+MOST, LEAST = 366, 190
+SHARE, HIGH_FROM = 0.3, 940
+"""The share of a window's height that the cards take at most; in windows as high as this two rows are shown whole."""
 
 
 class FactsRow(QScrollArea):
@@ -33,17 +33,23 @@ class FactsRow(QScrollArea):
         self.grid = CardGrid()
         self.grid.open_asked.connect(self.open_asked)
         inside = QWidget()
-        column = QVBoxLayout(inside)
+        self._inside = column = QVBoxLayout(inside)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(8)
         column.addWidget(self.numbers)
         column.addWidget(self.grid, 1)
         self.setWidget(inside)
+        self._window_px = 0
         self.make_room(0)
 
     def make_room(self, window_px: int) -> None:
-        """Take as much height as the window has room for."""
-        self.setFixedHeight(HIGH if window_px >= HIGH_FROM else LOW)
+        """Take the height of the cards, as far as the window has room for them."""
+        self._window_px = window_px
+        most = MOST if window_px >= HIGH_FROM else max(LEAST, round(SHARE * window_px))
+        needed = self._inside.totalHeightForWidth(self.viewport().width())
+        if needed < 0:
+            needed = self._inside.totalSizeHint().height()
+        self.setFixedHeight(min(most, needed + 2 * self.frameWidth()) if self.grid.cards else most)
 
     def show_measures(self, shown: MeasuresView) -> None:
         """Show other numbers; while the cards are hidden they are kept for later."""
@@ -61,3 +67,4 @@ class FactsRow(QScrollArea):
         if self.shown is not None:
             self.numbers.show_numbers(self.shown.numbers)
             self.grid.show_cards(self.shown.below)
+            self.make_room(self._window_px)
