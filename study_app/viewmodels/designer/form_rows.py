@@ -317,7 +317,7 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
     if row.path == STUDY_LANGUAGES:
         lacking = missing_texts(study)
         for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
-            missing = lacking.get(code, 0)
+            missing = lacking.get(str(code), 0)
             note = f"{missing} missing" if missing else "every text"
             yield Entry((*row.path, at), language_name(str(code)), note, missing)
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
