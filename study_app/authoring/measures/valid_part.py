@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
+from study_app.authoring.document_values import with_value, without_value
 from study_app.authoring.measures.texts import text_keys
 from study_app.authoring.study import Study
 from study_app.protocol.load import examined
@@ -56,7 +57,7 @@ def valid_part(study: Study) -> ValidPart:
             if not _is_there(document, place) and value is None:
                 continue  # another fault of the same element left it out
             whole = whole and (value is not None or fault.message == "unknown key" or place[0] in _LEFT_OUT)
-            document = _with(document, place, value)
+            document = without_value(document, place) if value is None else with_value(document, place, value)
         protocol, faults = examined(document)
         if protocol is not None:
             return ValidPart(protocol, whole)
@@ -104,18 +105,3 @@ def _text(document: Any) -> Any:
 
 def _is_there(document: Any, path: Path) -> bool:
     return value_at(document, path) is not None
-
-
-def _with(document: Any, path: Path, value: Any) -> Any:
-    """Return a document with another value at a path, without it where the value is None."""
-    step, *rest = path
-    if isinstance(document, tuple) and isinstance(step, int):
-        if not rest and value is None:
-            return document[:step] + document[step + 1 :]
-        return (*document[:step], _with(document[step], tuple(rest), value) if rest else value, *document[step + 1 :])
-    if not isinstance(document, Mapping):
-        return document
-    changed = {key: inner for key, inner in document.items() if key != step}
-    if rest:
-        return {**changed, step: _with(document.get(step, {}), tuple(rest), value)}
-    return changed if value is None else {**changed, step: value}

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, Q
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.theme.icons import draw_icon, draw_logo
-from study_app.gui.theme.theme import RADIUS_CARD, Theme, font
+from study_app.gui.theme.theme import RADIUS_CARD, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.labels import Ink, label
 from study_app.viewmodels.tones import Tone
@@ -51,6 +51,15 @@ class Card(Themed, QWidget):
         painter.setPen(QPen(QColor(self.theme.border), 1))
         painter.setBrush(QColor(self.theme.surface))
         painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
+
+
+def paint_ground(part: QWidget, colour: str) -> None:
+    """Paint the ground of a part with rounded corners."""
+    painter = QPainter(part)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(colour))
+    painter.drawRoundedRect(QRectF(part.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
 
 
 class Rule(Themed, QWidget):

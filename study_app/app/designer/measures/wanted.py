@@ -12,7 +12,7 @@ from study_app.protocol.model import Protocol
 from study_app.viewmodels.designer.measures.measures_view import Controls, Focus
 
 PARTICIPANTS: Final = 12
-"""Where the file decides no number."""
+"""Simulated participants of a study without `analysis.participants`."""
 PRECISION: Final = 0.15
 JND: Final = 0.19
 """People tell viscosities that differ by so much (Jones, Hunter & Lafontaine 1997)."""

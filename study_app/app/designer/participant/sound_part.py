@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
+from study_app.authoring.document_values import with_value, without_value
 from study_app.authoring.study import Study
 from study_app.errors import ProtocolError
 from study_app.protocol.load import examined, read_document
@@ -55,11 +56,11 @@ def _mended(document: dict[str, Any], faults: Iterable[Fault], before: Mapping[s
     for fault in faults:
         value, sound = _at(found, fault.path), _at(before, fault.path)
         if fault.in_one_language and isinstance(value, str):
-            found = _with(found, fault.path, dict.fromkeys(languages, value))
+            found = with_value(found, fault.path, dict.fromkeys(languages, value))
         elif (lacking := fault.missing_language) and isinstance(value, Mapping) and value:
-            found = _with(found, fault.path, {**value, lacking: next(iter(value.values()))})
+            found = with_value(found, fault.path, {**value, lacking: next(iter(value.values()))})
         elif sound is not _NOTHING and sound != value:
-            found = _with(found, fault.path, sound)
+            found = with_value(found, fault.path, sound)
         elif value is not _NOTHING:
             left_out.add(fault.path)
         else:
@@ -68,7 +69,7 @@ def _mended(document: dict[str, Any], faults: Iterable[Fault], before: Mapping[s
                 parent = parent[:-1]
             left_out.add(parent)
     for path in sorted((path for path in left_out if path), key=str, reverse=True):
-        found = _without(found, path)
+        found = without_value(found, path)
     return dict(found)
 
 
@@ -78,29 +79,3 @@ def _at(node: Any, path: Path) -> Any:
             return _NOTHING
         node = node[step]
     return node
-
-
-def _with(node: Any, path: Path, value: Any) -> Any:
-    """Return a document with a value at a path; the same where there is nothing to hold it."""
-    if not path:
-        return value
-    step, rest = path[0], path[1:]
-    if isinstance(node, Mapping):
-        return {**node, step: _with(node.get(step, {}), rest, value)}
-    if isinstance(step, int) and isinstance(node, tuple) and step < len(node):
-        return (*node[:step], _with(node[step], rest, value), *node[step + 1 :])
-    return node
-
-
-def _without(node: Any, path: Path) -> Any:
-    """Return a document without what is at a path."""
-    step, rest = path[0], path[1:]
-    if not has(node, step):
-        return node
-    if isinstance(node, Mapping):
-        if not rest:
-            return {key: value for key, value in node.items() if key != step}
-        return {**node, step: _without(node[step], rest)}
-    assert isinstance(step, int)  # noqa: S101 - of an array
-    inner = () if not rest else (_without(node[step], rest),)
-    return (*node[:step], *inner, *node[step + 1 :])

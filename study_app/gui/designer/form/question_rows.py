@@ -6,9 +6,9 @@ from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from study_app.gui.theme.theme import RADIUS_CONTROL, TypeRole, font
+from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.cards import Icon, Rule
+from study_app.gui.widgets.cards import Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.viewmodels.designer.special.questions import QuestionLine
@@ -99,11 +99,7 @@ class QuestionRow(Themed, QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Tint the row where it is selected."""
         if self.chosen:
-            painter = QPainter(self)
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(QColor(self.theme.selected))
-            painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+            paint_ground(self, self.theme.selected)
 
 
 def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
@@ -158,10 +154,5 @@ class Panel(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the ground."""
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(self.theme.selected))
-        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
-        painter.setBrush(QColor(self.theme.accent))
-        painter.drawRect(QRectF(0, 2, 3, self.height() - 4))
+        paint_ground(self, self.theme.selected)
+        QPainter(self).fillRect(QRectF(0, 2, 3, self.height() - 4), QColor(self.theme.accent))

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.number_field import NumberField
-from study_app.viewmodels.designer.measures.cards import ControlValues
+from study_app.viewmodels.designer.measures.number_cards import ControlValues
 
 FIELD_PX = 48
 

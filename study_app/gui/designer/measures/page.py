@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.measures.controls import MeasureControls
 from study_app.gui.designer.measures.parts import CardGrid, NumberPart
-from study_app.gui.theme.theme import RADIUS_CONTROL
 from study_app.gui.theme.themed import Themed, dress
-from study_app.gui.widgets.cards import Card, Chip, Icon
+from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.designer.measures.cards import ANEW, ForcesPlot, MeasuresView, NumberCard
+from study_app.viewmodels.designer.measures.number_cards import ANEW, ForcesPlot, MeasuresView, NumberCard
 
 if TYPE_CHECKING:
     from study_app.gui.designer.measures.plots import ForcesView, FunctionView, TrackView
@@ -83,11 +82,7 @@ class WarningBar(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the field."""
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(self.theme.warn_bg))
-        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+        paint_ground(self, self.theme.warn_bg)
 
 
 class ForcesCard(Card):

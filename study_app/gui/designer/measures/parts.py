@@ -13,7 +13,7 @@ from study_app.gui.theme.themed import Themed, dress, take_away
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
-from study_app.viewmodels.designer.measures.cards import (
+from study_app.viewmodels.designer.measures.number_cards import (
     ANEW,
     BalanceCard,
     Line,

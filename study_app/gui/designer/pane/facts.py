@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.measures.page import NumbersRow
 from study_app.gui.designer.measures.parts import CardGrid
-from study_app.viewmodels.designer.measures.cards import MeasuresView
+from study_app.viewmodels.designer.measures.number_cards import MeasuresView
 
 MOST, LEAST = 366, 190
 SHARE, HIGH_FROM = 0.3, 940

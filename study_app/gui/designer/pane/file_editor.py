@@ -22,6 +22,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QWidget
 
 from study_app.gui.designer.form.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
+from study_app.gui.designer.text_lines import visible_lines
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Themed
@@ -174,7 +175,7 @@ class FileEditor(Themed, QPlainTextEdit):
         """Paint the marks of lines, then the text."""
         painter = QPainter(self.viewport())
         width = self.viewport().width()
-        for line, top, height in self._visible():
+        for line, top, height in visible_lines(self):
             if line in self.shown.faulty:
                 painter.fillRect(QRectF(0, top, width, height), QColor(self.theme.bad_bg))
             elif self._selected(line):
@@ -187,17 +188,6 @@ class FileEditor(Themed, QPlainTextEdit):
     def _selected(self, line: int) -> bool:
         return any(first <= line <= last for first, last in self.shown.selected)
 
-    def _visible(self) -> list[tuple[int, float, float]]:
-        found = []
-        block = self.firstVisibleBlock()
-        while block.isValid():
-            place = self.blockBoundingGeometry(block).translated(self.contentOffset())
-            if place.top() > self.viewport().height():
-                break
-            found.append((block.blockNumber(), place.top(), place.height()))
-            block = block.next()
-        return found
-
     def gutter_px(self) -> int:
         """Return the width of the gutter."""
         return 34 + self.fontMetrics().horizontalAdvance("9") * max(3, len(str(self.blockCount())))
@@ -206,7 +196,7 @@ class FileEditor(Themed, QPlainTextEdit):
         """Paint the numbers of the lines in view, faulty ones with a sign."""
         painter.setFont(self.font())
         width = self._gutter.width()
-        for line, top, height in self._visible():
+        for line, top, height in visible_lines(self):
             faulty = line in self.shown.faulty
             painter.setPen(QColor(self.theme.bad if faulty else self.theme.text2))
             painter.drawText(QRectF(0, top, width - 10, height), Qt.AlignmentFlag.AlignRight, str(line + 1))

@@ -6,6 +6,7 @@ from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QPainter, QPaintEvent, QResizeEvent, QTextCursor
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QTextEdit, QVBoxLayout, QWidget
 
+from study_app.gui.designer.text_lines import visible_lines
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import Rule
@@ -98,7 +99,7 @@ class _Side(Themed, QPlainTextEdit):
         """Paint the marks of lines, then the text."""
         t, painter = self.theme, QPainter(self.viewport())
         tints = {"changed": t.selected, "gone": t.bad_bg, "new": t.ok_bg, "gap": t.sunk}
-        for row, top, height in self._visible():
+        for row, top, height in visible_lines(self):
             if (tint := tints.get(self.lines[row].mark)) is not None:
                 painter.fillRect(QRectF(0, top, self.viewport().width(), height), QColor(tint))
         painter.end()
@@ -109,7 +110,7 @@ class _Side(Themed, QPlainTextEdit):
         t, width = self.theme, self._numbers.width()
         inks = {"changed": t.accent, "gone": t.bad, "new": t.ok}
         painter.setFont(self.font())
-        for row, top, height in self._visible():
+        for row, top, height in visible_lines(self):
             line = self.lines[row]
             painter.setPen(QColor(inks.get(line.mark, t.text2)))
             right, middle = Qt.AlignmentFlag.AlignRight, Qt.AlignmentFlag.AlignVCenter
@@ -118,17 +119,6 @@ class _Side(Themed, QPlainTextEdit):
             painter.drawText(QRectF(width - 18, top, 12, height), middle, SIGNS.get(line.mark, ""))
             if row in self._chosen:
                 painter.fillRect(QRectF(0, top, 3, height), QColor(t.accent))
-
-    def _visible(self) -> list[tuple[int, float, float]]:
-        found = []
-        block = self.firstVisibleBlock()
-        while block.isValid() and block.blockNumber() < len(self.lines):
-            place = self.blockBoundingGeometry(block).translated(self.contentOffset())
-            if place.top() > self.viewport().height():
-                break
-            found.append((block.blockNumber(), place.top(), place.height()))
-            block = block.next()
-        return found
 
     def _place_numbers(self) -> None:
         width = 30 + self.fontMetrics().horizontalAdvance("9") * max(2, len(str(len(self.lines))))

@@ -15,7 +15,8 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder
 from study_app.protocol.trials.tracks import design_of, stimulus_of
-from study_app.viewmodels.designer.measures.cards import (
+from study_app.viewmodels.designer.measures.level_words import LevelWords, even_ticks, rounded
+from study_app.viewmodels.designer.measures.number_cards import (
     UNKNOWN,
     ForceBar,
     ForcesPlot,
@@ -25,7 +26,6 @@ from study_app.viewmodels.designer.measures.cards import (
     TrackPlot,
     Verdict,
 )
-from study_app.viewmodels.designer.measures.level_words import LevelWords, even_ticks, rounded
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 ENOUGH: Final = 0.8

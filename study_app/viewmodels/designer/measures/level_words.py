@@ -10,7 +10,7 @@ from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.tracks import success_name
-from study_app.viewmodels.designer.measures.cards import Ticks
+from study_app.viewmodels.designer.measures.number_cards import Ticks
 
 MOST_TICKS: Final = 7
 _BY_DECADE: Final = ((1.0,), (1.0, 3.0), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 5.0, 7.0), tuple(range(1, 10)))

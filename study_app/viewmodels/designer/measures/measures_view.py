@@ -16,7 +16,6 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.measures import session_cards as cards
-from study_app.viewmodels.designer.measures.cards import ANEW, Card, ControlValues, LinesCard, MeasuresView
 from study_app.viewmodels.designer.measures.level_plots import (
     Simulated,
     forces_plot,
@@ -26,6 +25,7 @@ from study_app.viewmodels.designer.measures.level_plots import (
     track_plot,
 )
 from study_app.viewmodels.designer.measures.level_words import LevelWords, rounded
+from study_app.viewmodels.designer.measures.number_cards import ANEW, Card, ControlValues, LinesCard, MeasuresView
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 BELOW: Final = 4

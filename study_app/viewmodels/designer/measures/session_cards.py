@@ -21,7 +21,7 @@ from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.orders.durations import answering_s
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import language_name
-from study_app.viewmodels.designer.measures.cards import (
+from study_app.viewmodels.designer.measures.number_cards import (
     UNKNOWN,
     BalanceCard,
     Line,

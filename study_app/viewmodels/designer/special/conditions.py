@@ -12,7 +12,7 @@ from study_app.authoring.outline import title_of
 from study_app.authoring.study import Study
 from study_app.haptics.model.steady_state import HAND_MPS, steady
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.measures.cards import UNKNOWN
+from study_app.viewmodels.designer.measures.number_cards import UNKNOWN
 from study_app.viewmodels.designer.row_facts import RowFacts
 
 CAPTION: Final = f"force at {HAND_MPS:g} m/s of the hand"

@@ -19,7 +19,7 @@ SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "willi
 
 @dataclass(frozen=True, slots=True)
 class OrderBalance:
-    """Tone, icon and words of the chip beside the order, and a sentence that explains it."""
+    """Tone, icon and words of the chip of the order, and a sentence that explains it."""
 
     tone: Tone
     icon: str

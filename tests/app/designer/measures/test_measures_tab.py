@@ -27,7 +27,7 @@ from study_app.authoring.writer.edits import Set
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.measures.cards import ANEW, UNKNOWN
+from study_app.viewmodels.designer.measures.number_cards import ANEW, UNKNOWN
 
 pytestmark = pytest.mark.slow
 QUANTILES = (0.1, 0.15, 0.2, 0.25, 0.3)

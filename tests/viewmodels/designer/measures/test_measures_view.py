@@ -12,7 +12,9 @@ from study_app.haptics.model.steady_state import HAND_MPS, steady
 from study_app.protocol.load import shipped
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.measures.cards import (
+from study_app.viewmodels.designer.measures.level_words import even_ticks, log_ticks, rounded
+from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
+from study_app.viewmodels.designer.measures.number_cards import (
     UNKNOWN,
     BalanceCard,
     LinesCard,
@@ -20,8 +22,6 @@ from study_app.viewmodels.designer.measures.cards import (
     SessionCard,
     TextsCard,
 )
-from study_app.viewmodels.designer.measures.level_words import even_ticks, log_ticks, rounded
-from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
 
 SECTIONS = ("study", "device", "blocks", "liquids", "conditions", "tasks", "questionnaires", "pages", "stimuli")
 

@@ -18,7 +18,7 @@ LETTERS, NARROWEST = 8, 124
 
 
 class OrderField(ChoiceField):
-    """The choice, with a chip beside it."""
+    """The choice of an order, and a chip that says how even it is."""
 
     def __init__(self, row: FormRow) -> None:
         self.chip = Chip(small=True)
