@@ -9,6 +9,7 @@ from typing import Any
 
 from study_app.app.designer.open_study import OpenStudy, unsaved_studies
 from study_app.authoring.drafts import drafted_files
+from study_app.authoring.fields import row_at
 from study_app.authoring.names import Document
 from study_app.authoring.new_study import template
 from study_app.authoring.templates import templates
@@ -95,11 +96,12 @@ def _template_choice(name: str) -> TemplateChoice:
 
 
 def there(document: Document, path: Place) -> Place:
-    """Return a path, or as much of it as is in the document; the study's own table where nothing is."""
+    """Return a path, or as much of it as is in the document; a section may be left out; else the study's own table."""
     found: Any = document
+    known = path[:1] if path and row_at(document, path[:1]) is not None else FIRST
     for length, step in enumerate(path):
         if not has(found, step):
-            return path[:length] if length > 1 else FIRST
+            return path[:length] if length > 1 else known
         found = found[step]
     return path or FIRST
 

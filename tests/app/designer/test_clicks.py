@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
+from study_app.viewmodels.designer.requests import SetValue
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -43,3 +44,20 @@ def test_a_click_on_a_block_in_the_drawer_closes_it(qtbot: Any, designer: Any) -
         qtbot.mouseClick(tree.viewport(), LEFT, pos=tree.visualRect(index).center())
         assert designer.place.view.form.path == path
         assert outline.isVisible() is not closes
+
+
+def test_arrow_keys_walk_the_whole_outline_of_the_empty_study(qtbot: Any, designer: Any) -> None:
+    designer.controller.begin("template:empty", "walked")
+    tree = designer.place.outline.tree
+    qtbot.keyClick(designer.window, Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
+    seen = []
+    for _ in range(60):
+        qtbot.keyClick(tree, Qt.Key.Key_Down)
+        if tree.currentIndex().data(ROW_ROLE).path:
+            assert designer.editing.selected == tree.currentIndex().data(ROW_ROLE).path
+            assert designer.place.form.form.path == designer.editing.selected
+        seen.append(designer.editing.selected)
+    assert {("questionnaires",), ("groups",), ("scene",), ("limits",), ("analysis",)} <= set(seen)
+    designer.editing.select(("limits",))
+    designer.editing.ask(SetValue(("limits", "lateness_ms"), 3))
+    assert designer.editing.opened.study.document["limits"] == {"lateness_ms": 3}
