@@ -8,6 +8,7 @@ from types import MappingProxyType
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+from shiboken6 import isValid
 
 from study_app.gui.home.navigation import Rail
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
@@ -59,6 +60,7 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(LEAST)
         self.theme = theme
         self.notice: Notice | None = None
+        self._had_keyboard: QWidget | None = None
         self._makers = makers
         self._prepares = prepares
         self._places: dict[str, Place] = {}
@@ -138,11 +140,18 @@ class MainWindow(QMainWindow):
     def rest(self) -> None:
         """Leave the place one is at, and the screen: a session takes over."""
         self._now().leave()
+        self._had_keyboard = self.focusWidget()
         self.hide()
 
     def come_back(self) -> None:
-        """Be there again, where one was."""
+        """Be there again, where one was.
+
+        A window that becomes the active one while it is hidden, as when the dialog before a session closes, gives the
+        keyboard to the part after the one that had it.
+        """
         self.show()
+        if self._had_keyboard is not None and isValid(self._had_keyboard):
+            self._had_keyboard.setFocus()
         self._now().enter()
 
     def tell(self, title: str, sentence: str) -> None:

@@ -85,6 +85,17 @@ def test_a_session_and_the_end_leave_the_place(main, log):
     assert "leave lab" in log[-2:]
 
 
+def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
+    qtbot.waitUntil(main.isActiveWindow)
+    began = main.place("home").findChild(QPushButton)
+    began.setFocus()
+    main.rest()
+    main.focusNextChild()  # Qt does so where a hidden window becomes the active one
+    assert main.focusWidget() is not began
+    main.come_back()
+    assert main.focusWidget() is began
+
+
 def test_what_was_said_goes_with_the_window(main):
     main.tell("It did not work", "The cable is out.")
     assert main.notice.isVisible()
