@@ -62,7 +62,8 @@ application = application_here()
 beside = threading.Thread(target=load_windows)
 beside.start()
 beside.join()
-assert {"study_app.app.session.preflight_controller", "study_app.app.session.windows"} <= set(sys.modules)
+windows = {"study_app.app.session.preflight_controller", "study_app.app.session.windows"}
+assert windows | {"pyarrow.parquet"} <= set(sys.modules)
 objects = [one for one in gc.get_objects() if isinstance(one, QObject)]
 assert application in objects
 print([one for one in objects if one.thread() != application.thread()])

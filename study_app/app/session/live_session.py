@@ -72,7 +72,8 @@ def run_session(chosen: NewSession, tell: Callable[[str], object] | None) -> int
 def load_windows() -> None:
     """Load the modules of a session's windows while the note is shown: a third of a second; no object is made."""
     import study_app.app.session.preflight_controller  # noqa: PLC0415
-    import study_app.app.session.windows  # noqa: F401, PLC0415
+    import study_app.app.session.windows  # noqa: PLC0415
+    import study_app.store.recording_writer  # noqa: F401, PLC0415 - and pyarrow, which the recorder is made with
 
 
 class LiveSession(QObject):
