@@ -16,6 +16,8 @@ from study_app.psychophysics.grid import Grid, quantile
 
 BETWEEN_PEOPLE: Final = 1.2
 """Factor (one standard deviation of the logarithm) between the thresholds of people. [choice]"""
+ESTIMATE_NOISE: Final = 0.25
+"""Standard deviation of the logarithm of a simulated magnitude estimate. [choice]"""
 AT_ONCE: Final = 100
 """Posteriors that are computed together."""
 _COVERED: Final = 0.95
@@ -66,12 +68,12 @@ def estimated(grid: Grid, levels: ArrayLike, successes: Floats, failures: Floats
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What one participant's threshold at one standard is expected to show.
+    """What one participant's threshold at one standard, d′ or exponent is expected to show.
 
     Attributes
     ----------
     spacing : {"log", "linear"}
-        Of u: decades, or units of the level.
+        Of u: decades, or units of the level; "linear" for d′ and exponents.
     trials : int
         Of one standard.
     standards : int
@@ -81,7 +83,7 @@ class Expected:
     spread : float
         Standard deviation of the estimate's error, in u.
     threshold : float
-        About where the thresholds lie, as a level.
+        About where the thresholds lie, as a level; or the d′ or exponent that is assumed.
     """
 
     spacing: Literal["log", "linear"]

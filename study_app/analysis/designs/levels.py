@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Final
@@ -11,17 +11,20 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
+from study_app.analysis.designs.estimated_exponents import estimated_exponents
 from study_app.analysis.designs.level_conduct import catch_answers, level_conduct
 from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.designs.settings import settings
 from study_app.analysis.designs.thresholds import thresholds
 from study_app.analysis.designs.weber_exponents import weber_exponents
 from study_app.analysis.results.levels import (
+    ExponentFound,
     LevelAnswers,
     LevelsFound,
     LevelTimes,
     PublishedValue,
     Summary,
+    ThresholdFound,
     WithheldForce,
 )
 from study_app.analysis.results.question_answers import GroupAnswers
@@ -103,9 +106,10 @@ def _block(
         spacing="linear" if stimulus is None else stimulus.spacing,
         guess_rate=block.design.guess_rate if block.has_correct_answer else None,
         bounds=bounds,
+        own_units=_chooses_units(block),
         answers=() if opened is None else tuple(_answers(block, opened, bounds)),
         thresholds=estimated,
-        exponents=() if stimulus is None else tuple(weber_exponents(estimated, stimulus.level_kind)),
+        exponents=() if opened is None else tuple(_exponents(block, opened, estimated)),
         level_times=() if opened is None else tuple(_level_times(block, opened)),
         withheld=() if opened is None else tuple(_withheld(block, intervals)),
         conduct=() if opened is None else tuple(level_conduct(block, opened, intervals)),
@@ -116,6 +120,13 @@ def _block(
         settings=() if opened is None else tuple(settings(block, opened)),
         published=tuple(PublishedValue(**one.model_dump(exclude={"block"})) for one in block.published),
     )
+
+
+def _exponents(block: LevelBlock, opened: pd.DataFrame, estimated: Sequence[ThresholdFound]) -> Iterator[ExponentFound]:
+    """Yield the exponents of a block: of its numbers over levels, or of its thresholds over standards."""
+    if block.stimulus is not None:
+        yield from estimated_exponents(block, opened)
+        yield from weber_exponents(estimated, block.stimulus.level_kind)
 
 
 def _times(answers: pd.DataFrame) -> dict[str, Any]:
@@ -173,8 +184,27 @@ def _answers(block: LevelBlock, opened: pd.DataFrame, bounds: tuple[float, float
     else:
         rows = rows.assign(catch=rows["catch"].fillna(False).astype(bool))
         by = ["standard", "level", "catch"]
+    units = _own_units(block, rows)
     for _, at_level in rows.groupby(by, dropna=False, sort=True):
-        yield from _at_level(block, at_level, bounds)
+        yield from _at_level(block, at_level, bounds, units)
+
+
+def _chooses_units(block: LevelBlock) -> bool:
+    """Return whether each participant chooses the unit of the numbers named: there is no modulus."""
+    return block.design.reply == "number" and block.design.first is None
+
+
+def _own_units(block: LevelBlock, rows: pd.DataFrame) -> Mapping[str, float]:
+    """Return ln of the unit that each participant chose for numbers, over the mean unit; nothing with a modulus.
+
+    It is the mean over levels of the participant's mean ln answer.
+    """
+    if not _chooses_units(block):
+        return {}
+    answered = rows.assign(log=np.log(rows["value"].to_numpy(dtype=float)))
+    logs = answered.groupby(["participant", "level"])["log"].mean()
+    own = logs.groupby("participant").mean()
+    return dict(own - own.mean())
 
 
 def _places(block: LevelBlock) -> dict[str | None, int]:
@@ -182,7 +212,9 @@ def _places(block: LevelBlock) -> dict[str | None, int]:
     return {setting.condition: place for place, setting in enumerate(block.settings)}
 
 
-def _at_level(block: LevelBlock, rows: pd.DataFrame, bounds: tuple[float, float] | None) -> Iterator[LevelAnswers]:
+def _at_level(
+    block: LevelBlock, rows: pd.DataFrame, bounds: tuple[float, float] | None, units: Mapping[str, float]
+) -> Iterator[LevelAnswers]:
     summary = SUMMARIES[block.design.reply]
     ends = (0.0, 1.0) if summary == "share" else bounds
     values = rows["success"] if summary == "share" else rows["value"]
@@ -198,7 +230,7 @@ def _at_level(block: LevelBlock, rows: pd.DataFrame, bounds: tuple[float, float]
     )
     people = rows["participant"].to_numpy()
     own = {person: numbers[people == person] for person in sorted(set(people))}
-    means = np.array([one.mean() for one in own.values()])
+    means = np.array([one.mean() - units.get(person, 0.0) for person, one in own.items()])
     count = int(numbers.sum()) if summary == "share" else None
     value, low, high = _summarised(summary, means, ends)
     yield make(None, n=len(numbers), participants=len(own), count=count, value=value, low=low, high=high)

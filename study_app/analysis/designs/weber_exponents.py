@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from study_app.analysis.designs.estimated_exponents import mean_exponent
 from study_app.analysis.results.levels import ExponentFound, ThresholdFound
-from study_app.analysis.statistics.student_interval import student_interval
 
 
 def jnd_slope(standards: ArrayLike, jnds: ArrayLike) -> float:
@@ -48,6 +48,5 @@ def weber_exponents(thresholds: Sequence[ThresholdFound], level_kind: str) -> It
         if len(places) >= 2:
             own.append(ExponentFound(person, len(places), jnd_slope(*np.array(places).T)))
     if own:
-        slopes = np.array([one.exponent for one in own])
-        yield ExponentFound(None, len(own), float(slopes.mean()), *student_interval(slopes))
+        yield mean_exponent(own)
     yield from own

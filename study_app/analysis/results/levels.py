@@ -103,7 +103,7 @@ class ThresholdFound:
 
 @dataclass(frozen=True, slots=True)
 class ExponentFound:
-    """A participant's Weber exponent from ``n`` standards: the slope of ln JND on ln standard.
+    """A participant's exponent: of a power law, from ``n`` levels, or Weber's, of the JND over ``n`` standards.
 
     Where ``participant`` is None, it is the mean over ``n`` participants, with its 95 % interval by Student's t.
     """
@@ -245,7 +245,8 @@ class LevelsFound:
     the varied number, ``quantity`` its name in words, ``unit`` its unit, ``level_kind`` what a level is (weber,
     difference, value), all None where conditions are compared; ``family`` is the psychometric function of the
     thresholds; ``adaptive``: answers chose the levels; ``guess_rate`` is the share at chance, ``bounds`` are the ends
-    of a scale; ``withheld`` is known where the force is delayed, with jitter or loss. Where participants set the levels
+    of a scale; ``own_units``: each participant chose the unit of the numbers named, which group intervals leave out;
+    ``withheld`` is known where the force is delayed, with jitter or loss. Where participants set the levels
     there are ``settings`` in place of answers at levels. ``device`` are the device's own dynamics, None where they were
     not measured. Without the key only ``times`` are known.
     """
@@ -264,6 +265,7 @@ class LevelsFound:
     spacing: str = "linear"
     guess_rate: float | None = None
     bounds: tuple[float, float] | None = None
+    own_units: bool = False
     answers: tuple[LevelAnswers, ...] = ()
     thresholds: tuple[ThresholdFound, ...] = ()
     exponents: tuple[ExponentFound, ...] = ()
@@ -283,6 +285,11 @@ class LevelsFound:
         if self.device is None or one.standard is None or (self.vary, self.level_kind) != ("damping_nspm", "weber"):
             return None
         return one.threshold * one.standard / (one.standard + self.device.damping_nspm)
+
+    @property
+    def exponent_name(self) -> str:
+        """What its exponents are."""
+        return "exponent of the power law" if self.summary == "geometric mean" else "Weber exponent"
 
     @property
     def of_group(self) -> tuple[LevelAnswers, ...]:

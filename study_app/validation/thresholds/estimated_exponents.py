@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-import pandas as pd
 
+from study_app.analysis.designs.estimated_exponents import estimate_slope
 from study_app.analysis.statistics.student_interval import student_interval
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.steady_state import steady
@@ -26,14 +26,13 @@ from study_app.protocol.trials.due import next_level
 from study_app.protocol.trials.keyed import Key, draw_secret
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import condition_of, design_of, method_of, stimulus_of
+from study_app.psychophysics.precision import ESTIMATE_NOISE
 from study_app.session.simulated.design_observer import OBSERVER, Observer, estimate
 from study_app.validation.thresholds.methods_alone import PEOPLE, keyed_draw
 from study_app.validation.thresholds.verdicts import Verdict
 
 EXPONENT: Final = 0.44
 """Of perceived thickness over viscosity (Stevens & Guirao 1964)."""
-ESTIMATE_NOISE: Final = 0.25
-"""Standard deviation of the logarithm of an estimate. [choice]"""
 SPREADS: Final = 3
 ERROR_MOST: Final = 0.03
 POINTS: Final = 64
@@ -155,17 +154,7 @@ def _exponent(one: PlantedExponent, key: Key, person: str, seed: int) -> float:
         first = first or resistance
         levels.append(asked)
         answers.append(estimate(one.observer, resistance / first, keyed_draw(key, person, trial.number)))
-    return exponent_of(levels, answers)
-
-
-def exponent_of(levels: Sequence[float], answers: Sequence[float]) -> float:
-    """Return the slope of the mean ln answer at each level over the logarithm of the level."""
-    ascending = sorted(set(levels))
-    means = [
-        float(np.mean([math.log(answer) for level, answer in zip(levels, answers, strict=True) if level == one]))
-        for one in ascending
-    ]
-    return float(np.polyfit(np.log(ascending), means, 1)[0])
+    return estimate_slope(levels, answers)
 
 
 def exponent_verdicts(one: PlantedExponent, studies: Sequence[ExponentsFound]) -> Iterator[Verdict]:
@@ -192,15 +181,6 @@ def exponent_verdicts(one: PlantedExponent, studies: Sequence[ExponentsFound]) -
 def spread_of_exponents(studies: Sequence[ExponentsFound], people: int) -> float:
     """Return the standard deviation of the mean exponent over studies of so many participants."""
     return float(np.std([found.mean_of(people) for found in studies], ddof=1))
-
-
-def exponents_in(one: PlantedExponent, rows: pd.DataFrame) -> tuple[float, ...]:
-    """Return the exponent of each participant in the opened rows of `tracks`."""
-    own = rows[(rows["block"] == one.block.id) & rows["analysed"] & rows["value"].notna()]
-    return tuple(
-        exponent_of(of_person["level"].astype(float).tolist(), of_person["value"].astype(float).tolist())
-        for _, of_person in own.groupby("participant")
-    )
 
 
 def recovered_exponent(one: PlantedExponent, exponents: Sequence[float], spread: float) -> Verdict:

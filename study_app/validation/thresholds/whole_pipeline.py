@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from study_app.analysis.designs.estimated_exponents import estimated_exponents
 from study_app.analysis.designs.thresholds import thresholds
 from study_app.analysis.tables.study import Study, load_study
 from study_app.analysis.tables.tracks import tracks
@@ -18,11 +19,7 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
-from study_app.validation.thresholds.estimated_exponents import (
-    PlantedExponent,
-    exponents_in,
-    recovered_exponent,
-)
+from study_app.validation.thresholds.estimated_exponents import PlantedExponent, recovered_exponent
 from study_app.validation.thresholds.planted import Planted
 from study_app.validation.thresholds.verdicts import Verdict
 
@@ -78,9 +75,9 @@ def rehearsed(one: Planted | PlantedExponent, source: bytes, seed: int) -> Rehea
 
 def _recovered(one: Planted | PlantedExponent, study: Study) -> tuple[float, ...]:
     rows = tracks(study)
-    if isinstance(one, PlantedExponent):
-        return exponents_in(one, rows)
     block = next(block for block in study.levels if block.id == one.block.id)
+    if isinstance(one, PlantedExponent):
+        return tuple(found.exponent for found in estimated_exponents(block, rows) if found.participant is not None)
     return tuple(row.threshold for row in thresholds(block, rows) if row.participant is not None)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
 from study_app.protocol.load import load, parse, source_bytes
@@ -12,7 +10,6 @@ from study_app.validation.thresholds.estimated_exponents import (
     EXPONENT,
     ExponentsFound,
     PlantedExponent,
-    exponent_of,
     exponent_verdicts,
     found_of,
     planted_exponent,
@@ -61,12 +58,6 @@ def test_studies_recover_it_and_a_wrong_exponent_is_found(one: PlantedExponent, 
     narrow = [ExponentsFound(found.own, found.mean, found.mean, found.mean) for found in studies]
     assert not list(exponent_verdicts(one, narrow))[1].holds
     assert spread_of_exponents(studies, 10) < spread_of_exponents(studies, 3) < 0.05
-
-
-def test_the_exponent_is_the_slope_of_mean_logarithms() -> None:
-    levels = [1.0, 1.0, math.e, math.e, math.e]
-    answers = [math.exp(value) for value in (0.0, 2.0, 1.0, 1.5, 2.0)]  # means 1 and 1.5
-    assert exponent_of(levels, answers) == pytest.approx(0.5)
 
 
 def test_studies_without_estimation_at_a_pace_have_no_exponent() -> None:

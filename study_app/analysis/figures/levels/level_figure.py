@@ -68,9 +68,10 @@ def _panels(found: LevelsFound, banded: bool) -> str:
             "those of several standards one below another; "
             f"circles: answers at each level, area by their number{crosses}. First panel: all participants."
         )
+    units = ", without the unit that each chose" if found.own_units else ""
     return (
         f"First panel: {mean_words(found)} over the participants, bars: its 95 % interval (Student's t); thin: "
-        f"participants. Other panels: each participant with the 95 % interval of the answers{crosses}."
+        f"participants{units}. Other panels: each participant with the 95 % interval of the answers{crosses}."
     )
 
 
@@ -157,7 +158,7 @@ def _panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -
         shown = [one for one in found.answers if one.standard == standard and not one.catch]
         if person is None and len(groups) == 1 and not found.own_thresholds:
             for somebody in found.people:
-                _line(axes, [one for one in shown if one.participant == somebody], places, found)
+                _line(axes, shown, somebody, places, found)
         shifted = {level: place + aside for level, place in places.items()}
         _points(axes, [one for one in shown if one.participant == person], shifted, found, colour)
         caught = [one for one in found.answers if one.standard == standard and one.catch and one.participant == person]
@@ -165,10 +166,17 @@ def _panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -
         axes.plot([shifted[_where(one)] for one in caught], heights, "x", color=colour, markersize=4, zorder=4)
 
 
-def _line(axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsFound) -> None:
+def _line(
+    axes: Axes, shown: Sequence[LevelAnswers], person: str, places: Mapping[Any, float], found: LevelsFound
+) -> None:
+    """Draw a participant's answers; numbers without the unit that the participant chose."""
+    points = [one for one in shown if one.participant == person]
+    heights = np.array([_height(found, one.value) for one in points])
+    if found.own_units and points:
+        heights += np.mean([_height(found, one.value) for one in shown if one.participant is None]) - heights.mean()
     axes.plot(
         [places[_where(one)] for one in points],
-        [_height(found, one.value) for one in points],
+        heights,
         color=style.PARTICIPANT,
         linewidth=0.5,
         alpha=0.7,

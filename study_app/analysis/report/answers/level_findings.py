@@ -1,4 +1,4 @@
-"""What was found in blocks of levels, a sentence each: thresholds of the group, and its Weber exponent."""
+"""What was found in blocks of levels, a sentence each: thresholds of the group, and its exponent."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ def level_findings(found: LevelsFound) -> Iterator[str]:
             )
     for exponent in found.exponents:
         if exponent.participant is None:
+            meaning = "; 1 is Weber’s law, 0 a constant JND" if found.thresholds else f" over {found.quantity}"
             yield (
-                f"{found.title}: Weber exponent {number(exponent.exponent)} ({_interval(exponent)}; "
-                f"{counted(exponent.n, 'participant')}); 1 is Weber’s law, 0 a constant JND."
+                f"{found.title}: {found.exponent_name} {number(exponent.exponent)} ({_interval(exponent)}; "
+                f"{counted(exponent.n, 'participant')}){meaning}."
             )
-    if found.thresholds and found.published:
+    if (found.thresholds or found.exponents) and found.published:
         yield f"{found.title}: published values: {'; '.join(one.in_words() for one in found.published)}."
 
 

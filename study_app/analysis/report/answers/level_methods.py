@@ -30,7 +30,12 @@ def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsFound]) -
             "(Wichmann & Hill 2001). Group means are random-effects means with the between-person variance of Paule "
             f"and Mandel (1982) and, from {FEWEST} participants on, the interval of Hartung and Knapp (2001)."
         )
-    if any(found.exponents for found in opened):
+    if any(found.exponents and found.summary == "geometric mean" for found in opened):
+        yield (
+            "The exponent of magnitude estimation (Stevens 1957) is the slope of the mean ln answer at each level on "
+            "ln level, by least squares for each participant; the group’s is the mean with Student’s 95 % interval."
+        )
+    if any(found.exponents and found.thresholds for found in opened):
         yield (
             "The Weber exponent is the slope of ln JND on ln standard, by least squares for each participant; the "
             "group’s is the mean with Student’s 95 % interval."

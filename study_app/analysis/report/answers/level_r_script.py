@@ -18,8 +18,8 @@ from study_app.analysis.tables.study import Study
 from study_app.protocol.trials.methods.updown import UpDown
 
 START: Final = """
-# Blocks with a design: d' and criterion, means of reversals, random-effects means with Hartung-Knapp intervals, and
-# Weber exponents, and settings of the method of adjustment.
+# Blocks with a design: d' and criterion, means of reversals, random-effects means with Hartung-Knapp intervals,
+# exponents of power laws and of Weber's law, and settings of the method of adjustment.
 
 tracks <- read.csv(file.path(folder, "{table}"), colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
 for (name in c("standard", "trial", "level_asked")) tracks[[name]] <- as.numeric(tracks[[name]])
@@ -94,12 +94,21 @@ exponent <- function(what, standards, jnds, reported) {{
   same(paste(what, "Weber exponent"), reported, slope)
   slope
 }}
-exponents <- function(what, slopes, mean, ends) {{
-  same(paste(what, "Weber exponent"), mean, base::mean(slopes))
+power_law <- function(what, rows, reported) {{
+  rows$answer <- log(as.numeric(rows$response)); rows <- rows[is.finite(rows$answer) & rows$level_asked > 0, ]
+  delivered <- ave(as.numeric(rows$level_delivered), rows$level_asked, FUN = function(x) mean(x, na.rm = TRUE))
+  levels <- ifelse(is.na(delivered), rows$level_asked, delivered)
+  means <- unique(data.frame(level = log(levels), answer = ave(rows$answer, rows$level_asked)))
+  slope <- unname(coef(lm(answer ~ level, means))[2])
+  same(paste(what, "exponent of the power law"), reported, slope)
+  slope
+}}
+exponents <- function(what, name, slopes, mean, ends) {{
+  same(paste(what, name), mean, base::mean(slopes))
   if (length(ends)) {{
     interval <- t.test(slopes)$conf.int
-    same(paste(what, "Weber exponent, low"), ends[1], interval[1])
-    same(paste(what, "Weber exponent, high"), ends[2], interval[2])
+    same(paste0(what, " ", name, ", low"), ends[1], interval[1])
+    same(paste0(what, " ", name, ", high"), ends[2], interval[2])
   }}
 }}
 mean_of_settings <- function(what, u, log, mean_level, ends) {{
@@ -219,6 +228,11 @@ def _exponents(found: LevelsFound) -> Iterator[tuple[str, int]]:
     for one in found.exponents:
         if one.participant is None:
             continue
+        if not found.thresholds:
+            which = f"{r_text(found.block)}, {r_text(one.participant)}, NA"
+            what = r_text(f"{found.block}, {one.participant}")
+            slopes.append(f"  power_law({what}, at_standard(judged, {which}), {r_number(one.exponent)})")
+            continue
         own = [each for each in found.own_thresholds if each.participant == one.participant]
         own = [each for each in own if (each.standard or 0.0) > 0 and each.threshold > 0]
         standards = ", ".join(_number(each.standard) for each in own)
@@ -229,7 +243,8 @@ def _exponents(found: LevelsFound) -> Iterator[tuple[str, int]]:
     ends = _ends(group)
     lines = ",\n".join(slopes)
     yield (
-        f"exponents({r_text(f'{found.block}, group')}, c(\n{lines}), {r_number(group.exponent)}, {ends})",
+        f"exponents({r_text(f'{found.block}, group')}, {r_text(found.exponent_name)}, c(\n{lines}), "
+        f"{r_number(group.exponent)}, {ends})",
         len(slopes) + (1 if group.low is None else 3),
     )
 

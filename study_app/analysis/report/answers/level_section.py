@@ -21,6 +21,7 @@ EXPLAINED = (
     "{mean} over the participants, with the 95 % interval by Student's t where at least two participants differ. "
     "Below: each participant, with the number of answers."
 )
+OWN_UNITS = " The interval leaves out that each participant chose a unit: ln answers less the participant's mean."
 
 
 def section(found: LevelsFound, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:
@@ -47,7 +48,8 @@ def section(found: LevelsFound, pictures: Sequence[Picture], estimator: str | No
         return
     if not found.adaptive:
         yield _of_group(found)
-        yield paragraph(EXPLAINED.format(mean=mean_words(found).capitalize()), "soft")
+        explained = EXPLAINED.format(mean=mean_words(found).capitalize())
+        yield paragraph(explained + (OWN_UNITS if found.own_units else ""), "soft")
     yield from drawn({one.name: one for one in pictures}, f"levels-{found.block}")
     if not found.adaptive:
         for standard in sorted({one.standard for one in found.answers}, key=lambda one: one or 0.0):

@@ -27,6 +27,12 @@ EXPONENT: Final = (
     "interval."
 )
 
+POWER_LAW: Final = (
+    "The exponent n of answer ∝ levelⁿ (Stevens 1957) is the least-squares slope of a participant’s mean ln answer at "
+    "each level on ln level, at the levels delivered to the hand; it does not depend on the unit that a participant "
+    "chose. That of the group is the mean over participants with Student’s interval."
+)
+
 
 def section(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str]:
     """Yield thresholds, sensitivity and bias, and times to answer of a block whose key is open."""
@@ -38,9 +44,9 @@ def section(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str
         yield from drawn(pictures, f"tracks-{found.block}")
         yield from drawn(pictures, f"weber-{found.block}")
     if found.exponents:
-        yield heading(3, "Weber exponent")
+        yield heading(3, found.exponent_name[0].upper() + found.exponent_name[1:])
         yield _exponents(found)
-        yield paragraph(EXPONENT, "soft")
+        yield paragraph(EXPONENT if found.thresholds else POWER_LAW, "soft")
         yield from _published(found, exponents=True)
     if found.sensitivities:
         yield heading(3, "Sensitivity and bias")
@@ -99,7 +105,7 @@ def _published(found: LevelsFound, *, exponents: bool) -> Iterator[str]:
 
 def _exponents(found: LevelsFound) -> str:
     return table(
-        ("Participant", "standards", "exponent", "95 % interval"),
+        ("Participant", "standards" if found.thresholds else "levels", "exponent", "95 % interval"),
         [
             [
                 one.participant or f"group of {one.n}",
