@@ -16,7 +16,7 @@ from study_app.workers.executors import Workers
 
 if TYPE_CHECKING:
     from study_app.analysis.power.power_curves import Powers
-    from study_app.analysis.power.threshold_studies import ThresholdPlans
+    from study_app.analysis.power.threshold_studies import PrecisionPlans
     from study_app.analysis.power.threshold_tables import Precisions
     from study_app.protocol.model import Protocol
 
@@ -60,7 +60,8 @@ def _trials(_context: click.Context, _option: click.Parameter, value: str | None
     "--trials",
     callback=_trials,
     metavar="N,N,…",
-    help="Trials of each standard, for studies of thresholds; default: the protocol's.",
+    help="Trials of each standard or comparison, for studies of thresholds, d′ or magnitude estimation; default: the "
+    "protocol's.",
 )
 @click.option(
     "--studies",
@@ -84,9 +85,9 @@ def power(
     """Estimate the power of the protocol's own tests on simulated studies, and the smallest detectable difference.
 
     Four sessions are rehearsed to obtain the features of each condition; then thousands of participants answer with
-    the rehearsals' answer model, which is plausible but not measured. Of a study of thresholds: the standard deviation
-    of one participant, half the group's 95 % interval, and how many studies reach analysis.precision, for each number
-    of participants and of --trials. Ctrl-C ends with the results so far.
+    the rehearsals' answer model, which is plausible but not measured. Of a study of thresholds, d′ or magnitude
+    estimation: the standard deviation of one participant, half the group's 95 % interval, and how many studies reach
+    analysis.precision, for each number of participants and of --trials. Ctrl-C ends with the results so far.
     """
     if engine == "processes":
         workers = Workers(workers.count)
@@ -100,7 +101,9 @@ def power(
     study = load(protocol)
     planned = plans(study, trials)
     if trials and not planned:
-        raise click.UsageError(f"--trials: {study.study.name} has no main block of thresholds")
+        raise click.UsageError(
+            f"--trials: {study.study.name} has no main block of thresholds, d′ or magnitude estimation"
+        )
     if to is not None:
         make_folder(to)
     found: Powers | Precisions | None = None
@@ -140,7 +143,7 @@ def _of_statements(
 
 def _of_thresholds(
     study: Protocol,
-    planned: ThresholdPlans,
+    planned: PrecisionPlans,
     sizes: tuple[int, ...],
     studies: int,
     seed: int,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from statistics import NormalDist
 from typing import Final, Literal, TypeAlias
 
@@ -75,6 +75,7 @@ def proportion_correct(task: str, d_prime: float) -> float:
     return PROPORTIONS[task](d_prime)
 
 
+@lru_cache(maxsize=4096)
 def d_prime_at(task: str, proportion: float) -> float:
     """Return d′ at a P(correct), by bisection to 1e-10; 0 at or below chance."""
     return _inverse(PROPORTIONS[task], proportion)
@@ -218,6 +219,15 @@ def _oddity(d_prime: float) -> float:
     return float(2.0 * (weights * (_cdf(-z * math.sqrt(3.0) + away) + _cdf(-z * math.sqrt(3.0) - away))).sum())
 
 
+def _same_different_differencing(d_prime: float) -> float:
+    """Return P(correct) of the criterion k at which "same" is as often correct as "different"."""
+    low, high = 0.0, MOST
+    while high - low > TOLERANCE:
+        k = 0.5 * (low + high)
+        low, high = (k, high) if different_rate(d_prime, k) + different_rate(0.0, k) > 1.0 else (low, k)
+    return 0.5 * (1.0 + different_rate(d_prime, low) - different_rate(0.0, low))
+
+
 def _same_different(d_prime: float) -> float:
     return 0.5 * (1.0 + (2.0 * NORMAL.cdf(d_prime / 2.0) - 1.0) ** 2)
 
@@ -229,6 +239,8 @@ PROPORTIONS: Final[Mapping[str, Callable[[float], float]]] = {
     "abx differencing": partial(_abx, divisor=math.sqrt(6.0)),
     "abx independent": partial(_abx, divisor=2.0),
     "oddity": _oddity,
+    "samedifferent differencing": _same_different_differencing,
     "samedifferent independent": _same_different,
+    "yesno": lambda d_prime: NORMAL.cdf(d_prime / 2.0),
 }
 """P(correct) from d′, by design and model."""

@@ -29,7 +29,9 @@ WORKED = {  # P(correct) at d′ = 1 and 2, confirmed by simulations of 2·10⁶
     "abx differencing": (0.5825, 0.7468),
     "abx independent": (0.5997, 0.7877),
     "oddity": (0.4180, 0.6048),
+    "samedifferent differencing": (0.5513, 0.6748),
     "samedifferent independent": (0.5733, 0.7330),
+    "yesno": (0.6915, 0.8413),
 }
 
 
@@ -37,7 +39,7 @@ WORKED = {  # P(correct) at d′ = 1 and 2, confirmed by simulations of 2·10⁶
 def test_proportion_correct_is_the_worked_one_at_d_prime_1_and_2_and_chance_at_0(task):
     assert [proportion_correct(task, d) for d in (1, 2)] == pytest.approx(WORKED[task], abs=5e-5)
     assert proportion_correct(task, 0) == pytest.approx(CHANCE.get(task, 0.5), abs=1e-12)
-    assert proportion_correct(task, 15) == pytest.approx(1, abs=1e-9)
+    assert proportion_correct(task, 15) == pytest.approx(1, abs=1e-7)
 
 
 @pytest.mark.parametrize("task", PROPORTIONS)
@@ -53,7 +55,7 @@ def test_two_intervals_as_an_integral_is_the_closed_form():
         assert forced_choice(d_prime, 2) == pytest.approx(norm.cdf(d_prime / math.sqrt(2)), abs=1e-12)
 
 
-@pytest.mark.parametrize("task", ["3ifc", "4ifc", "abx differencing", "oddity"])
+@pytest.mark.parametrize("task", ["3ifc", "4ifc", "abx differencing", "oddity", "samedifferent differencing"])
 def test_proportions_are_those_of_simulated_observers(task):
     draw, n, d_prime = np.random.default_rng(3), 400_000, 1.4
     if task == "abx differencing":
@@ -63,6 +65,11 @@ def test_proportions_are_those_of_simulated_observers(task):
         x = draw.normal(size=(n, 3)) + d_prime * np.array([0, 0, 1])
         gaps = np.abs(np.stack([x[:, 1] - x[:, 2], x[:, 0] - x[:, 2], x[:, 0] - x[:, 1]]))
         right = gaps.argmin(axis=0) == 2
+    elif task == "samedifferent differencing":
+        same, different = draw.normal(scale=math.sqrt(2), size=(2, n // 2))
+        gaps = np.sort(np.abs(np.concatenate((same, different + d_prime))))
+        k = gaps[n // 2]  # unbiased: "same" as often as "different"
+        right = np.concatenate((np.abs(same) < k, np.abs(different + d_prime) >= k))
     else:
         x = draw.normal(size=(n, int(task[0])))
         x[:, 0] += d_prime

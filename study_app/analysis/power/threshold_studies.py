@@ -1,7 +1,8 @@
-"""Simulated studies of thresholds: how precisely one participant's threshold and a group's mean are known.
+"""Simulated studies of thresholds, d′ and exponents: how precisely one participant's and a group's mean are known.
 
-The observers answer through the block's method; their thresholds are estimated as in the report. The thresholds of a
-study's people differ by a factor of 1.2 about a mean that is drawn from the middle half of the levels.
+The observers answer through the block's method; what they show is estimated as in the report. The people of a study
+differ by a factor of 1.2: in their thresholds about a mean that is drawn from the middle half of the levels, in d′ and
+exponents about the value that `check` assumes.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.analysis.statistics.random_effects import FEWEST, group_mean
+from study_app.analysis.statistics.student_interval import student_interval
 from study_app.analysis.tables.measures import Array
 from study_app.errors import AnalysisError
-from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
+from study_app.protocol.checks.expected_means import MeanPlan
+from study_app.protocol.checks.expected_precision import ThresholdPlan, precision_plan
 from study_app.protocol.model import Protocol
 from study_app.psychophysics.precision import BETWEEN_PEOPLE
 
@@ -26,7 +29,8 @@ BATCH: Final = 10
 """Studies of one case; which studies these are does not depend on how many are asked for."""
 TRACKS_AT_ONCE: Final = 200
 
-ThresholdPlans: TypeAlias = Mapping[str, Mapping[int, ThresholdPlan]]
+Plan: TypeAlias = ThresholdPlan | MeanPlan
+PrecisionPlans: TypeAlias = Mapping[str, Mapping[int, Plan]]
 """Block → trials of each standard → what is simulated."""
 
 
@@ -38,14 +42,14 @@ class Case:
     ----------
     block : str
         Id of the block.
-    plan : ThresholdPlan
+    plan : ThresholdPlan or MeanPlan
         What is simulated.
     seed : tuple of int
         Of its draws.
     """
 
     block: str
-    plan: ThresholdPlan
+    plan: Plan
     seed: tuple[int, ...]
 
 
@@ -57,7 +61,7 @@ class Found:
     ----------
     errors : list of array
         Of each study the errors of the participants' thresholds, (people, standards), in natural logarithms; as shares
-        of the threshold on linear spacing.
+        of the threshold on linear spacing, of the mean d′ or of the mean exponent.
     halves : list of array
         Of each study half the group's 95 % interval as a share of the mean, (sizes,); NaN below three participants.
     """
@@ -79,8 +83,10 @@ class Found:
         return float(np.mean([one[place] <= precision for one in self.halves]))
 
 
-def plans(protocol: Protocol, trials: Sequence[int]) -> ThresholdPlans:
-    """Return for each block with thresholds the plan for each number of trials; none given: the protocol's.
+def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
+    """Return for each block of thresholds, d′ or exponents the plan for each number of trials.
+
+    No number given: the protocol's.
 
     Raises
     ------
@@ -89,10 +95,10 @@ def plans(protocol: Protocol, trials: Sequence[int]) -> ThresholdPlans:
     """
     found = {}
     for block in protocol.main_blocks:
-        plan = threshold_plan(protocol, block)
+        plan = precision_plan(protocol, block)
         if plan is None:
             continue
-        changed = [plan.with_trials(one) for one in trials] or [plan]
+        changed: list[Plan] = [plan.with_trials(one) for one in trials] or [plan]
         for asked, one in zip(trials, changed, strict=False):
             if abs(one.trials - asked) > max(1, asked / 2):
                 raise AnalysisError(
@@ -114,6 +120,8 @@ def study_batch(case: Case, sizes: Sequence[int]) -> Found:
         Numbers of participants, ascending; smaller studies have the first participants of the largest.
     """
     plan, rng, people = case.plan, np.random.default_rng(case.seed), sizes[-1]
+    if not isinstance(plan, ThresholdPlan):
+        return _means(plan, sizes, rng)
     low, high = plan.stimulus.domain
     means = low + (high - low) * (0.25 + 0.5 * rng.random((BATCH, 1, 1)))
     apart = math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people, 1))
@@ -138,6 +146,21 @@ def study_batch(case: Case, sizes: Sequence[int]) -> Found:
     return found
 
 
+def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Found:
+    """Return what the studies of a batch find of d′ or exponents: their means have Student's interval."""
+    people, found = sizes[-1], Found()
+    truth = plan.value * np.exp(math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people)))
+    estimates = plan.estimates(truth.reshape(-1), rng).reshape(BATCH, people)
+    for own, true in zip(estimates, truth, strict=True):
+        halves = []
+        for n in sizes:
+            low, high = student_interval(own[:n])
+            halves.append(math.nan if low is None or high is None else (high - low) / 2 / abs(own[:n].mean()))
+        found.errors.append((own - true)[:, None] / plan.value)
+        found.halves.append(np.array(halves))
+    return found
+
+
 def _estimates(plan: ThresholdPlan, truth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Return posterior medians and variances of observers with these thresholds [u]."""
     medians: list[NDArray[np.float64]] = []
@@ -152,7 +175,7 @@ def _estimates(plan: ThresholdPlan, truth: Array, rng: np.random.Generator) -> t
 
 
 def sweep(
-    planned: ThresholdPlans, sizes: Sequence[int], studies: int, seed: int, executor: Executor
+    planned: PrecisionPlans, sizes: Sequence[int], studies: int, seed: int, executor: Executor
 ) -> Iterator[tuple[int, dict[tuple[str, int], Found]]]:
     """Yield after every round of batches how many studies were simulated so far, and what was found in them all.
 

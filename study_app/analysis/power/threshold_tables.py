@@ -1,4 +1,4 @@
-"""The precision of thresholds as tables: CSV with a row for each pair of sizes, and Markdown."""
+"""The precision of thresholds, d′ and exponents as tables: CSV with a row for each pair of sizes, and Markdown."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from typing import Any, Final
 
 from study_app import __version__
 from study_app.analysis.power.power_curves import interval
-from study_app.analysis.power.threshold_studies import Found
+from study_app.analysis.power.threshold_studies import Found, Plan, plans
 from study_app.analysis.tables.compared_blocks import spoken
+from study_app.protocol.checks.expected_means import SensitivityPlan
+from study_app.protocol.checks.expected_precision import ThresholdPlan
 from study_app.protocol.model import Protocol
 from study_app.protocol.texts import text_in
+from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
 from study_app.store.tables.column import Column, optional
 from study_app.store.tables.csv_files import csv_bytes
 
@@ -20,10 +23,15 @@ COLUMNS: Final = (
     Column("study", "text", "Short name of the study, from its protocol."),
     Column("simulated", "flag", "true: all of these answers come from a model, none from people."),
     Column("block", "text", "Id of the block of trials."),
-    Column("trials", "integer", "Trials of each standard.", minimum=1),
+    Column("trials", "integer", "Trials of each standard or comparison; of magnitude estimation, all.", minimum=1),
     Column("participants", "integer", "Participants of each study.", minimum=2),
     Column("studies", "integer", "Simulated studies.", minimum=1),
-    Column("spread", "number", "Standard deviation of the logarithm of one participant's threshold.", minimum=0),
+    Column(
+        "spread",
+        "number",
+        "Standard deviation of the logarithm of one participant's threshold; of d′ and exponents, as a share of them.",
+        minimum=0,
+    ),
     optional(
         "half_interval",
         "number",
@@ -92,21 +100,21 @@ def threshold_markdown(precisions: Precisions) -> str:
     study, precision = precisions.protocol.study, precisions.precision
     language = spoken({"study": {"languages": study.languages}})
     lines = [
-        f"# Precision of thresholds in {text_in(study.title, language)} ({study.name} {study.version})",
+        f"# Expected precision of {text_in(study.title, language)} ({study.name} {study.version})",
         "",
         f"**SIMULATED.** {precisions.studies} studies for each row (seed {precisions.seed}, liquid-study "
-        f"{__version__}). Observers answer by a psychometric function with a lapse rate of 2 %; people differ by a "
-        "factor of 1.2 about a mean in the middle half of the levels. Thresholds are estimated as in the report; the "
-        "group's interval is that of the mean over all standards (Hartung–Knapp).",
+        f"{__version__}). People differ by a factor of {BETWEEN_PEOPLE:g}. Results are estimated as in the report.",
     ]
     if precisions.studies < precisions.asked:
         lines += ["", f"**Ended early: {precisions.studies} of {precisions.asked} studies.**"]
     wanted = [] if precision is None else [f"studies within ±{100 * precision:g} %"]
-    heads = ["trials per standard", "participants", "SD of one participant", "half the group's 95 % interval", *wanted]
+    heads = ["participants", "SD of one participant", "half the group's 95 % interval", *wanted]
+    planned = plans(precisions.protocol, ())
     blocks = precisions.protocol.blocks
     for block in dict.fromkeys(block for block, _ in precisions.found):
-        lines += ["", f"## {text_in(blocks[block].title, language)} (block {block})", ""]
-        lines += [f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|"]
+        lines += ["", f"## {text_in(blocks[block].title, language)} (block {block})", "", _assumed(planned[block]), ""]
+        trials_of = "trials" + next(iter(planned[block].values())).per
+        lines += [f"| {' | '.join((trials_of, *heads))} |", "|---:" * (1 + len(heads)) + "|"]
         for (of_block, trials), found in precisions.found.items():
             if of_block != block:
                 continue
@@ -116,3 +124,21 @@ def threshold_markdown(precisions: Precisions) -> str:
                 cells = (str(trials), str(size), f"{found.spread:.0%}", "–" if math.isnan(half) else f"±{half:.0%}")
                 lines.append(f"| {' | '.join((*cells, *([share] if wanted else [])))} |")
     return "\n".join(lines) + "\n"
+
+
+def _assumed(plans_of_block: Mapping[int, Plan]) -> str:
+    """Return what the simulated people of a block are like, and what the group's interval is."""
+    plan = next(iter(plans_of_block.values()))
+    if isinstance(plan, ThresholdPlan):
+        return (
+            "Observers answer by a psychometric function with a lapse rate of 2 %; the mean of their thresholds is in "
+            "the middle half of the levels. The group's interval is that of the mean over all standards "
+            "(Hartung–Knapp)."
+        )
+    group = "The group's interval is that of the mean (Student)."
+    if isinstance(plan, SensitivityPlan):
+        return f"Observers are unbiased, with a mean d′ of {plan.value:g}; SD as a share of it. {group}"
+    return (
+        f"Observers follow a power law with a mean exponent of {plan.value:g}; ln answers have a standard deviation of "
+        f"{ESTIMATE_NOISE:g}; SD as a share of the exponent. {group}"
+    )

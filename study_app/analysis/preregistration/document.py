@@ -10,10 +10,11 @@ from study_app.analysis.preregistration.commitment import Commitment, commitment
 from study_app.analysis.preregistration.questions import analyses, hypotheses
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.compared_blocks import spoken
-from study_app.protocol.checks.expected_precision import expected, precision_rows, threshold_plan
+from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows
 from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.model import Protocol
 from study_app.protocol.texts import text_in
+from study_app.psychophysics.precision import BETWEEN_PEOPLE
 
 
 def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = None) -> str:
@@ -99,9 +100,9 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
     yield planned + wanted
     reasons = []
     for block in protocol.main_blocks:
-        plan = threshold_plan(protocol, block)
-        found = None if plan is None else expected(plan)
-        if found is None:
+        plan = precision_plan(protocol, block)
+        found = None if plan is None else expected_of(plan)
+        if plan is None or found is None:
             continue
         reached = ""
         if one.participants is not None:
@@ -110,8 +111,8 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
         needed = None if one.precision is None else found.participants_for(one.precision)
         enough = "" if needed is None else f" The aim takes {counted(needed, 'participant')}."
         reasons.append(
-            f"- Block {block.id}: from simulated tracks, {found.trials} trials per standard, people who differ by a "
-            f"factor of 1.2.{reached}{enough}"
+            f"- Block {block.id}: from simulated answers, {found.trials} trials{plan.per}, people who differ by a "
+            f"factor of {BETWEEN_PEOPLE:g}.{reached}{enough}"
         )
     if reasons:
         yield from ("", *reasons)

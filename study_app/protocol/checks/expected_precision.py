@@ -1,13 +1,14 @@
-"""How precise the thresholds of a block are expected to be, from simulated tracks with a fixed seed."""
+"""How precise the results of a block are expected to be: thresholds, from simulated tracks with a fixed seed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from study_app.protocol.blocks import Block
+from study_app.protocol.checks.expected_means import MeanPlan, expected_mean, mean_plan
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.design import Design
@@ -78,6 +79,8 @@ class ThresholdPlan:
     method: Method
     catch: int
     standards: int
+
+    per: ClassVar[str] = " per standard"
 
     @property
     def trials(self) -> int:
@@ -218,13 +221,27 @@ def _affordable(plan: ThresholdPlan) -> tuple[ThresholdPlan, int]:
     return simulated, max(FEWEST, min(OBSERVERS, MOST_WORK // (per_trial * simulated.trials)))
 
 
+def precision_plan(protocol: Protocol, block: Block) -> ThresholdPlan | MeanPlan | None:
+    """Return what decides how precise a block's thresholds, d′ or exponents are; None where it has none of them."""
+    return threshold_plan(protocol, block) or mean_plan(protocol, block)
+
+
+def expected_of(plan: ThresholdPlan | MeanPlan) -> Expected | None:
+    """Return how precise results are expected to be; None where the method's tracks are not simulated."""
+    return expected(plan) if isinstance(plan, ThresholdPlan) else expected_mean(plan)
+
+
 def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
-    """Yield the expected 95 % intervals of one participant and of the planned group; nothing without thresholds."""
-    plan = threshold_plan(protocol, block)
-    found = None if plan is None else expected(plan)
+    """Yield the expected 95 % intervals of one participant and of the planned group, where any are expected."""
+    plan = precision_plan(protocol, block)
+    found = None if plan is None else expected_of(plan)
     if plan is None or found is None:
         return
-    unit = f" {quantity(plan.stimulus.vary).unit}".rstrip() if plan.stimulus.level_kind != "weber" else ""
+    unit, words = "", ""
+    if not isinstance(plan, ThresholdPlan):
+        words = plan.words
+    elif plan.stimulus.level_kind != "weber":
+        unit = f" {quantity(plan.stimulus.vary).unit}".rstrip()
     one = f"±{found.half:.2g}{unit}" if found.factor is None else f"×/÷ {found.factor:.1f}"
     people, precision = _planned(protocol)
     over = "" if found.standards == 1 else " over all standards"
@@ -233,24 +250,26 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
         group = f"; {people} participants ±{100 * found.of_group(people):.0f} %{over}"
     elif precision is not None and (needed := found.participants_for(precision)) is not None:
         group = f"; ±{100 * precision:g} %{over} takes {needed} participants"
-    yield "Expected precision", f"one participant {one}{group} (95 % intervals)"
+    yield "Expected precision", f"{words}one participant {one}{group} (95 % intervals)"
 
 
 def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield that the planned participants and trials do not reach the planned precision."""
-    plan, (people, precision) = threshold_plan(protocol, block), _planned(protocol)
-    if plan is None or people is None or precision is None or (found := expected(plan)) is None:
+    plan, (people, precision) = precision_plan(protocol, block), _planned(protocol)
+    if plan is None or people is None or precision is None or (found := expected_of(plan)) is None:
         return
     if (reached := found.of_group(people)) <= precision:
         return
-    key = "trials" if plan.method.adaptive else "repetitions"
+    adaptive = block.stimulus is not None and method_of(protocol, block).adaptive
+    key = "trials" if adaptive else "repetitions"
+    place = f"blocks.{block.id}" if block.stimulus is None else f"methods.{block.method}"
     trials, wanted = found.trials_for(precision, people), found.participants_for(precision)
     ways = [
         *([] if trials is None else [f"about {trials} trials"]),
         *([] if wanted is None else [f"{wanted} participants"]),
     ]
     yield (
-        f"methods.{block.method}.{key}: {plan.trials} trials per standard give ±{100 * reached:.0f} % with "
+        f"{place}.{key}: {plan.trials} trials{plan.per} give ±{100 * reached:.0f} % with "
         f"{people} participants, not ±{100 * precision:g} %: {', or '.join(ways) or 'a larger analysis.precision'}"
     )
 

@@ -165,6 +165,20 @@ class Design(Table):
         """
         return None
 
+    def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
+        """Return P(correct) of an unbiased observer, where answers can be correct.
+
+        Parameters
+        ----------
+        d_prime : float
+            Distance of comparison and standard in standard deviations of one observation, 0 or more.
+        roving : bool
+            Whether standards vary from trial to trial, so that intervals can only be compared with each other.
+        """
+        from study_app.psychophysics.detection import proportion_correct  # noqa: PLC0415 - loads numpy
+
+        return proportion_correct(self.kind, d_prime)
+
     def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
         """Return the answer of a simulated observer, where the reply is a choice.
 

@@ -38,6 +38,7 @@ def design_rows(protocol: Protocol, block: Block, delay_ticks: int = BELIEVED_TI
     intervals = "1 interval" if design.intervals == 1 else f"{design.intervals} intervals, {design.pause_s:g} s apart"
     if block.stimulus is None:
         yield "Design", f"{kind} against {block.standard}: {intervals}"
+        yield from precision_rows(protocol, block)
         return
     stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
     standards = [one for one in standards_of(protocol, block) if one is not None]

@@ -18,6 +18,7 @@ from study_app.analysis.power.threshold_studies import BATCH, Case, plans, study
 from study_app.analysis.power.threshold_tables import Precisions, threshold_markdown
 from study_app.cli import commands
 from study_app.errors import AnalysisError
+from study_app.protocol.checks.expected_means import expected_mean, mean_plan
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 
@@ -92,6 +93,29 @@ def test_smaller_studies_have_the_first_participants_and_fewer_studies_are_the_f
     large = study_batch(Case("thicker", plan, (1, 0, 10, 0)), (3, 9))
     assert [one.shape for one in large.errors] == [(9, 2)] * BATCH
     assert np.array_equal(large.errors[0], many.found["thicker", 10].errors[0])
+
+
+def test_exponents_and_d_primes_have_the_spread_that_check_expects() -> None:
+    compared = study(
+        ('design = "2ifc", method = "m"', 'design = "2ifc", conditions = ["damper", "late"], standard = "damper"'),
+        ('stimulus = "damping", ', ""),
+        (
+            'methods.m = { kind = "questplus", trials = 20 }',
+            'conditions.damper.liquid = "damper"\nconditions.late = { liquid = "damper", delay_ms = 90 }',
+        ),
+        ('stimuli.damping = { vary = "damping_nspm", levels = [0.02, 0.6], standards = [4, 8], steps = 15 }\n', ""),
+    )
+    for protocol, block, trials in ((load("thickness"), "thickness", 36), (compared, "thicker", 60)):
+        found = swept(protocol, (trials,), (2, 20), 2 * BATCH)
+        plan = mean_plan(protocol, protocol.blocks[block])
+        assert plan is not None
+        alone = expected_mean(plan.with_trials(trials))
+        assert found.found[block, trials].spread == pytest.approx(alone.spread / alone.threshold, rel=0.15)
+        assert found.found[block, trials].half(1) == pytest.approx(alone.of_group(20), rel=0.15)
+        assert found.found[block, trials].half(0) > 3 * found.found[block, trials].half(1)  # two have an interval
+        said = threshold_markdown(found)
+        assert f"mean {'exponent of 0.44' if block == 'thickness' else 'd′ of 1'}" in said
+        assert f"| {'trials' if block == 'thickness' else 'trials per comparison'} | participants |" in said
 
 
 def test_two_participants_have_no_interval() -> None:

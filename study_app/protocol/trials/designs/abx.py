@@ -47,6 +47,12 @@ class Abx(Design):
 
         return abx(*self.correct_of(answers), "differencing" if roving else "independent")
 
+    def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
+        """Return P(correct) under the model of `sensitivity`."""
+        from study_app.psychophysics.detection import proportion_correct  # noqa: PLC0415 - loads numpy
+
+        return proportion_correct(f"{self.kind} {'differencing' if roving else 'independent'}", d_prime)
+
     def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
         """Return which of the first two is closer to the third."""
         first, second, third = taken

@@ -52,6 +52,12 @@ class SameDifferent(Design):
             "differencing" if roving else "independent",
         )
 
+    def proportion_correct(self, d_prime: float, *, roving: bool) -> float:
+        """Return P(correct) under the model of `sensitivity`."""
+        from study_app.psychophysics.detection import proportion_correct  # noqa: PLC0415 - loads numpy
+
+        return proportion_correct(f"{self.kind} {'differencing' if roving else 'independent'}", d_prime)
+
     def simulated(self, taken: Sequence[float], mean: float, attention: Attention) -> str:
         """Return "different" where a difference is noticed."""
         first, second = taken

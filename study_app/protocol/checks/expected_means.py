@@ -1,0 +1,194 @@
+"""How precise d′ and the exponents of magnitude estimation are expected to be.
+
+Simulated participants answer the block's trials, and the estimates are those of the report. People differ by a factor
+of `BETWEEN_PEOPLE`, as their thresholds do, and the group's interval is that of the mean by Student's t.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar, Final, TypeAlias
+
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
+from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.psychometric import rises
+from study_app.protocol.trials.tracks import (
+    design_of,
+    has_correct_answer,
+    method_of,
+    standards_of,
+    stimulus_of,
+    tracks_of,
+)
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+    from study_app.psychophysics.families import Floats
+    from study_app.psychophysics.precision import Expected
+
+D_PRIME: Final = 1.0
+"""Of simulated participants. [choice]"""
+EXPONENT: Final = 0.5
+"""Of simulated participants, where no exponent was published; as the answers of rehearsals. [choice]"""
+OBSERVERS: Final = 1000
+SEED: Final = 1
+Z_95: Final = 1.959964
+
+
+@dataclass(frozen=True)
+class SensitivityPlan:
+    """What decides how precise d′ is: of one compared condition, or of one standard.
+
+    Attributes
+    ----------
+    design : Design
+        How trials are built; answers to it can be correct.
+    trials : int
+        Of each condition or standard.
+    roving : bool
+        Whether standards alternate, so that intervals can only be compared with each other.
+    of_each : str
+        What has so many trials: "comparison" or "standard".
+    """
+
+    design: Design
+    trials: int
+    roving: bool
+    of_each: str
+    value: ClassVar[float] = D_PRIME
+
+    @property
+    def words(self) -> str:
+        """What is assumed, in words."""
+        return f"at d′ = {self.value:g}: "
+
+    @property
+    def per(self) -> str:
+        """What has so many trials, in words."""
+        return f" per {self.of_each}"
+
+    def with_trials(self, trials: int) -> SensitivityPlan:
+        """Return the plan with so many trials."""
+        return replace(self, trials=trials)
+
+    def estimates(self, truth: Floats, random: Generator) -> Floats:
+        """Return d′ as the report estimates it, of unbiased observers.
+
+        Parameters
+        ----------
+        truth : (observers,) array
+            Their d′.
+        random : random.Generator
+            Where answers are drawn from.
+        """
+        import numpy as np  # noqa: PLC0415
+
+        design, count = self.design, len(self.design.arrangements)
+        trials = [self.trials // count + (place < self.trials % count) for place in range(count)]
+        correct = [str(design.correct(place)) for place in range(count)]
+        wrong = [next(one for one in design.answers if one != right) for right in correct]
+        found = []
+        for d_prime in truth:
+            rights = random.binomial(trials, design.proportion_correct(float(d_prime), roving=self.roving))
+            answers = {(place, correct[place]): int(right) for place, right in enumerate(rights)}
+            answers |= {(place, wrong[place]): trials[place] - int(right) for place, right in enumerate(rights)}
+            sensitivity = design.sensitivity(answers, roving=self.roving)
+            found.append(math.nan if sensitivity is None else sensitivity.d_prime)
+        return np.array(found)
+
+
+@dataclass(frozen=True)
+class EstimationPlan:
+    """What decides how precise the exponent of magnitude estimation is.
+
+    Attributes
+    ----------
+    levels : tuple of float
+        That are presented, all above zero.
+    repetitions : int
+        Of each level.
+    value : float
+        The exponent of simulated participants.
+    """
+
+    levels: tuple[float, ...]
+    repetitions: int
+    value: float
+    per: ClassVar[str] = ""
+
+    @property
+    def trials(self) -> int:
+        """Trials of a participant that are analysed."""
+        return len(self.levels) * self.repetitions
+
+    @property
+    def words(self) -> str:
+        """What is assumed, in words."""
+        return f"exponent of {self.value:g}: "
+
+    def with_trials(self, trials: int) -> EstimationPlan:
+        """Return the plan with so many trials, rounded to repetitions of all levels."""
+        return replace(self, repetitions=max(1, round(trials / len(self.levels))))
+
+    def estimates(self, truth: Floats, random: Generator) -> Floats:
+        """Return exponents as the report estimates them: least-squares slopes of mean ln answers on ln level.
+
+        Parameters
+        ----------
+        truth : (observers,) array
+            Their exponents.
+        random : random.Generator
+            Where answers are drawn from.
+        """
+        import numpy as np  # noqa: PLC0415
+
+        from study_app.psychophysics.precision import ESTIMATE_NOISE  # noqa: PLC0415
+
+        x = np.log(self.levels)
+        means = truth[:, None] * x + random.normal(
+            0.0, ESTIMATE_NOISE / math.sqrt(self.repetitions), (len(truth), len(x))
+        )
+        return np.asarray((means @ (x - x.mean())) / ((x - x.mean()) ** 2).sum(), float)
+
+
+MeanPlan: TypeAlias = SensitivityPlan | EstimationPlan
+
+
+def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
+    """Return what decides how precise the d′ or the exponents of a block are; None where it has neither."""
+    if block.design is None or block.phase != "main":
+        return None
+    design = design_of(protocol, block).model_copy(update={"question": None})  # a dictionary has no hash
+    slots = tracks_of(protocol, block)[0].slots
+    if block.stimulus is None:
+        choice = design.reply == "choice" and not design.has_noise
+        return SensitivityPlan(design, slots, roving=False, of_each="comparison") if choice else None
+    stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
+    if design.reply == "number":
+        levels = tuple(sorted({one for one in method.asked(stimulus) if one > 0}))
+        repetitions = method.tracks * method.presentations(stimulus) // len(method.asked(stimulus))
+        return EstimationPlan(levels, repetitions, _published(protocol, block)) if len(levels) > 1 else None
+    if design.reply == "choice" and has_correct_answer(design, stimulus) and not rises(stimulus, design):
+        roving = len(standards_of(protocol, block)) > 1 and method.order == "interleaved"
+        return SensitivityPlan(design, slots * method.tracks, roving, of_each="standard")
+    return None
+
+
+def _published(protocol: Protocol, block: Block) -> float:
+    """Return the exponent that the protocol compares a block's with, else `EXPONENT`."""
+    published = () if protocol.analysis is None else protocol.analysis.published
+    return next((one.value for one in published if (one.block, one.measure) == (block.id, "exponent")), EXPONENT)
+
+
+def expected_mean(plan: MeanPlan) -> Expected:
+    """Return how precise the d′ or the exponent of one participant, and their mean, are expected to be."""
+    import numpy as np  # noqa: PLC0415
+
+    from study_app.psychophysics.precision import Expected  # noqa: PLC0415
+
+    found = plan.estimates(np.full(OBSERVERS, plan.value), np.random.default_rng(SEED))
+    spread = float(found.std())
+    return Expected("linear", plan.trials, standards=1, half=Z_95 * spread, spread=spread, threshold=plan.value)
