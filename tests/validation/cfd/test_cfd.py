@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from scipy.integrate import quad
 
 from study_app.cli.evidence.cfd import cfd
+from study_app.cli.parallel import executor_for
 from study_app.errors import StudyError
 from study_app.figure_style import PLOT_SETTINGS, file_bytes
 from study_app.protocol.load import load_scene
@@ -22,7 +23,9 @@ from study_app.validation.cfd import fits as fitted
 from study_app.validation.cfd.cases import Case
 from study_app.validation.cfd.profiles import END, PROFILES, RAMP, STOP, STOPPING
 from study_app.validation.cfd.solver_truths import solver_truths
+from study_app.workers.executors import Workers
 from tests.haptics.scenes import COMPILED as IS_COMPILED
+from tests.validation.cfd import stand_ins
 
 COMPILED = pytest.mark.skipif(not IS_COMPILED, reason="fits need the compiled tick")
 PACKAGE = resources.files("study_app.validation.cfd")
@@ -301,6 +304,42 @@ def test_cases_are_solved_by_an_executor_and_stored_under_their_names(monkeypatc
     folders = [path.parent.relative_to(tmp_path / "new").as_posix() for path in written]
     assert folders == ["."] * 4 + ["training"] * 8 + ["held_out"] * len(cases.HELD_OUT) + ["."]
     assert said[0] == f"{NAMES[0]}.csv, 1 of {len(written)} ..."
+
+
+@pytest.fixture
+def without_solver(monkeypatch):
+    monkeypatch.setattr(solver, "library", lambda: None)
+    monkeypatch.setattr(solver, "_solved", stand_ins.linear_table)
+    monkeypatch.setattr(solver, "steady_table", stand_ins.steady)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("without_solver")
+def test_tables_are_the_same_bytes_with_one_worker_two_and_a_cluster(tmp_path, all_workers):
+    held = []
+    for number, workers in enumerate(all_workers):
+        with executor_for(workers) as executor:
+            written = solver.solve(tmp_path / str(number), executor, lambda _: None)
+        held.append([(path.relative_to(tmp_path / str(number)), path.read_bytes()) for path in written])
+    assert len(held[0]) == len(CASES) + 1
+    assert all(one == held[0] for one in held)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("without_solver")
+def test_an_interrupted_solution_keeps_its_tables_and_continues(tmp_path, capsys):
+    def until_the_tenth(said):
+        if ", 10 of " in said:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), executor_for(Workers(1)) as executor:
+        solver.solve(tmp_path, executor, until_the_tenth)
+    assert len(list(tmp_path.rglob("*.csv"))) == 9
+    (kept,) = re.findall(r"finished cases kept: (\d+)", capsys.readouterr().err)
+    with executor_for(Workers(1)) as executor:
+        assert len(solver.solve(tmp_path, executor, lambda _: None)) == len(CASES) + 1
+    assert int(kept) >= 9
+    assert f"cases finished by an earlier start: {kept}" in capsys.readouterr().err
 
 
 def _step(case):
