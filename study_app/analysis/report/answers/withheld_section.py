@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import takewhile
 
 from study_app.analysis.report.html_page import heading, paragraph, table
 from study_app.analysis.results.levels import LevelsFound
+from study_app.protocol.checks.delayed_force import WITHHELD_PERCENT
 
 EXPLAINED = (
     "Share of the requested force that passivity controller, slew limit and device withheld in the comparisons, those "
@@ -35,4 +37,15 @@ def withheld(found: LevelsFound) -> Iterator[str]:
         ],
         words=0,
     )
-    yield paragraph(EXPLAINED, "soft")
+    yield paragraph(f"{' '.join(_up_to(found))} {EXPLAINED}", "soft")
+
+
+def _up_to(found: LevelsFound) -> Iterator[str]:
+    """Yield for each standard up to which level hardly anything was withheld in any comparison."""
+    unit = f" {found.unit}" if found.unit else ""
+    for standard in dict.fromkeys(one.standard for one in found.withheld):
+        rows = [one for one in found.withheld if one.standard == standard]
+        kept = list(takewhile(lambda one: one.most_percent <= WITHHELD_PERCENT, rows))
+        at = "" if standard is None else f" at the standard of {standard:.4g}{unit}"
+        until = f"up to {kept[-1].high:.3g}{unit}" if kept else "at no level presented"
+        yield f"At most {WITHHELD_PERCENT:g} % was withheld in every comparison {until}{at}."
