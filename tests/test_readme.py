@@ -56,5 +56,5 @@ def test_the_tree_names_every_file_of_a_study_and_no_other(section: str, tmp_pat
     exclude(folder, "P001", 1, by="AB", reason="a test")
     reveal(folder, by="AB", reason="a test")
     there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    there.add("data/sub-P001/ses-01/crash.txt")  # where the program had crashed
+    there |= {"data/sub-P001/ses-01/crash.txt", "withdrawals.jsonl"}  # after a crash; after a withdrawal
     assert {re.sub(r"trial-\d{3}", "trial-003", name).replace("P001", "P007") for name in there} == named_files(section)

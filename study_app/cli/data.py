@@ -164,6 +164,36 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
 
 
 @click.command()
+@takes_study
+@click.option("--participant", required=True, metavar="ID")
+@BY
+@click.option("--reason", required=True, metavar="TEXT", help="Reason; it remains, so it must not identify the person.")
+@click.option(
+    "--also",
+    multiple=True,
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    metavar="DIR",
+    help="A folder with copies of the study, at any depth; repeatable.",
+)
+def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
+    """Erase what a participant gave; date, operator, reason and checksums remain."""
+    from study_app.store.withdrawals.withdraw import withdraw as withdraw_from
+
+    done = withdraw_from(results, participant, by=by, reason=reason, also=also)
+    for folder in done.folders:
+        click.echo(f"erased     participant {participant} from {folder}")
+    for path in done.outputs:
+        click.echo(f"deleted    {path}, made from the results")
+    if not (done.folders or done.outputs):
+        click.echo(f"nothing to erase: participant {participant} withdrew at {done.tombstone.at}")
+    for output in done.elsewhere:
+        state = "delete it, and make it again" if output.paths else "no longer there"
+        click.echo(f"warning: output of {output.at} outside of the results folder: {output.to} ({state})", err=True)
+    for sentence in done.left:
+        click.echo(f"warning: {sentence}", err=True)
+
+
+@click.command()
 @takes_session
 def rebuild(session: Path) -> None:
     """Rebuild a session's tables from its journal."""

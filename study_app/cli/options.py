@@ -14,7 +14,7 @@ EXIT_FOUND = 3
 
 GROUPS: Final = {
     "Study": "new edit check design power preregister run resume rehearse studies sessions workspace",
-    "Data": "export plot report unblind exclude include verify rebuild reproduce replay",
+    "Data": "export plot report unblind exclude include withdraw verify rebuild reproduce replay",
     "Model": "scene simulate identify figures",
     "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds screenshots",
     "Devices": "devices emulate-falcon",

@@ -3,7 +3,8 @@
 ::
 
     results/<study>/
-      dataset_description.json  exclusions.csv  exclusions_reversed.jsonl  fingerprints.txt  .psychds-ignore
+      dataset_description.json  exclusions.csv  exclusions_reversed.jsonl  fingerprints.txt  withdrawals.jsonl
+      .psychds-ignore
       blinding/key.sealed  blinding/reveals.jsonl  blinding/allocated/001.json ...
       data/
         study-<study>_description-participants_data.csv
@@ -106,6 +107,11 @@ class StudyFolder:
     def fingerprints(self) -> Path:
         """A line for every session that ended: what tells it from any other."""
         return self.path / FINGERPRINTS
+
+    @property
+    def withdrawals(self) -> Path:
+        """A tombstone for each participant whose data were erased."""
+        return self.path / "withdrawals.jsonl"
 
     @property
     def blinding(self) -> Path:

@@ -12,7 +12,7 @@ from study_app.analysis.export.typed_tables import deliver
 from study_app.analysis.export.wide_table import wide
 from study_app.analysis.results.section_failures import Failure, Progress, silent
 from study_app.analysis.tables.study import Study, load_study
-from study_app.store.output_files import write_files
+from study_app.store.withdrawals.output_log import write_output
 
 
 def export(
@@ -56,7 +56,7 @@ def export(
     progress("making the tables", 0.3)
     files, failures = _files(study, extras)
     progress("writing", 0.9)
-    written = write_files(Path(to), files)
+    written = write_output(study.folder, Path(to), files)
     study.tell_doubts(warn)
     if failed is not None:
         for failure in failures:

@@ -17,7 +17,7 @@ from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.tables.study import Study, load_study
 from study_app.errors import AnalysisError
-from study_app.store.output_files import write_files
+from study_app.store.withdrawals.output_log import write_output
 
 
 def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None) -> tuple[Path, ...]:
@@ -42,7 +42,7 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
         files[f"{picture.name}.txt"] = f"{picture.caption}\n".encode()
     if not files:
         raise AnalysisError(f"{folder}: no completed session with answers yet: there is nothing to draw")
-    written = write_files(Path(to), files)
+    written = write_output(study.folder, Path(to), files)
     study.tell_doubts(warn)
     return written
 

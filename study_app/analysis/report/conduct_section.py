@@ -32,6 +32,8 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         f"{listed([f'{count} {status}' for status, count in states.most_common()])}. Counted: "
         f"{counted(study.n, 'participant')}."
     )
+    if study.withdrawn:
+        yield paragraph(f"{counted(study.withdrawn, 'participant').capitalize()} withdrew; their data were erased.")
     masked = Counter(map(str, study.participants["motors_masked"].dropna()))
     if masked:
         answers = [f"{means} in {counted(count, 'session')}" for means, count in masked.most_common()]

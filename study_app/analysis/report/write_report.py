@@ -31,7 +31,7 @@ from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study import Study, load_study
 from study_app.errors import AnalysisError
 from study_app.store.blinded import blinding
-from study_app.store.output_files import write_files
+from study_app.store.withdrawals.output_log import write_output
 
 HASHES_SHOWN = 12
 """Of so few files the page shows the hashes one by one; of more, one over all of them."""
@@ -72,7 +72,7 @@ def report(
         raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to report")
     files, found = report_files(study, progress)
     progress("writing", 0.95)
-    written = write_files(Path(to), files)
+    written = write_output(study.folder, Path(to), files)
     study.tell_doubts(warn)
     if failed is not None:
         for failure in found:

@@ -37,6 +37,7 @@ from study_app.store.sessions.unstarted_sessions import never_begun
 from study_app.store.tables.columns import INTERVALS, SEALED
 from study_app.store.tables.study_description import has_intervals
 from study_app.store.verification.integrity import Doubt, doubts
+from study_app.store.withdrawals.tombstones import tombstones
 
 COMPLETED: Final = "completed"
 _TRIAL: Final = ["participant", "session", "trial"]
@@ -55,7 +56,8 @@ class Study:
     intervals of their trials; ``others`` are the questions that no block of statements holds;
     ``answered`` has the rows of all questions as they were recorded, of which ``responses`` are those of statements;
     ``own_dynamics`` are the device's, where receipts record a measurement; ``estimator`` names that of the velocity,
-    "device" where the device measured it; None where receipts do not say it.
+    "device" where the device measured it; None where receipts do not say it. ``withdrawn`` is how many participants
+    withdrew, so that their data were erased.
     """
 
     folder: Path
@@ -77,6 +79,7 @@ class Study:
     protocol: Mapping[str, Any] = field(default_factory=dict)
     own_dynamics: OwnDynamics | None = None
     estimator: str | None = None
+    withdrawn: int = 0
 
     @property
     def people(self) -> tuple[str, ...]:
@@ -225,6 +228,7 @@ def load_study(folder: Path) -> Study:
         protocol=records[0].protocol,
         own_dynamics=_own_dynamics(records),
         estimator=_estimator(records),
+        withdrawn=len(tombstones(place)),
     )
 
 

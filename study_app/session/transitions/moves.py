@@ -40,6 +40,7 @@ from study_app.session.transitions.events import (
     WriteFailed,
     WriteRetried,
 )
+from study_app.session.transitions.page_builder import consent_hash
 from study_app.session.transitions.state import Hold, Phase, SessionState, Stall
 from study_app.session.transitions.steps import (
     FADE_OUT_S,
@@ -76,8 +77,11 @@ def read_on(state: SessionState, event: Continue) -> Result:
     """Leave a page that was read; one that lasts some time stays until then, whoever presses what."""
     if state.stays_until_s is not None and event.at_s < state.stays_until_s:
         return state, ()
-    consents = state.plan.protocol.pages[state.page_id].kind == "consent"
-    left = Write("page_left", {"page": state.page_id}, waits=consents)
+    text = state.plan.protocol.pages[state.page_id]
+    left = Write("page_left", {"page": state.page_id})
+    if text.kind == "consent":
+        agreed = {"text_sha256": consent_hash(state, text), "study_version": state.plan.protocol.study.version}
+        left = Write("page_left", {"page": state.page_id, **agreed}, waits=True)
     return enter(state, state.index + 1, (left,), at_s=event.at_s)
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import Protocol, Questionnaire
+from study_app.protocol.model import PageText, Protocol, Questionnaire
 from study_app.protocol.orders.schedule import FormStep, Trial
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.number import NumberView
@@ -79,6 +80,13 @@ def _text_page(state: SessionState) -> TextPage:
         stays_until_s=state.stays_until_s,
         coming=None if (trial := _coming(state)) is None else _task_page(state, trial),
     )
+
+
+def consent_hash(state: SessionState, text: PageText) -> str:
+    """Return the SHA-256 of title and paragraphs as the participant read them: UTF-8, blank lines between them."""
+    protocol, language = state.plan.protocol, state.plan.language
+    shown = (_text(state, text.title), *protocol.paragraphs(text.body, language))
+    return hashlib.sha256("\n\n".join(shown).encode()).hexdigest()
 
 
 def _task_page(state: SessionState, trial: Trial) -> TaskPage:

@@ -47,7 +47,12 @@ EVENTS: tuple[Event, ...] = (
     ),
     Event("preflight", "The checks before the first page, as accepted by the operator.", ("checks",)),
     Event("page_shown", "A page of text was shown.", ("page",)),
-    Event("page_left", "The participant left it.", ("page",)),
+    Event(
+        "page_left",
+        "The participant left it; of a consent `text_sha256` is the SHA-256 of title and paragraphs as they were read, "
+        "in UTF-8 with blank lines between them, and `study_version` the version of the study.",
+        ("page",),
+    ),
     Event("language_chosen", "The participant chose another language of the study.", ("language",)),
     Event(
         "trial_started",

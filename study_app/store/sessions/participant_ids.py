@@ -9,6 +9,7 @@ from pathlib import Path
 from study_app.errors import StoreError
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
 from study_app.store.sessions.unstarted_sessions import abandoned
+from study_app.store.withdrawals.tombstones import tombstones
 
 MAX_ID_LENGTH = 32
 MAX_SESSION = 99
@@ -41,12 +42,13 @@ class UsedIds:
     """The sessions of a study's folder as they were when it was read: ids and numbers are checked without the disk.
 
     ``held`` are participant and number of the sessions that were begun, or are claimed by a program that runs; ``ids``
-    the ids of all folders.
+    the ids of all folders; ``withdrawn`` are those of participants whose data were erased.
     """
 
     path: Path
     held: frozenset[tuple[str, int]]
     ids: tuple[str, ...]
+    withdrawn: tuple[str, ...] = ()
 
     def numbers(self, participant: str) -> tuple[int, ...]:
         """Return the numbers of a participant's sessions."""
@@ -54,7 +56,8 @@ class UsedIds:
 
     def suggested(self) -> str:
         """Return the next free id: P001, P002 ...; those of sessions that were never begun are free again."""
-        matches = (_NUMBERED.fullmatch(participant.upper()) for participant, _ in self.held)
+        used = (*(participant for participant, _ in self.held), *self.withdrawn)
+        matches = (_NUMBERED.fullmatch(participant.upper()) for participant in used)
         return f"P{max((int(match[1]) for match in matches if match), default=0) + 1:03d}"
 
     def check_unused(self, participant: str, number: int) -> None:
@@ -69,6 +72,11 @@ class UsedIds:
         """
         if not 1 <= number <= MAX_SESSION:
             raise StoreError(f"session number {number} cannot be used: it must be from 1 to {MAX_SESSION}")
+        if participant.lower() in (used.lower() for used in self.withdrawn):
+            raise StoreError(
+                f"participant {participant} withdrew, so the id is not used again: use another id (next free: "
+                f"{self.suggested()})"
+            )
         for used in self.ids:
             if used != participant and used.lower() == participant.lower():
                 raise StoreError(
@@ -92,7 +100,7 @@ def used_ids(folder: StudyFolder) -> UsedIds:
     """Return which ids and session numbers of a study are used; nothing is touched."""
     sessions = folder.sessions()
     held = frozenset((one.participant, one.number) for one in sessions if not abandoned(one.path))
-    return UsedIds(folder.path, held, tuple(sorted({one.participant for one in sessions})))
+    return UsedIds(folder.path, held, tuple(sorted({one.participant for one in sessions})), tuple(tombstones(folder)))
 
 
 def check_unused(folder: StudyFolder, participant: str, number: int) -> None:

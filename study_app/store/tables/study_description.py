@@ -34,6 +34,7 @@ blinding/
 exclusions.csv
 exclusions_reversed.jsonl
 fingerprints.txt
+withdrawals.jsonl
 rebuilt.txt
 """
 

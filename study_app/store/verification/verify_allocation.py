@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from study_app.protocol.groups.allocation import group_of
 from study_app.store.atomic import is_there
 from study_app.store.blinded.allocation import claims, entries_begun, group_in
@@ -10,8 +12,11 @@ from study_app.store.folders import StudyFolder
 from study_app.store.verification.violations import Gathered
 
 
-def check_allocation(study: StudyFolder, key: Key | None, found: Gathered) -> None:
-    """Check that every participant with a session has one entry, that of the journals, and that none was changed."""
+def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], found: Gathered) -> None:
+    """Check that every participant with a session has one entry, that of the journals, and that none was changed.
+
+    Those of the participants who have ``withdrawn`` stay used.
+    """
     if key is None:
         return
     begun = entries_begun(study)
@@ -28,7 +33,7 @@ def check_allocation(study: StudyFolder, key: Key | None, found: Gathered) -> No
         elif claim.participant in holders:
             first = holders[claim.participant]
             found.error(claim.path, f"is a second entry of participant {claim.participant}, who has entry {first}")
-        elif claim.participant not in begun:
+        elif claim.participant not in begun and claim.participant not in withdrawn:
             found.warning(claim.path, f"belongs to participant {claim.participant}, who has no session yet")
         holders.setdefault(claim.participant, claim.entry)
     for participant, entry in begun.items():

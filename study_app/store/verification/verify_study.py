@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -43,6 +43,7 @@ from study_app.store.verification.table_comparison import check_table
 from study_app.store.verification.verify_allocation import check_allocation
 from study_app.store.verification.verify_session import BETWEEN_S, LOOKS, Checked, check_session
 from study_app.store.verification.violations import Finding, Gathered
+from study_app.store.withdrawals.tombstones import Tombstone, tombstones
 
 Sessions: TypeAlias = list[Checked]
 Rows: TypeAlias = list[tuple[csv_files.Row, bool]]  # and whether the session runs
@@ -91,16 +92,17 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     found = Gathered(folder)
     key = _key(study, found)
     early = listed(study.fingerprints)
+    withdrawn = _withdrawn(study, found)
     sessions = [check_session(Place(study, one, name), key, found) for one in study.sessions()]
     _participants(study, name, sessions, found)
     _chains(study, sessions, found)
     _fingerprints(study, sessions, early, found)
     if fingerprints is not None and copy is not None:
-        _copy(study, sessions, copy, fingerprints, found)
+        _copy(study, sessions, [one for one in copy if one not in _erased(study, withdrawn)], fingerprints, found)
     _description(study, found)
     _exclusions(study, sessions, found)
     _reveals(study, key, found)
-    check_allocation(study, key, found)
+    check_allocation(study, key, withdrawn, found)
     _blinding(study, key, found)
     for path in (*temporaries(folder), *temporaries(study.data)):
         found.warning(path, "is an incomplete file of a program that was ended, or is being written")
@@ -117,6 +119,32 @@ def _key(study: StudyFolder, found: Gathered) -> Key | None:
     except StoreError as error:
         found.failure(study.key, error)
         return None
+
+
+def _withdrawn(study: StudyFolder, found: Gathered) -> dict[str, Tombstone]:
+    """Return the withdrawals, and report those that are not finished."""
+    try:
+        withdrawn = tombstones(study)
+    except StoreError as error:
+        found.failure(study.withdrawals, error)
+        return {}
+    for participant, tombstone in withdrawn.items():
+        if not is_there(study.data / f"sub-{participant}"):
+            when = f"at {tombstone.at} (recorded by {tombstone.by})"
+            found.warning(study.withdrawals, f"participant {participant} withdrew {when}; the data were erased")
+        else:
+            again = "the withdrawal was interrupted: run liquid-study withdraw again"
+            found.error(study.data / f"sub-{participant}", f"is there, although {participant} withdrew; {again}")
+    return withdrawn
+
+
+def _erased(study: StudyFolder, withdrawn: Mapping[str, Tombstone]) -> set[tuple[str, str]]:
+    """Return fingerprint and place of the sessions that were erased."""
+    return {
+        (session.fingerprint, place_of(study, study.session(participant, session.session)))
+        for participant, tombstone in withdrawn.items()
+        for session in tombstone.sessions
+    }
 
 
 def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Gathered) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 from typing import Any
 
@@ -116,7 +117,9 @@ def test_a_page_to_read_holds_the_protocols_texts_and_the_interfaces_word_where_
 
 def test_leaving_a_page_is_written_and_so_is_the_next() -> None:
     _, commands = advance(state_in(Phase.READING), Continue(3.0))
-    assert commands[0] == Write("page_left", {"page": "welcome"}, waits=True)  # it is a consent
+    read = hashlib.sha256(b"Welcome\n\nOne.\n\nTwo.").hexdigest()
+    agreed = {"text_sha256": read, "study_version": "1"}
+    assert commands[0] == Write("page_left", {"page": "welcome", **agreed}, waits=True)  # it is a consent
     assert written(commands) == ["page_left", "trial_started"]
 
 

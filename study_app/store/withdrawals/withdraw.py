@@ -1,0 +1,247 @@
+"""Withdrawal: erase all that a participant gave from a study's folder and from copies of it.
+
+The tombstone is written first. A program that ends before all is erased leaves a folder that `verify` reports; the same
+command then finishes it. Erased files are unlinked: disks and back-ups may still hold their blocks.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+from study_app.errors import StoreError
+from study_app.store.atomic import (
+    append_line,
+    cannot_read,
+    cannot_write,
+    is_there,
+    paths_in,
+    read_regular,
+    sync_folder,
+    write_file,
+)
+from study_app.store.exclusions import exclusion_bytes, exclusions
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals.parsing import parse_json
+from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
+from study_app.store.tables.participants import write_participants
+from study_app.store.tables.study_description import described_study
+from study_app.store.verification.fingerprints import place_of
+from study_app.store.withdrawals.output_log import Output, erase_outputs
+from study_app.store.withdrawals.tombstones import Tombstone, bury, describe_session, tombstones
+from study_app.workspace import workspace
+
+DATASET: Final = "dataset_description.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Withdrawn:
+    """What a withdrawal did.
+
+    Attributes
+    ----------
+    tombstone : Tombstone
+        What remains of the participant.
+    folders : tuple of Path
+        The study folders from which the sessions were erased.
+    outputs : tuple of Path
+        The deleted files that were made from the results.
+    elsewhere : tuple of Output
+        Outputs outside of the results folder, which were left.
+    left : tuple of str
+        What else still names the participant, or is another session than the erased ones.
+    """
+
+    tombstone: Tombstone
+    folders: tuple[Path, ...]
+    outputs: tuple[Path, ...]
+    elsewhere: tuple[Output, ...]
+    left: tuple[str, ...] = field(default=())
+
+
+def withdraw(
+    folder: Path, participant: str, *, by: str, reason: str, also: Iterable[Path] = (), now: datetime | None = None
+) -> Withdrawn:
+    """Erase the sessions of a participant from the study in ``folder``, and from copies of it.
+
+    Erased are the participant's folder, the rows of tables and lists, and outputs in the results folder. A tombstone
+    remains, and the participant's ID is not used again. Withdrawing again finishes what was interrupted, and reaches
+    further copies.
+
+    Parameters
+    ----------
+    folder : Path
+        The study folder.
+    participant : str
+        The participant's ID.
+    by : str
+        The operator's initials.
+    reason : str
+        Why, in words; it remains, so it must not tell who the person is.
+    also : iterable of Path
+        Folders with copies of the study, searched at any depth.
+    now : datetime, optional
+        Wall time with its zone; by default the system's.
+
+    Raises
+    ------
+    StoreError
+        There is no such participant, a session of theirs runs, ``by`` or ``reason`` is empty, or a file cannot be
+        written or deleted; what was erased by then stays erased.
+    """
+    for name, text in (("by", by), ("reason", reason)):
+        if not text.strip():
+            raise StoreError(f"--{name} is empty: a withdrawal needs initials and a reason")
+    study = StudyFolder(folder)
+    copies = _copies(study, also)
+    at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
+    opening = open_alone(folder)
+    try:
+        tombstone = _tombstone(study, participant, at, by.strip(), reason.strip())
+        erased = [study.path] if _erase(study, tombstone) else []
+        outputs, elsewhere = _outputs(study)
+    finally:
+        opening.release()
+    left = [*_names(study, participant)]
+    for copy in copies:
+        opening = open_alone(copy.path)
+        try:
+            if others := _others(copy, tombstone):
+                left += [f"{other} is not a session that was erased: {copy.path} was left" for other in others]
+            elif _erase(copy, tombstone):
+                erased.append(copy.path)
+                left += _names(copy, participant)
+        finally:
+            opening.release()
+    return Withdrawn(tombstone, tuple(erased), outputs, elsewhere, tuple(left))
+
+
+def _copies(study: StudyFolder, also: Iterable[Path]) -> list[StudyFolder]:
+    """Return the study folders below ``also``, without the study's own."""
+    found: dict[Path, StudyFolder] = {}
+    for folder in also:
+        if not folder.is_dir():
+            raise StoreError(f"{folder} is not a folder: --also names a folder with copies of the study")
+        for description in sorted(folder.rglob(DATASET)):
+            place = description.parent.resolve()
+            if place != study.path.resolve() and StudyFolder(place).data.is_dir():
+                found[place] = StudyFolder(description.parent)
+    return list(found.values())
+
+
+def _tombstone(study: StudyFolder, participant: str, at: str, by: str, reason: str) -> Tombstone:
+    """Return the participant's tombstone, written now if there is none yet."""
+    if (known := tombstones(study).get(participant)) is not None:
+        return known
+    sessions = _sessions(study, participant)
+    if not sessions:
+        held = ", ".join(study.ids()) or "none"
+        raise StoreError(f"{study.path} has no participant {participant!r}; participants: {held}")
+    for session in sessions:
+        refuse_if_open(session.path)
+    made = Tombstone(participant, at, by, reason, tuple(map(describe_session, sessions)))
+    bury(study, made)
+    return made
+
+
+def _sessions(study: StudyFolder, participant: str) -> list[SessionFolder]:
+    return [session for session in study.sessions() if session.participant == participant]
+
+
+def _others(copy: StudyFolder, tombstone: Tombstone) -> list[Path]:
+    """Return the folders of the participant's sessions in a copy that are not those that were erased."""
+    begun = {one.begun for one in tombstone.sessions if one.begun}
+    return [
+        session.path
+        for session in _sessions(copy, tombstone.participant)
+        if describe_session(session).begun not in begun
+    ]
+
+
+def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
+    """Erase a participant's folder and rows from a study folder; return whether anything was there."""
+    participant = tombstone.participant
+    sessions = _sessions(study, participant)
+    for session in sessions:
+        refuse_if_open(session.path)
+    if sessions and participant not in tombstones(study):
+        bury(study, replace(tombstone, sessions=tuple(map(describe_session, sessions))))
+    _keep_out_of_psychds(study)
+    person = study.data / f"sub-{participant}"
+    try:
+        if is_there(person):
+            shutil.rmtree(person)
+            sync_folder(study.data)
+    except OSError as error:
+        raise cannot_write(person, error) from error
+    changed = [
+        _keep_lines(study.fingerprints, lambda line: not _lists(line, study, participant)),
+        _keep_lines(study.reversed_exclusions, lambda line: not _reverses(line, participant)),
+        _keep_exclusions(study, participant),
+    ]
+    name = described_study(study)
+    if name is not None:
+        write_participants(study, name)
+    return bool(sessions) or any(changed)
+
+
+def _keep_out_of_psychds(study: StudyFolder) -> None:
+    """Let a Psych-DS validator pass over the list of withdrawals, also in folders of earlier versions."""
+    name = study.withdrawals.name.encode()
+    if is_there(study.ignore) and name not in read_regular(study.ignore).splitlines():
+        append_line(study.ignore, name + b"\n")
+
+
+def _keep_lines(path: Path, keeps: Callable[[bytes], bool]) -> bool:
+    """Rewrite a list without the lines that it does not keep; return whether there were any."""
+    try:
+        lines = read_regular(path).splitlines(keepends=True)
+    except FileNotFoundError:
+        return False
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    kept = [line for line in lines if keeps(line)]
+    if kept != lines:
+        write_file(path, b"".join(kept))
+    return kept != lines
+
+
+def _lists(line: bytes, study: StudyFolder, participant: str) -> bool:
+    place = place_of(study, study.session(participant, 1)).rpartition("/")[0]
+    return line.decode("utf-8", "replace").partition("  ")[2].strip().lower().startswith(f"{place}/".lower())
+
+
+def _reverses(line: bytes, participant: str) -> bool:
+    try:
+        return bool(parse_json(line)["exclusion"]["participant"] == participant)
+    except (ValueError, KeyError, TypeError):
+        return False
+
+
+def _keep_exclusions(study: StudyFolder, participant: str) -> bool:
+    rows = exclusions(study.path)
+    kept = tuple(row for row in rows if row.participant != participant)
+    if kept != rows:
+        write_file(study.exclusions, exclusion_bytes(kept))
+    return kept != rows
+
+
+def _outputs(study: StudyFolder) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
+    own, results = study.path.resolve(), workspace().results.resolve()
+    return erase_outputs(study.path, results if own.is_relative_to(results) else own)
+
+
+def _names(study: StudyFolder, participant: str) -> Iterator[str]:
+    """Yield what still names the participant, except the tombstone, the entry in the allocation and recordings."""
+    word = re.compile(rb"(?<![A-Za-z0-9])" + re.escape(participant.encode()) + rb"(?![A-Za-z0-9])")
+    for path in paths_in(study.path):
+        kept = path == study.withdrawals or path.is_relative_to(study.allocated)
+        if kept or path.parent.name == "recordings" or not path.is_file():
+            continue
+        if word.search(path.name.encode()) or word.search(read_regular(path)):
+            yield f"{path} still names {participant}"

@@ -1,0 +1,224 @@
+"""Withdrawal: nothing of the person remains, the study stays sound, and an interrupted erasure is finished."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from unittest import mock
+
+import pytest
+from click.testing import CliRunner, Result
+
+from study_app.analysis.export.export import export
+from study_app.analysis.report.write_report import report
+from study_app.cli import commands, main
+from study_app.errors import StoreError
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import exclude, include
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.sessions.participant_ids import used_ids
+from study_app.store.verification.verify_study import verify
+from study_app.store.withdrawals.tombstones import tombstones
+from study_app.store.withdrawals.withdraw import Withdrawn, withdraw
+from tests.studies import rehearsed
+
+pytestmark = pytest.mark.slow
+
+NOW = datetime(2026, 11, 22, 9, 30, tzinfo=UTC)
+PERSON = "P002"
+KILLED = """
+import os, shutil, signal, sys
+from pathlib import Path
+from study_app.store.withdrawals.withdraw import withdraw
+
+def rmtree(folder):
+    next(folder.rglob("journal.jsonl")).unlink()
+    os.kill(os.getpid(), signal.SIGKILL)
+
+shutil.rmtree = rmtree
+withdraw(Path(sys.argv[1]), "P002", by="AK", reason="asked by letter")
+"""
+
+
+@pytest.fixture
+def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the results folder of the workspace."""
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    return tmp_path / "results"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a study of three finished sessions, to be copied."""
+    folder = rehearsed(tmp_path_factory.mktemp("made"))
+    exclude(folder, PERSON, 1, trial=2, by="AK", reason="the phone of P002 rang")
+    exclude(folder, PERSON, 1, trial=3, by="AK", reason="coughed")
+    include(folder, PERSON, 1, trial=3, by="AK", reason="not so bad")
+    return folder
+
+
+@pytest.fixture
+def study(made: Path, results: Path) -> Path:
+    return Path(shutil.copytree(made, results / made.name))
+
+
+def erase(study: Path, **given: object) -> Withdrawn:
+    return withdraw(study, PERSON, **({"by": "AK", "reason": "asked by letter", "now": NOW} | given))  # type: ignore[arg-type]
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(commands, [str(word) for word in words])
+
+
+def personal(study: Path) -> set[bytes]:
+    """Return what occurs in this person's files and in no other's: hashes, moments, seeds, names of files."""
+    session = study / "data" / f"sub-{PERSON}"
+    words = re.compile(rb"[0-9A-Za-z][0-9A-Za-z:.+_-]{7,}")
+    own, other = set(), set()
+    for path in (path for path in study.rglob("*") if path.is_file()):
+        (own if path.is_relative_to(session) else other).update(words.findall(path.read_bytes()))
+    return own - other
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    left_out = ("withdrawals.jsonl",)
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and path.name not in left_out}
+
+
+def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, results: Path) -> None:
+    own = personal(study)
+    assert len(own) > 30
+    unblind(study, "AK", "closed")
+    export(study, results / "tables", extras=["wide", "parquet"])
+    report(study, study / "report")
+    copy = study.parent / "fingerprints-kept.txt"
+    shutil.copy(study / "fingerprints.txt", copy)
+    done = erase(study)
+    copy = copy.rename(results.parent / "fingerprints-kept.txt")
+    assert done.left == ()
+    assert done.elsewhere == ()
+    for path, content in contents(results).items():
+        assert PERSON.encode() not in content, path
+        assert PERSON not in str(path)
+        assert not [word for word in own if word in content], path
+    assert verify(study, copy).sound
+    assert "participant P002 withdrew at 2026-11-22T09:30:00+00:00" in "\n".join(map(str, verify(study).warnings))
+    (page,) = [path for path in report(study, results.parent / "again") if path.name == "report.html"]
+    assert "1 participant withdrew; their data were erased." in page.read_text(encoding="utf-8")
+
+
+def test_the_tombstone_proves_which_session_was_erased(study: Path) -> None:
+    session = study / "data" / f"sub-{PERSON}" / "ses-01"
+    listed = (study / "fingerprints.txt").read_text()
+    sums = hashlib.sha256((session / "checksums.sha256").read_bytes()).hexdigest()
+    first = (session / "journal.jsonl").read_bytes().splitlines(keepends=True)[0]
+    erase(study)
+    (line,) = (study / "withdrawals.jsonl").read_text().splitlines()
+    held = json.loads(line)
+    (erased,) = held.pop("sessions")
+    assert held == {
+        "participant": PERSON,
+        "at": "2026-11-22T09:30:00+00:00",
+        "by": "AK",
+        "reason": "asked by letter",
+    }
+    assert erased["checksums"] == sums
+    assert erased["begun"] == hashlib.sha256(first).hexdigest()
+    assert f"{erased['fingerprint']}  data/sub-{PERSON}/ses-01\n" in listed
+    assert PERSON not in (study / "fingerprints.txt").read_text()
+
+
+def test_the_id_is_not_used_again(study: Path) -> None:
+    withdraw(study, "P003", by="AK", reason="asked")
+    used = used_ids(StudyFolder(study))
+    assert used.suggested() == "P004"
+    with pytest.raises(StoreError, match=r"participant p003 withdrew, .* \(next free: P004\)"):
+        used.check_unused("p003", 1)
+
+
+def test_a_killed_withdrawal_is_reported_and_finished_by_the_same_command(study: Path) -> None:
+    killed = subprocess.run([sys.executable, "-c", KILLED, str(study)], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    wrong = verify(study)
+    assert "was interrupted: run liquid-study withdraw again" in "\n".join(map(str, wrong.errors))
+    done = erase(study, by="BM", reason="again")
+    assert done.folders == (study,)
+    assert tombstones(StudyFolder(study))[PERSON].by == "AK"
+    assert verify(study).sound
+    again = erase(study)
+    assert (again.folders, again.outputs) == ((), ())
+
+
+def test_copies_are_reached_also_those_made_before_unblinding(study: Path, results: Path, tmp_path: Path) -> None:
+    shutil.copytree(study, tmp_path / "disk" / "sites" / "A" / study.name)
+    unblind(study, "AK", "closed")
+    shutil.copytree(study, tmp_path / "disk" / "later")
+    done = erase(study, also=[tmp_path / "disk"])
+    assert len(done.folders) == 3
+    for folder in done.folders:
+        assert not list(folder.rglob(f"*{PERSON}*"))
+        assert verify(folder).sound
+    assert results.is_dir()
+
+
+def test_another_persons_session_of_that_id_is_left(study: Path, tmp_path: Path) -> None:
+    other = rehearsed(tmp_path / "elsewhere")
+    done = erase(study, also=[tmp_path / "elsewhere"])
+    assert done.folders == (study,)
+    assert f"{other} was left" in done.left[0]
+    assert (other / "data" / f"sub-{PERSON}").is_dir()
+
+
+def test_what_cannot_be_reached_is_listed(study: Path, tmp_path: Path) -> None:
+    export(study, tmp_path / "usb")
+    export(study, tmp_path / "gone")
+    shutil.rmtree(tmp_path / "gone")
+    (study / "notes.txt").write_text("P002 was late; P0022 was not")
+    said = run("withdraw", study, "--participant", PERSON, "--by", "AK", "--reason", "asked")
+    assert said.exit_code == 0
+    assert f"erased     participant P002 from {study}" in said.stdout
+    assert f"results folder: {tmp_path / 'usb'} (delete it, and make it again)" in said.stderr
+    assert f"results folder: {tmp_path / 'gone'} (no longer there)" in said.stderr
+    assert f"{study / 'notes.txt'} still names P002" in said.stderr
+    assert [path for path in (tmp_path / "usb").iterdir() if PERSON in path.read_text(encoding="utf-8")]
+    again = run("withdraw", study, "--participant", PERSON, "--by", "AK", "--reason", "asked")
+    assert "nothing to erase: participant P002 withdrew at " in again.stdout
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"participant": "P009"}, "has no participant 'P009'; participants: P001, P002, P003"),
+        ({"by": " "}, "--by is empty: a withdrawal needs initials and a reason"),
+        ({"reason": ""}, "--reason is empty: a withdrawal needs initials and a reason"),
+    ],
+)
+def test_bad_input_erases_nothing(
+    study: Path, capsys: pytest.CaptureFixture[str], given: dict[str, str], sentence: str
+) -> None:
+    before = contents(study)
+    options = {"participant": PERSON, "by": "AK", "reason": "asked"} | given
+    words = ["withdraw", str(study), *(word for name, value in options.items() for word in (f"--{name}", value))]
+    with mock.patch.object(sys, "argv", ["liquid-study", *words]), pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert sentence in line
+    assert contents(study) == before
+
+
+def test_a_running_session_is_not_erased(study: Path) -> None:
+    opening = open_alone(study / "data" / f"sub-{PERSON}" / "ses-01")
+    before = contents(study)
+    with pytest.raises(StoreError, match="is open in another program"):
+        erase(study)
+    opening.release()
+    assert contents(study) == {path: content for path, content in before.items() if not path.name.startswith(".open-")}
