@@ -74,8 +74,14 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     ("valid", "within", "told"),
     [
         (None, "not measured", "Whether trials kept to the protocol's limits of timing was not measured."),
-        (True, "1 of 1", "No trial that counts exceeded the protocol's limits of timing."),
-        (False, "0 of 1", "Ten trials exceeded the protocol's limits of timing and are in these numbers."),
+        pytest.param(
+            *(True, "1 of 1", "No trial that counts exceeded the protocol's limits of timing."),
+            marks=pytest.mark.nightly,
+        ),
+        pytest.param(
+            *(False, "0 of 1", "Ten trials exceeded the protocol's limits of timing and are in these numbers."),
+            marks=pytest.mark.nightly,
+        ),
     ],
 )
 def test_what_was_not_measured_is_neither_within_limits_nor_beyond(
