@@ -1,4 +1,4 @@
-"""No stop is lost under the painting windows of a session: a minute of ``tests/benchmarks/devices/stops.py``."""
+"""No stop is lost under the painting windows of a session: a minute each of ``tests/benchmarks/devices/stops.py``."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ pytestmark = [needs_servo, pytest.mark.nightly]
 SECONDS = 60.0
 
 
-def test_a_minute_of_stops_under_painting_windows_loses_none(qapp: object) -> None:
+@pytest.mark.parametrize("name", ["inverse3", "falcon", "force-dimension"])
+def test_a_minute_of_stops_under_painting_windows_loses_none(qapp: object, name: str) -> None:
     from tests.benchmarks.devices.stops import under_windows
 
-    found = under_windows(SECONDS)
+    found = under_windows(name, SECONDS)
     assert found.lost == []
     assert found.faults == []
     assert found.stops > 30

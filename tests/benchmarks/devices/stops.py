@@ -1,30 +1,81 @@
-"""Whether a stop is ever lost: python tests/benchmarks/devices/stops.py [MINUTES] runs 30 minutes by default.
+"""Whether a stop of the force is ever lost: python tests/benchmarks/devices/stops.py [DEVICE ...] [--minutes M].
 
-The Inverse3's driver runs at 1 kHz over TCP against the emulated service, under the painting windows of a session,
-while a simulated hand reaches to and fro in honey. About once a second the force is stopped in mid-stroke; every fifth
-time the servo is stopped, and started again. A stop is lost where the service is commanded a force later than 50 ms
-after it, or where a stopped servo is not silent. The last line names what was lost; exit code 3 where something was.
+DEVICE is inverse3 (its driver over TCP, against the emulated service), falcon (its driver on the emulated bus) or
+force-dimension (its driver with emulated library functions); by default all, 30 minutes each.
+
+The servo runs at 1 kHz under the painting windows of a session, while a simulated hand reaches back and forth in honey.
+About once a second the force is stopped in mid-stroke; every fifth time the servo is stopped, and started again. A stop
+is lost where the device has a force later than 50 ms after it, or where a stopped servo sends commands. The last line
+of each device is its verdict; exit code 3 where one has failed.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from study_app.devices.base import Device
+from study_app.devices.falcon.emulated import EmulatedFalcon
+from study_app.devices.falcon.emulator.emulator import Emulator
+from study_app.devices.force_dimension.emulated import EmulatedForceDimension
 from study_app.devices.inverse3.device import Inverse3Device
 from study_app.devices.inverse3.emulator.server import ServiceServer
 from study_app.devices.inverse3.emulator.service import Service
+from study_app.devices.simulated.hand_commands import HandOrders
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 
 IN_FORCE_S = 0.05
 WATCHED_S = 0.15
+LOOK_S = 0.005
 STROKE_S = 0.8
 EVERY = 5
+NOISE_N = 0.5
+
+
+class Stand(NamedTuple):
+    """An open device, the hand at it, what acts on the handle (while the servo ticks or not), and commands so far."""
+
+    device: Device
+    hand: HandOrders
+    acting: Callable[[bool], Any]
+    commands: Callable[[], int]
+
+
+@contextmanager
+def inverse3() -> Iterator[Stand]:
+    service = Service()
+    with ServiceServer(service) as server, Inverse3Device(f"127.0.0.1:{server.port}") as device:
+        yield Stand(device, service, lambda _: service.force_n, lambda: int(service.state.commands))
+
+
+@contextmanager
+def falcon() -> Iterator[Stand]:
+    emulator = Emulator(running=True)
+
+    def acting(ticking: bool) -> Any:
+        return emulator.torques if ticking else device.held[1]  # without ticks the emulator's time stands still
+
+    with EmulatedFalcon(emulator=emulator) as device:
+        yield Stand(device, emulator, acting, lambda: device.counters["requests"])
+
+
+@contextmanager
+def force_dimension() -> Iterator[Stand]:
+    with EmulatedForceDimension() as device:
+        hand = device.hand
+        yield Stand(device, hand, lambda _: hand.force_n, lambda: int(hand.state.handle.written))
+
+
+STANDS = {"inverse3": inverse3, "falcon": falcon, "force-dimension": force_dimension}
 
 
 @dataclass(slots=True)
@@ -33,18 +84,27 @@ class Found:
 
     stops: int = 0
     servo_stops: int = 0
-    under_force: int = 0  # stops with more than 0.5 N on the handle
+    under_force: int = 0  # stops with more than `NOISE_N` commanded
     lost: list[str] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
     lateness_us: tuple[float, float] = (0.0, 0.0)
     frames: int = 0
 
+    @property
+    def verdict(self) -> str:
+        """Whether it passed, in a line."""
+        if self.lost or self.faults:
+            return f"FAILED: {len(self.lost)} stops lost, {len(self.faults)} faults"
+        if self.under_force == 0:
+            return "FAILED: no stop was under force"
+        return f"PASSED: none of {self.stops} stops lost"
 
-def stop_again_and_again(seconds: float) -> Found:
-    """Return what was found in so many seconds."""
-    found, service = Found(), Service()
-    with ServiceServer(service) as server, Inverse3Device(f"127.0.0.1:{server.port}") as device:
-        servo = Servo(device)
+
+def stop_again_and_again(name: str, seconds: float) -> Found:
+    """Return what was found of a device in so many seconds."""
+    found = Found()
+    with STANDS[name]() as stand:
+        servo = Servo(stand.device)
         servo.start()
         late: list[float] = []
         scene = load("rek2024").scene_for("honey")
@@ -53,15 +113,16 @@ def stop_again_and_again(seconds: float) -> Found:
             reader = servo.telemetry.reader()
             servo.load(scene)
             servo.fade_in()
-            service.reach_to(0.04 * side, 0.0, 0.01, duration_s=1.2)
+            stand.hand.reach_to(0.04 * side, 0.0, 0.01, duration_s=1.2)
             side = -side
             time.sleep(STROKE_S)
-            found.under_force += int(np.linalg.norm(service.force_n) > 0.5)
-            late += list(np.percentile(reader.read()["lateness_ns"], [50, 99]) / 1e3)
+            samples = reader.read()
+            found.under_force += int(np.linalg.norm(samples["device_force_n"][-1]) > NOISE_N)
+            late += list(np.percentile(samples["lateness_ns"], [50, 99]) / 1e3)
             whole = found.stops % EVERY == EVERY - 1
             found.stops += 1
             found.servo_stops += whole
-            _stop(servo, service, found, whole=whole)
+            _stop(servo, stand, found, whole=whole)
             if servo.fault is not None:
                 found.faults.append(servo.fault)
             if whole:
@@ -71,39 +132,55 @@ def stop_again_and_again(seconds: float) -> Found:
     return found
 
 
-def _stop(servo: Servo, service: Service, found: Found, *, whole: bool) -> None:
+def _stop(servo: Servo, stand: Stand, found: Found, *, whole: bool) -> None:
     (servo.stop if whole else servo.stop_force)()
     time.sleep(IN_FORCE_S)
-    pushes, commands = int(service.state.pushes), int(service.state.commands)
-    time.sleep(WATCHED_S - IN_FORCE_S)
-    if service.state.pushes != pushes or service.force_n != (0.0, 0.0, 0.0):
-        found.lost.append(f"stop {found.stops}: {service.force_n} N")
-    if whole and service.state.commands != commands:
-        found.lost.append(f"stop {found.stops}: {service.state.commands - commands} commands of a stopped servo")
+    reader, commands = servo.telemetry.reader(), stand.commands()
+    end = time.monotonic() + WATCHED_S - IN_FORCE_S
+    while time.monotonic() < end:
+        acting = stand.acting(not whole)
+        if any(acting):
+            found.lost.append(f"stop {found.stops}: {acting} acts")
+            return
+        time.sleep(LOOK_S)
+    if not whole and reader.read()["device_force_n"].any():
+        found.lost.append(f"stop {found.stops}: the servo sent a force")
+    if whole and stand.commands() != commands:
+        found.lost.append(f"stop {found.stops}: {stand.commands() - commands} commands of a stopped servo")
 
 
-def under_windows(seconds: float) -> Found:
+def under_windows(name: str, seconds: float) -> Found:
     """Return what was found while both windows of a session paint."""
     from study_app.app.windows_load import lend
 
     windows = lend("gui")
-    found = windows.during(lambda: stop_again_and_again(seconds))
+    found = windows.during(lambda: stop_again_and_again(name, seconds))
     found.frames = windows.frames
     return found
 
 
-def main(minutes: float) -> int:
+def main(names: list[str], minutes: float) -> int:
     """Run, print, and return the exit code."""
     if sys.platform == "linux" and not any(map(os.environ.get, ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"))):
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
-    found = under_windows(60.0 * minutes)
-    print(f"{found.stops} stops, {found.under_force} of them under force, {found.servo_stops} of the servo")
-    print(
-        f"{found.frames} frames painted; lateness p50 {found.lateness_us[0]:.0f} us, p99 {found.lateness_us[1]:.0f} us"
-    )
-    print(f"lost stops: {len(found.lost)}; faults: {len(found.faults)}", *found.lost, *found.faults, sep="\n")
-    return 3 if found.lost or found.faults else 0
+    failed = False
+    for name in names:
+        found = under_windows(name, 60.0 * minutes)
+        print(f"{name}: {found.stops} stops, {found.under_force} under force, {found.servo_stops} of the servo")
+        p50_us, p99_us = found.lateness_us
+        print(f"{found.frames} frames painted; lateness p50 {p50_us:.0f} us, p99 {p99_us:.0f} us")
+        print(*found.lost, *found.faults, f"{name}: {found.verdict}", sep="\n", flush=True)
+        failed = failed or not found.verdict.startswith("PASSED")
+    return 3 if failed else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(float(sys.argv[1]) if len(sys.argv) > 1 else 30.0))
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
+    parser.add_argument("devices", nargs="*", metavar="DEVICE", help=", ".join(STANDS))
+    parser.add_argument("--minutes", type=float, default=30.0)
+    given = parser.parse_args()
+    for unknown in set(given.devices) - set(STANDS):
+        parser.error(f"{unknown} is not one of {', '.join(STANDS)}")
+    if not given.minutes > 0.0:
+        parser.error(f"--minutes must be above 0, not {given.minutes:g}")
+    sys.exit(main(given.devices or list(STANDS), given.minutes))
