@@ -34,34 +34,13 @@ _LIBRARIES = ("numpy", "numba", "pydantic", "PySide6-Essentials", "pyqtgraph", "
 
 # What every receipt holds; the first of these lines are the journal's too, word for word.
 FACTS = (
-    "participant",
-    "session",
-    "study",
-    "seed",
-    "language",
-    "operator",
-    "simulated",
-    "pilot",
-    "recordings",
-    "key_hash",
-    "protocol_hash",
-    "version",
-)
+    "participant", "session", "study", "seed", "language", "operator", "simulated", "pilot", "recordings",
+    "key_hash", "protocol_hash", "version",
+)  # fmt: skip
 FIELDS = (
-    "format",
-    "status",
-    "reason",
-    "started_at",
-    "ended_at",
-    "resumed",
-    *FACTS,
-    "generator",
-    "versions",
-    "device",
-    "screens",
-    "clock",
-    "protocol",
-)
+    "format", "status", "reason", "started_at", "ended_at", "resumed", *FACTS, "generator", "versions",
+    "device", "screens", "clock", "protocol",
+)  # fmt: skip
 
 
 def without_conditions(protocol: Protocol) -> dict[str, Any]:

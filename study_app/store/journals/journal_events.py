@@ -208,19 +208,9 @@ _KINDS: Mapping[str, Callable[[object], bool]] = {
     "list of texts": _are_texts,
 }
 _MAY_BE_NULL = (
-    "level",
-    "standard",
-    "part",
-    "value",
-    "answer",
-    "onset_s",
-    "first_s",
-    "last_s",
-    "gap_s",
-    "device",
-    "t_task_s",
-    "scene",
-)
+    "level", "standard", "part", "value", "answer", "onset_s", "first_s", "last_s", "gap_s", "device",
+    "t_task_s", "scene",
+)  # fmt: skip
 _KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for column in (*TRIALS, *DELIVERED)} | {
     name: (kind, name in _MAY_BE_NULL)
     for kind, names in {

@@ -30,20 +30,9 @@ RECOMMENDED_FOLDERS = ("analysis", "results", "materials", "documentation")
 _DESCRIPTION = "dataset_description.json"
 _IGNORE = ".psychds-ignore"
 _IGNORED = (
-    ".git*",
-    "*.DS_Store",
-    ".datalad/",
-    ".reproman/",
-    "sourcedata/",
-    "code/",
-    "stimuli/",
-    "materials/",
-    "results/",
-    "products/",
-    "analysis/",
-    "documentation/",
-    "log/",
-)
+    ".git*", "*.DS_Store", ".datalad/", ".reproman/", "sourcedata/", "code/", "stimuli/", "materials/",
+    "results/", "products/", "analysis/", "documentation/", "log/",
+)  # fmt: skip
 _SCHEMA_ORG = re.compile(r"https?://(www\.)?schema\.org/?")
 
 

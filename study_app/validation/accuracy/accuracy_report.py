@@ -14,27 +14,10 @@ from study_app.validation.accuracy.accuracy_figure import draw
 from study_app.validation.accuracy.comparison import Accuracy, Row
 
 COLUMNS: Final = (
-    "kind",
-    "liquid",
-    "truth",
-    "model",
-    "median_ns",
-    "p99_ns",
-    "ns_per_ms",
-    "rms_error_n",
-    "max_error_n",
-    "rms_error_percent",
-    "max_error_percent",
-    "direction_error_deg",
-    "target_percent",
-    "memory_bytes",
-    "rate_hz",
-    "ticks_per_s",
-    "times_real_time",
-    "batches",
-    "pareto_front",
-    "gate_choice",
-)
+    "kind", "liquid", "truth", "model", "median_ns", "p99_ns", "ns_per_ms", "rms_error_n", "max_error_n",
+    "rms_error_percent", "max_error_percent", "direction_error_deg", "target_percent", "memory_bytes",
+    "rate_hz", "ticks_per_s", "times_real_time", "batches", "pareto_front", "gate_choice",
+)  # fmt: skip
 
 
 def _values(row: Row) -> tuple[str | float, ...]:
@@ -91,19 +74,9 @@ _WHAT: Final = (
     "each against the truth that it misses most; ◎ what the gate chooses, and the program runs."
 )
 _HEADINGS: Final = (
-    "",
-    "model",
-    "ns per tick",
-    "p99",
-    "RMS error [N]",
-    "max [N]",
-    "RMS [%]",
-    "max [%]",
-    "direction [°]",
-    "memory [kB]",
-    "ticks per second",
-    "times real time",
-)
+    "", "model", "ns per tick", "p99", "RMS error [N]", "max [N]", "RMS [%]", "max [%]", "direction [°]",
+    "memory [kB]", "ticks per second", "times real time",
+)  # fmt: skip
 
 
 def _markdown_table(rows: Sequence[Row]) -> str:

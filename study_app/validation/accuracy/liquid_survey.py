@@ -166,18 +166,9 @@ def survey_markdown(found: tuple[Surveyed, ...]) -> str:
 
 
 _HEADINGS: Final = (
-    "liquid",
-    "greatest Re (speed)",
-    "model",
-    "creeping flow",
-    "steady drag",
-    "fluid solver",
-    "solved up to",
-    "drag laws differ by",
-    "strokes, known velocity",
-    "strokes, estimated velocity",
-    "ns per tick",
-)
+    "liquid", "greatest Re (speed)", "model", "creeping flow", "steady drag", "fluid solver", "solved up to",
+    "drag laws differ by", "strokes, known velocity", "strokes, estimated velocity", "ns per tick",
+)  # fmt: skip
 _WHAT: Final = (
     "Errors: RMS of the error over RMS of the force, the greatest of several references, with velocities known. "
     "Creeping flow: at Re 0.01. Steady drag: against experiments. Fluid solver: at 1 kHz; unsteady drag meets each "
