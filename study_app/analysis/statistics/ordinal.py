@@ -65,7 +65,6 @@ def ordinal(
     *,
     sessions: ArrayLike | None = None,
     intercepts: bool = True,
-    nodes: int = NODES,
 ) -> Ordinal:
     """Test whether settings move answers up or down.
 
@@ -82,8 +81,6 @@ def ordinal(
     intercepts : bool
         Whether each participant has an intercept of his or her own. Without, answers are taken as independent, which
         shrinks the effects: for comparison only.
-    nodes : int
-        Quadrature nodes a participant.
 
     Raises
     ------
@@ -98,15 +95,15 @@ def ordinal(
     levels = np.unique(rows[~np.isnan(rows)])
     reason = _impossible(rows, levels, intercepts)
     if reason:
-        return _outcome(rows, used, levels, design.shape[1], intercepts, None, 0.0, reason, nodes)
+        return _outcome(rows, used, levels, design.shape[1], intercepts, None, 0.0, reason)
     answers = _answers(rows, levels, design, intercepts)
     factor = _factor(None if sessions is None else np.asarray(sessions).reshape(array.shape)[used], rows, answers)
-    whole = fit(Answers(answers.level, np.hstack([answers.design, factor]), answers.starts), nodes)
-    without = fit(Answers(answers.level, factor, answers.starts), nodes)
+    whole = fit(Answers(answers.level, np.hstack([answers.design, factor]), answers.starts))
+    without = fit(Answers(answers.level, factor, answers.starts))
     ratio = max(0.0, 2 * (whole.log_likelihood - without.log_likelihood))
     bad = whole.errors is None or bool((np.abs(whole.effects) > FAR).any() or (whole.errors > FAR).any())
     note = SEPARATED if bad else ""
-    return _outcome(rows, used, levels, design.shape[1], intercepts, whole, ratio, note, nodes, factor.shape[1])
+    return _outcome(rows, used, levels, design.shape[1], intercepts, whole, ratio, note, factor.shape[1])
 
 
 def _design(settings: int, columns: ArrayLike | None) -> Array:
@@ -160,7 +157,6 @@ def _outcome(
     model: Model | None,
     ratio: float,
     note: str,
-    nodes: int,
     sessions: int = 0,
 ) -> Ordinal:
     found = None if note else model
@@ -175,7 +171,7 @@ def _outcome(
         statistic_name="likelihood ratio",
         statistic=None if found is None else ratio,
         p=None if found is None else float(chi_square.sf(ratio, columns)),
-        method=f"random intercepts, adaptive Gauss-Hermite quadrature, {nodes} nodes"
+        method=f"random intercepts, adaptive Gauss-Hermite quadrature, {NODES} nodes"
         + ("; sessions as a factor" if sessions else "")
         if intercepts
         else "no intercepts",

@@ -15,7 +15,6 @@ from study_app.analysis.statistics.exact_distributions import Lattice, doubled_r
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, Whole, checked
 from study_app.errors import AnalysisError
 
-Zeros: TypeAlias = Literal["wilcox", "pratt"]
 Alternative: TypeAlias = Literal["two-sided", "greater", "less"]
 
 EXACT_UP_TO: Final = 200
@@ -23,11 +22,6 @@ EXACT_UP_TO: Final = 200
 
 INTERVAL_FROM: Final = 6
 """Below so many pairs with a difference no test can be significant, and no interval is shown."""
-
-ZEROS: Final[dict[Zeros, str]] = {
-    "wilcox": "equal pairs left out (Wilcoxon)",
-    "pratt": "equal pairs ranked, then left out (Pratt)",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,24 +37,13 @@ class Paired(Outcome):
     median_difference: float | None
 
 
-def paired(
-    x: ArrayLike,
-    y: ArrayLike,
-    *,
-    zeros: Zeros = "wilcox",
-    alternative: Alternative = "two-sided",
-    alpha: float = 0.05,
-) -> Paired:
-    """Compare answers of the same participants under two settings.
+def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
+    """Compare answers of the same participants under two settings; equal pairs are left out, as by R and JASP.
 
     Parameters
     ----------
     x, y : (participants,) arrays
         NaN where an answer is missing: that pair is dropped.
-    zeros : "wilcox" | "pratt"
-        What becomes of equal pairs. Wilcoxon's rule is what R and JASP do.
-    alternative : str
-        "greater": x lies above y.
     alpha : float
         What p is compared with: the note says where so few pairs cannot reach it.
 
@@ -75,11 +58,11 @@ def paired(
     both = first - second
     differences = both[~np.isnan(both)]
     n, dropped = len(differences), int(np.isnan(both).sum())
-    ranks, signs = signed(differences, zeros)
+    ranks, signs = signed(differences)
     v = int(ranks[signs > 0].sum())
     all_ranks = int(ranks.sum())
     effect = (2 * v - all_ranks) / all_ranks if len(ranks) else None
-    p, smallest, method = signed_p(ranks, v, alternative)
+    p, smallest, method = signed_p(ranks, v)
     interval, reason = _fisher(effect, len(ranks))
     return Paired(
         test="Wilcoxon signed ranks",
@@ -89,7 +72,7 @@ def paired(
         statistic=v / 2 if len(ranks) else None,
         p=p,
         smallest_p=smallest,
-        method=f"{method}, {alternative}; {ZEROS[zeros]}",
+        method=f"{method}, two-sided; equal pairs left out (Wilcoxon)",
         effect_name="matched rank-biserial correlation",
         effect=effect,
         interval=interval,
@@ -101,13 +84,11 @@ def paired(
     )
 
 
-def signed(differences: Array, zeros: Zeros = "wilcox") -> tuple[Whole, Array]:
+def signed(differences: Array) -> tuple[Whole, Array]:
     """Return the (doubled) ranks and the signs of the differences that are not 0."""
-    kept = differences != 0.0
-    ranked = differences[kept] if zeros == "wilcox" else differences
+    kept = differences[differences != 0.0]
     # Differences of decimals that should tie differ in the last bit: 0.3 - 0.1 and 0.2.
-    ranks = doubled_ranks(np.round(np.abs(ranked), 9)[None])[0]
-    return (ranks if zeros == "wilcox" else ranks[kept]), np.sign(differences[kept])
+    return doubled_ranks(np.round(np.abs(kept), 9)[None])[0], np.sign(kept)
 
 
 def signed_p(ranks: Whole, v: int, alternative: Alternative = "two-sided") -> tuple[float | None, float | None, str]:

@@ -36,7 +36,7 @@ from study_app.analysis.statistics.psychometrics.rise import NO_RISE, p_of_rise
 from study_app.errors import AnalysisError
 
 NOTICED_FROM: Final = 5.0
-"""Agreement from "somewhat agree" on counts as having noticed, unless the protocol asks for yes or no."""
+"""Agreement from "somewhat agree" on counts as having noticed."""
 
 SURE: Final = 0.95
 DROP: Final = float(chi_square.ppf(SURE, 1)) / 2
@@ -83,20 +83,17 @@ def noticed(
     values: ArrayLike,
     levels: Sequence[float],
     *,
-    noticed_from: float = NOTICED_FROM,
     alpha: float = 0.05,
     seed: int = 1,
 ) -> Threshold:
-    """Return the threshold of raw answers: ``noticed_from`` or more means noticed, NaN is missing.
+    """Return the threshold of raw answers: `NOTICED_FROM` or more means noticed, NaN is missing.
 
     Parameters
     ----------
     values : (participants, levels) or (participants, levels, presentations) array
-        Answers in points of the scale; for yes and no coded 1 and 0 give ``noticed_from`` = 1.
+        Answers in points of the scale.
     levels : sequence of float
         What was presented; equal levels are replicates of one.
-    noticed_from : float
-        The least answer that means noticed.
     alpha : float
         No threshold is stated where p of a rise is above it.
     seed : int
@@ -107,7 +104,7 @@ def noticed(
     there = ~np.isnan(array)
     used = there.any(axis=(1, 2))
     rows = there[used]
-    yes, asked = (rows & (array[used] >= noticed_from)).sum(axis=2), rows.sum(axis=2)
+    yes, asked = (rows & (array[used] >= NOTICED_FROM)).sum(axis=2), rows.sum(axis=2)
     return _estimated(
         np.asarray(levels, dtype=np.float64),
         yes.astype(np.float64),
