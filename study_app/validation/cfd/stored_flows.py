@@ -48,10 +48,10 @@ class Table:
         return Case(self.notes["liquid"], density_kg_m3, viscosity_pa_s, diameter_m, speed_mps, profile)
 
 
-def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats], digits: int = 7) -> bytes:
+def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats]) -> bytes:
     """Return a table as the bytes of its file."""
     head = "".join(f"# {name}: {value}\n" for name, value in notes.items())
-    rows = ([f"{value:.{digits}g}" for value in row] for row in zip(*columns.values(), strict=True))
+    rows = ([f"{value:.7g}" for value in row] for row in zip(*columns.values(), strict=True))
     return (head + csv_text_of([columns, *rows])).encode()
 
 

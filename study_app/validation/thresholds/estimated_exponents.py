@@ -29,7 +29,7 @@ from study_app.protocol.trials.tracks import condition_of, design_of, method_of,
 from study_app.psychophysics.precision import ESTIMATE_NOISE
 from study_app.session.simulated.design_observer import OBSERVER, Observer, estimate
 from study_app.validation.thresholds.methods_alone import PEOPLE, keyed_draw
-from study_app.validation.thresholds.verdicts import Verdict
+from study_app.validation.thresholds.verdicts import Verdict, group_coverage
 
 EXPONENT: Final = 0.44
 """Of perceived thickness over viscosity (Stevens & Guirao 1964)."""
@@ -168,14 +168,7 @@ def exponent_verdicts(one: PlantedExponent, studies: Sequence[ExponentsFound]) -
         abs(mean - EXPONENT) <= ERROR_MOST,
     )
     share = float(np.mean([found.low <= EXPONENT <= found.high for found in studies]))
-    slack = 3 * math.sqrt(0.95 * 0.05 / len(studies))
-    yield Verdict(
-        one.name,
-        "coverage of the group's 95 % intervals",
-        f"{100 * share:.1f} %",
-        f"95 ± {100 * slack:.1f} %",
-        abs(share - 0.95) <= slack,
-    )
+    yield group_coverage(one.name, share, len(studies))
 
 
 def spread_of_exponents(studies: Sequence[ExponentsFound], people: int) -> float:

@@ -48,14 +48,7 @@ def verdicts(one: Planted, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
         interval(near / n, n)[1] >= NEAR_SHARE,
     )
     of_group = [low <= one.threshold <= high for found in studies for _, low, high in found.group]
-    share, slack = sum(of_group) / len(of_group), 3 * math.sqrt(0.95 * 0.05 / n)
-    yield Verdict(
-        one.name,
-        "coverage of the group's 95 % intervals",
-        f"{100 * share:.1f} %",
-        f"95 ± {100 * slack:.1f} %",
-        abs(share - 0.95) <= slack,
-    )
+    yield group_coverage(one.name, sum(of_group) / len(of_group), n)
     of_people = [low <= one.threshold <= high for found in studies for own in found.own for _, low, high in own]
     share = sum(of_people) / len(of_people)
     low, high = OWN_COVERAGE
@@ -75,6 +68,14 @@ def verdicts(one: Planted, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
             f"{one.exponent:g} ± {EXPONENT_MOST:g}",
             abs(exponent - one.exponent) <= EXPONENT_MOST,
         )
+
+
+def group_coverage(study: str, share: float, studies: int) -> Verdict:
+    """Return whether the share of the group's intervals that hold the truth is 95 %, but for chance."""
+    slack = 3 * math.sqrt(0.95 * 0.05 / studies)
+    limit = f"95 ± {100 * slack:.1f} %"
+    what = "coverage of the group's 95 % intervals"
+    return Verdict(study, what, f"{100 * share:.1f} %", limit, abs(share - 0.95) <= slack)
 
 
 def spread(studies: Sequence[StudyFound], people: int) -> float:

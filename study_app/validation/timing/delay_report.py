@@ -15,25 +15,10 @@ BEGIN: Final = "<!-- delays: printed by liquid-study timing --delays --to DIR --
 END: Final = "<!-- end of delays -->"
 
 COLUMNS: Final = (
-    "screen",
-    "frames_follow",
-    "load",
-    "requested_ms",
-    "achieved_ms",
-    "frames",
-    "error_mean_ms",
-    "error_p50_ms",
-    "error_p95_ms",
-    "error_p99_ms",
-    "error_max_ms",
-    "error_mean_frames",
-    "error_p50_frames",
-    "error_p95_frames",
-    "error_p99_frames",
-    "error_max_frames",
-    "late",
-    "refreshes_missed",
-)
+    "screen", "frames_follow", "load", "requested_ms", "achieved_ms", "frames", "error_mean_ms", "error_p50_ms",
+    "error_p95_ms", "error_p99_ms", "error_max_ms", "error_mean_frames", "error_p50_frames", "error_p95_frames",
+    "error_p99_frames", "error_max_frames", "late", "refreshes_missed",
+)  # fmt: skip
 PERCENTILES: Final = (50.0, 95.0, 99.0)
 _HEADINGS: Final = ("asked", "achieved", "mean", "p95", "p99", "worst", "mean", "p95", "p99", "worst", "late", "missed")
 
@@ -109,20 +94,20 @@ def _head(found: Delayed) -> str:
 
 
 def _row(trial: Shown) -> tuple[str, ...]:
-    frames = (trial.mean_ms, trial.percentile_ms(95), trial.percentile_ms(99), trial.worst_ms)
     return (
         f"{1e3 * trial.delay_s:g}",
         f"{trial.achieved_ms:.1f}",
         *_errors(trial),
-        *(f"{error_ms / trial.frame_ms:.2f}" for error_ms in frames),
+        *(f"{error_ms / trial.frame_ms:.2f}" for error_ms in _measures_ms(trial)),
         f"{trial.late} of {trial.frames}",
         f"{trial.missed}",
     )
 
 
 def _errors(trial: Shown) -> tuple[str, ...]:
+    return tuple(f"{error_ms:.1f}" for error_ms in _measures_ms(trial))
+
+
+def _measures_ms(trial: Shown) -> tuple[float, ...]:
     """Return mean, 95th and 99th percentile and the worst [ms]."""
-    return tuple(
-        f"{error_ms:.1f}"
-        for error_ms in (trial.mean_ms, trial.percentile_ms(95), trial.percentile_ms(99), trial.worst_ms)
-    )
+    return trial.mean_ms, trial.percentile_ms(95), trial.percentile_ms(99), trial.worst_ms

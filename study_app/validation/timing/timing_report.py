@@ -15,36 +15,13 @@ BEGIN: Final = "<!-- timing: printed by liquid-study timing --to DIR -->"
 END: Final = "<!-- end of timing -->"
 
 COLUMNS: Final = (
-    "priority",
-    "granted",
-    "loop",
-    "ticks",
-    "overruns",
-    "over_1_ms",
-    "p50_us",
-    "p90_us",
-    "p99_us",
-    "p99_9_us",
-    "max_us",
-    "p50_against_bare",
-    "p99_against_bare",
-    "tick_p50_us",
-    "tick_p99_us",
-)
+    "priority", "granted", "loop", "ticks", "overruns", "over_1_ms", "p50_us", "p90_us", "p99_us", "p99_9_us",
+    "max_us", "p50_against_bare", "p99_against_bare", "tick_p50_us", "tick_p99_us",
+)  # fmt: skip
 _HEADINGS: Final = (
-    "priority",
-    "loop",
-    "p50",
-    "p90",
-    "p99",
-    "p99.9",
-    "worst",
-    "over 1 ms",
-    "skipped",
-    "p50 : bare",
-    "p99 : bare",
-    "tick p99",
-)
+    "priority", "loop", "p50", "p90", "p99", "p99.9", "worst", "over 1 ms", "skipped", "p50 : bare",
+    "p99 : bare", "tick p99",
+)  # fmt: skip
 
 
 def write(found: Timed, to: Path) -> tuple[Path, ...]:
@@ -65,8 +42,8 @@ def text(found: Timed) -> str:
     widths = [max(len(row[column]) for row in rows) for column in range(len(_HEADINGS))]
     lines = [_head(found), "lateness in µs; skipped: deadlines that passed during a longer tick", ""]
     for row in rows:
-        left = (cell.ljust(width) if column < 2 else cell.rjust(width) for column, (cell, width) in _with(row, widths))
-        lines.append("  ".join(left).rstrip())
+        cells = (f"{cell:{'<' if column < 2 else '>'}{widths[column]}}" for column, cell in enumerate(row))
+        lines.append("  ".join(cells).rstrip())
     return "\n".join((*lines, "", *map(str, found.promises()), "", *_notes(found))) + "\n"
 
 
@@ -122,10 +99,6 @@ def _row(found: Timed, lane: Lane) -> tuple[str, ...]:
         *ratios,
         f"{lane.busy_us(99):.1f}" if len(lane.busy_ns) else "–",
     )
-
-
-def _with(row: tuple[str, ...], widths: list[int]) -> enumerate[tuple[str, int]]:
-    return enumerate(zip(row, widths, strict=True))
 
 
 def _notes(found: Timed) -> tuple[str, ...]:
