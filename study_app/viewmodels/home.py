@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 from study_app.errors import ProtocolError, StudyError
@@ -90,7 +90,17 @@ def read_studies(opened: Iterable[str]) -> tuple[StudyFacts | BrokenFacts, ...]:
 def holds_liquids_alone(source: str) -> bool:
     """Return whether a file holds liquids and no study; a file that cannot be read does not."""
     try:
-        return is_scene_file(source)
+        path = find(source)
+        state = path.stat()
+        return _holds_liquids_alone(path, state.st_mtime_ns, state.st_size)
+    except (ProtocolError, OSError):
+        return False
+
+
+@lru_cache(maxsize=256)
+def _holds_liquids_alone(path: Path, _changed_ns: int, _size: int) -> bool:
+    try:
+        return is_scene_file(path)
     except ProtocolError:
         return False
 

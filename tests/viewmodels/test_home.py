@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import datetime, timedelta
+from pathlib import Path
 
 import pytest
 
@@ -13,7 +14,15 @@ from study_app.session.resume import REHEARSED_SCREENS
 from study_app.store.exclusions import exclude
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.viewmodels.home import BrokenFacts, StudyFacts, held, interrupted, sources, study_facts
+from study_app.viewmodels.home import (
+    BrokenFacts,
+    StudyFacts,
+    held,
+    holds_liquids_alone,
+    interrupted,
+    sources,
+    study_facts,
+)
 from study_app.viewmodels.session.columns import incidents, matching, states_of, status_chip, validity_chip
 from study_app.viewmodels.session.record import read_record
 from study_app.viewmodels.sessions import sessions, started_words
@@ -260,3 +269,13 @@ def test_the_extent_of_a_study_with_groups_is_a_range(tmp_path):
     assert isinstance(facts, StudyFacts)
     assert facts.extent == "2 parts, 6 settings, 6 to 7 answers"
     assert facts.duration == "about 1 to 2 min"
+
+
+def test_a_file_of_liquids_that_becomes_a_study_is_noticed(tmp_path: Path) -> None:
+    file = tmp_path / "liquids.toml"
+    file.write_text("format = 1\n[liquids.water]\ndensity_kg_m3 = 1000\n")
+    assert holds_liquids_alone(str(file))
+    file.write_text(f"{file.read_text()}[study]\nname = 'mine'\n")
+    assert not holds_liquids_alone(str(file))
+    file.unlink()
+    assert not holds_liquids_alone(str(file))

@@ -142,6 +142,8 @@ class OpenStudy:
 
     def standing(self, known: tuple[Run, ...]) -> Standing:
         """Return how the study stands to what was run."""
+        if not any(run.sessions for run in known):
+            return standing("", "", self.version, known)
         file = with_liquid_files(self.saved.encode(), self.study.folder)
         base = content_hash(file) if self.base else ""
         return standing(content_hash(self.source()), base, self.version, known)

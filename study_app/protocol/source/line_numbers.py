@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.notation import scan
@@ -17,13 +17,19 @@ class Places:
     """
 
     def __init__(self, source: str) -> None:
-        line_starts = [0, *(match.end() for match in re.finditer("\n", source))]
-        self._lines: dict[Path, int] = {}
-        for node in scan(source):
+        self._source = source
+
+    @cached_property
+    def _lines(self) -> dict[Path, int]:
+        """The lines by path; a text without problems is not scanned for them."""
+        line_starts = [0, *(match.end() for match in re.finditer("\n", self._source))]
+        found: dict[Path, int] = {}
+        for node in scan(self._source):
             line = bisect_right(line_starts, node.start)
             for length in range(1, len(node.path)):
-                self._lines.setdefault(node.path[:length], line)
-            self._lines[node.path] = line
+                found.setdefault(node.path[:length], line)
+            found[node.path] = line
+        return found
 
     def line(self, path: Path) -> int | None:
         """Return the line (from 1) of ``path``, or of the innermost table around it that is in the file."""

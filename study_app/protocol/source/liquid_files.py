@@ -16,7 +16,7 @@ from typing import Any, Final
 
 TABLE: Final = "liquid_files"
 _HEADER: Final = f"\n\n# The liquid files of this study, as they were read.\n[{TABLE}]\n".encode()
-_FILE_KEY: Final = re.compile(rb"\bfile\b")
+_FILE_KEY: Final = re.compile(rb"""\bfile["']?[ \t]*=""")
 
 
 def with_liquid_files(study: bytes, folder: Path) -> bytes:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from functools import lru_cache
 from typing import Literal, NamedTuple, TypeAlias
 
 from study_app.protocol.source.document import Path
@@ -50,6 +51,7 @@ class Node(NamedTuple):
     end: int
 
 
+@lru_cache(maxsize=2)
 def scan(text: str) -> tuple[Node, ...]:
     """Return every header, key and array entry of a TOML text, in the order in which they begin."""
     found = _Scan(text).nodes
