@@ -1,0 +1,95 @@
+"""Studies made from the empty one in a real window: by keys alone and by mouse alone; then saved, rehearsed and run."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from study_app.authoring.study import Study, read
+from tests.app.designer.support.program import USERS, environment
+from tests.app.designer.support.studies import STUDIES
+from tests.compiled import needs_servo
+from tests.real_windows import needs_display, virtual_display
+
+ROOT = Path(__file__).resolve().parents[3]
+LIMIT_S = 900.0
+
+
+def check_likert(study: Study) -> None:
+    found = study.document
+    assert found["blocks"]["liquids"]["conditions"] == ("water", "honey")
+    assert found["conditions"]["honey"]["liquid"] == "honey"
+    assert found["liquids"]["honey"] == {"density_kg_m3": 1400, "viscosity_pa_s": 5, "effects": ("drag",)}
+    questionnaire = found["questionnaires"][found["blocks"]["liquids"]["questionnaire"]]
+    assert [item["text"] for item in questionnaire["items"]] == ["This feels like a liquid.", "This is thick."]
+    labels = found["scales"][questionnaire["scale"]]["labels"]["en"]
+    assert (labels[0], labels[6], len(labels)) == ("Not at all", "Very much", 7)
+
+
+def check_two_interval(study: Study) -> None:
+    found = study.document
+    block = found["blocks"]["liquids"]
+    assert "conditions" not in block
+    stimulus, design, method = (
+        found[section][block[key]]
+        for section, key in (("stimuli", "stimulus"), ("designs", "design"), ("methods", "method"))
+    )
+    assert stimulus == {"vary": "delay_ms", "levels": (50, 200)}
+    assert design == {"kind": "2ifc", "item": "later", "question": "Which one was late?"}
+    assert method == {"kind": "constant", "levels": (50, 200), "repetitions": 2}
+
+
+CHECKS: dict[str, Callable[[Study], None]] = {"twoliquids": check_likert, "whichwaslate": check_two_interval}
+
+
+def check_file(file: Path, study: str) -> None:
+    made = read(file.read_bytes(), file.parent)
+    assert made.faults == ()
+    assert made.document["tasks"]["explore"]["max_s"] == 2
+    CHECKS[study](made)
+
+
+def command(folder: Path, *words: str) -> str:
+    """Run a command of the program; return what it prints."""
+    ran = subprocess.run(
+        [sys.executable, "-m", "study_app", *words],
+        cwd=ROOT, env=environment(folder), capture_output=True, text=True, check=False, timeout=LIMIT_S,
+    )  # fmt: skip
+    assert ran.returncode == 0, (words, ran.stdout, ran.stderr)
+    return ran.stdout
+
+
+@pytest.mark.nightly
+@pytest.mark.xvfb
+@needs_servo
+@needs_display
+@pytest.mark.timeout(4 * LIMIT_S)
+@pytest.mark.parametrize("study", STUDIES)
+@pytest.mark.parametrize("user", USERS)
+def test_a_study_is_made_from_the_empty_one_and_run(tmp_path: Path, user: str, study: str) -> None:
+    (tmp_path / "protocols").mkdir()
+    (tmp_path / "results").mkdir()
+    with virtual_display(size=(1366, 768)) as display:
+        ran = subprocess.run(
+            [sys.executable, "-m", "tests.app.designer.support.program", user, study, str(tmp_path)],
+            cwd=ROOT, env=environment(tmp_path) | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb"},
+            capture_output=True, text=True, check=False, timeout=LIMIT_S,
+        )  # fmt: skip
+    assert ran.returncode == 0, ran.stderr
+    assert int(ran.stdout) < 600, "actions"
+    file = tmp_path / "protocols" / f"{study}.toml"
+    check_file(file, study)
+    command(tmp_path, "check", str(file))
+    command(tmp_path, "rehearse", str(file))
+    for folder in (f"{study}-pilot-1", f"{study}-rehearsal-1"):
+        command(tmp_path, "verify", str(tmp_path / "results" / folder))
+    (journal,) = (tmp_path / "results" / f"{study}-pilot-1").glob("data/sub-*/ses-01/journal.jsonl")
+    events = [json.loads(line) for line in journal.read_bytes().splitlines()]
+    assert any(event["event"] == "choice" for event in events)  # a busy machine leaves out trials that it disturbed
+    assert events[-1]["event"] == "session_ended"
+    assert events[-1]["status"] == "completed"
