@@ -46,12 +46,14 @@ class _Cells(QStyledItemDelegate):
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if chip is not None:
-            size = QSize(min(chip_size(chip[2], small=True).width(), int(place.width())), 24)
-            top = place.top() + 1 if below else place.center().y() - 12
-            body = QRectF(place.left(), top, size.width(), 24)
+            width = min(chip_size(chip[2], small=True).width(), int(place.width()))
+            high, top = (20, place.top() + 4) if below else (24, place.center().y() - 12)
+            body = QRectF(place.left(), top, width, high)
             paint_chip(painter, body, theme, *chip, small=True)
             if below:
-                lower = QRectF(place.left() + GAP, body.bottom(), place.width() - GAP, place.bottom() - body.bottom())
+                lower = QRectF(
+                    place.left() + GAP, body.bottom(), place.width() - GAP, place.bottom() - 4 - body.bottom()
+                )
                 _write(painter, lower, font("small"), theme.text2, below)
             painter.restore()
             return
