@@ -5,7 +5,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from study_app.evaluation.non_newtonian_law import non_newtonian_n
-from study_app.haptics.kernels.plant import measure, move, new_handle, push
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.non_newtonian import steady_n
 from study_app.haptics.model.laws import rheology
@@ -15,7 +14,7 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Liquid
 from study_app.haptics.model.steady_state import steady
 from study_app.haptics.runtime.offline import simulate
-from tests.haptics.materials import PRESETS, tank
+from tests.haptics.materials import PRESETS, creep_mps, tank
 from tests.haptics.scenes import COMPILED, UNBENT, Hand, liquid, moving, scene, vectors
 
 pytestmark = pytest.mark.slow
@@ -160,26 +159,6 @@ def test_no_motion_gains_energy(name):
         mean = (velocity + np.concatenate([np.zeros((1, 3)), velocity[:-1]])) / 2
         power_w = (force(tank(name, scale=3.0), velocity) * mean).sum(axis=1)
         assert np.cumsum(power_w).max() * 1e-3 <= 1e-3 * abs(power_w).sum() * 1e-3
-
-
-def creep_mps(name, share, *, noise=0.0, scale=3.0):
-    """Return how fast a free handle of 0.1 kg creeps under a share of the yield force, read in counts.
-
-    ``noise`` is a share of samples that are off by a count.
-    """
-    tank_scene = tank(name, scale=scale)
-    pull_n = share * rheology.yield_n(tank_scene.liquids[0].non_newtonian, D)
-    handle = new_handle(mass_kg=0.1, viscous_nspm=0.5, stiffness_npm=1.0, quantum_m=38e-6, delay=1)
-    hand, random = Hand(tank_scene), np.random.default_rng(0)
-    seen_m, place_m = np.zeros(3), np.zeros((4000, 3))
-    for k in range(4000):
-        aim_m = handle.position_m + np.array([min(k / 500, 1.0) * pull_n, 0.0, 0.0])
-        move(handle, aim_m, aim_m, 1e-3)
-        measure(handle, seen_m)
-        sent = hand.tick(seen_m + 38e-6 * random.integers(-1, 2, 3) * (random.random() < noise))
-        push(handle, *sent.device_force_n)
-        place_m[k] = handle.position_m
-    return abs(place_m[-1, 0] - place_m[2000, 0]) / 2.0
 
 
 @compiled

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from study_app.evaluation.reference_solutions import oscillation, start
 from study_app.evaluation.unsteady_law import unsteady_n
@@ -18,44 +17,18 @@ from study_app.validation.cfd import fits, stored_flows
 from study_app.validation.stability.stability_cases import parse
 from study_app.validation.stability.verdict import judge
 from tests.haptics.scenes import COMPILED, UNBENT, Hand, liquid, moving, scene, vectors
+from tests.haptics.unsteady import (
+    ADDED_M3,
+    FLUIDS,
+    force,
+    highest_gain,
+    random_motion,
+    rotation_error,
+    tank,
+    tick_error,
+)
 
-FLUIDS = {
-    "water": (998.2, 1.0016e-3),
-    "olive oil": (913, 0.084),
-    "gear oil": (890, 0.35),
-    "glycerin": (1261, 1.41),
-    "honey": (1420, 10),
-    "tar": (1150, 100),
-}
-ADDED_M3 = 0.5 * np.pi / 6 * 0.068**3
 compiled = pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")
-
-
-def tank(name, **fields):
-    """Return a scene of one liquid with unsteady drag, at scale 1."""
-    density_kg_m3, viscosity_pa_s = FLUIDS[name]
-    one = liquid(density_kg_m3, viscosity_pa_s=viscosity_pa_s, effects=("unsteady_drag",))
-    return scene(one.model_copy(update=fields), knee=UNBENT, scale=1.0, format=2)
-
-
-def force(felt, velocity_mps, interval_s=1e-3):
-    """Return the force (n, 3) along velocities (n, 3)."""
-    felt = felt.model_copy(update={"rate_hz": 1 / float(np.median(interval_s))})
-    return vectors(simulate(felt, moving(velocity_mps, interval_s)), "force")
-
-
-def random_motion(seed, ticks=3000, rest=300):
-    """Return velocities (n, 3) of strokes, circles and stops that begin at rest, up to about 0.6 m/s."""
-    random = np.random.default_rng(seed)
-    t_s = np.arange(ticks) / 1000
-    waves = [
-        random.normal(size=3)[:, None] * np.sin(2 * np.pi * hertz * t_s + random.uniform(0, 6.3, 3)[:, None]) / hertz
-        for hertz in random.uniform(0.3, 6, 5)
-    ]
-    steps = np.repeat(random.integers(0, 2, ticks // rest + 1), rest)[:ticks].astype(float)
-    smooth = np.convolve(np.concatenate([np.zeros(100), steps]), np.hanning(101) / np.hanning(101).sum())[1 : ticks + 1]
-    smooth[:2] = 0.0
-    return 0.3 * random.uniform(0.05, 1) * (sum(waves) * smooth).T
 
 
 def test_the_exponentials_are_the_kernel_within_1_5_percent_from_1_ms_to_30_s():
@@ -110,22 +83,7 @@ def test_it_equals_its_law_by_the_letter(name, interval_s, within):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_turning_the_motion_turns_the_force(seed):
-    velocity = random_motion(seed, ticks=600 if COMPILED else 60, rest=20) + np.array([0.1, 0.2, 0.05])
-    by = Rotation.random(rng=np.random.default_rng(seed))
-    straight = force(tank("glycerin"), velocity)
-    assert abs(force(tank("glycerin"), by.apply(velocity)) - by.apply(straight)).max() <= 1e-12 * abs(straight).max()
-
-
-def highest_gain(name, seeds):
-    """Return the greatest net work on the hand since rest over ½ m_a v²."""
-    found = 0.0
-    for seed in seeds:
-        velocity = random_motion(seed)
-        mean = (velocity + np.concatenate([np.zeros((1, 3)), velocity[:-1]])) / 2
-        work_j = np.cumsum((force(tank(name), velocity) * mean).sum(axis=1) * 1e-3)
-        top = (velocity**2).sum(axis=1).max()
-        found = max(found, work_j.max() / (0.5 * FLUIDS[name][0] * ADDED_M3 * top)) if top > 0 else found
-    return found
+    assert rotation_error(seed, ticks=600 if COMPILED else 60) <= 1e-12
 
 
 @compiled
@@ -145,15 +103,7 @@ def test_none_of_300_motions_gains_energy(name):
 @pytest.mark.parametrize("name", FLUIDS)
 @pytest.mark.parametrize("tick_ms", [0.25, 0.5, 2, 4])
 def test_ticks_from_a_quarter_to_4_ms_feel_the_same(tick_ms, name):
-    def stroke(interval_s):
-        t_s = np.arange(0, 2, interval_s)
-        return np.outer(np.sin(6 * t_s), [0.3, 0.0, 0.4]), t_s
-
-    (usual, t_s), (other, other_s) = stroke(1e-3), stroke(tick_ms * 1e-3)
-    expected = force(tank(name), usual)
-    found = force(tank(name), other, np.full(len(other), tick_ms * 1e-3))
-    errors = [abs(np.interp(t_s, other_s, found[:, k]) - expected[:, k])[10:-10].max() for k in range(3)]
-    assert max(errors) <= 0.03 * abs(expected).max()
+    assert tick_error(name, tick_ms * 1e-3) <= 0.03
 
 
 @compiled
