@@ -148,7 +148,7 @@ def survey_markdown(found: tuple[Surveyed, ...]) -> str:
             it.model,
             _percent(it.creeping),
             _percent(it.steady),
-            _percent(it.solver) + (f" (Re {least:.2g} to {greatest:.3g})" if it.solver is not None else ""),
+            _percent(it.solver) + (f" (Re {_range(least, greatest)})" if it.solver is not None else ""),
             f"{checked_mps:.2g} m/s" if it.model == "unsteady drag" else "–",
             _percent(spread(it.reynolds)),
             _percent(it.expected.known_velocity_share),
@@ -184,6 +184,10 @@ def _measured(reynolds: float) -> float:
     """Return C_d Re/24 by experiment."""
     liquid = Liquid(id="any", density_kg_m3=1.0, viscosity_pa_s=1.0)
     return float(measured_drag_n(liquid, 1.0, np.array([reynolds]))[0]) / (3 * math.pi * reynolds)
+
+
+def _range(least: float, greatest: float) -> str:
+    return " to ".join(dict.fromkeys(f"{it:.2g}" if it < 10 else f"{it:.0f}" for it in (least, greatest)))
 
 
 def _percent(share: float | None) -> str:
