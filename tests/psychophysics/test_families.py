@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from study_app.psychophysics.families import level_at, position, rise, success
+from study_app.psychophysics.families import KAPPA, level_at, position, rise, success
 
 FAMILIES = ("weibull", "normal", "logistic")
 
@@ -46,3 +46,18 @@ def test_a_linear_observer_is_a_weibull_of_a_known_width():
     )
     assert 10.0**threshold == pytest.approx(w75, rel=0.024)
     assert 1.4 <= width <= 1.7
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_forward_and_inverse_agree_to_rounding_and_are_those_of_scipy(family):
+    from scipy import stats
+
+    shares = np.linspace(0.001, 0.999, 201)
+    x = np.array([position(family, float(share)) for share in shares])
+    assert rise(family, -0.7 + 1.3 * x, -0.7, 1.3) == pytest.approx(shares, abs=1e-12)
+    theirs = {
+        "weibull": stats.weibull_min.cdf(10 ** (KAPPA * x), 1, scale=1 / math.log(2)),
+        "normal": stats.norm.cdf(2 * stats.norm.ppf(0.95) * x),
+        "logistic": stats.logistic.cdf(2 * math.log(19) * x),
+    }
+    assert theirs[family] == pytest.approx(shares, abs=1e-12)

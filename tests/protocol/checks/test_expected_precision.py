@@ -43,6 +43,17 @@ def test_estimates_are_unbiased_and_as_precise_as_measured():
     assert 0.93 <= ((found.lows < truth) & (truth < found.highs)).mean() <= 0.99
 
 
+@pytest.mark.nightly
+@pytest.mark.slow
+@pytest.mark.parametrize("trials", [40, 80, 160])
+def test_intervals_of_1000_observers_cover_their_thresholds(trials):
+    plan, rng = plan_of(study(f'kind = "questplus", trials = {trials}')), np.random.default_rng(trials)
+    truth = math.log10(0.2) + math.log10(1.2) * rng.standard_normal(1000)
+    found = plan.simulate(truth, rng)
+    assert 0.93 <= ((found.lows < truth) & (truth < found.highs)).mean() <= 0.99
+    assert abs((found.medians - truth).mean() * math.log(10)) <= 0.05
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ['kind = "questplus"', 'kind = "updown"', 'kind = "constant"'])
 @pytest.mark.parametrize("design", ["2ifc", "4ifc", "yesno"])
