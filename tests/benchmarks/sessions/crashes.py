@@ -2,8 +2,9 @@
 
 Run it by itself: ``python tests/benchmarks/sessions/crashes.py [SESSIONS] [MINUTES]`` (defaults: 1000, 60). It starts
 `run` with the scripted device, ends the session at its first page, and closes the windows; it stops after SESSIONS or
-MINUTES, whichever comes first. A process that a signal ended counts as a crash. Printed are the counts and the upper
-bound of the one-sided 95 % interval (Clopper & Pearson 1934; without a crash about 3 / sessions).
+MINUTES, whichever comes first. A process that a signal ended counts as a crash. Printed, every 25 sessions and at the
+end, are the counts and the upper bound of the one-sided 95 % interval (Clopper & Pearson 1934; without a crash about
+3 / sessions).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from scipy.stats import beta
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 PATIENCE_S = 600.0
+EVERY = 25
 
 
 def main(sessions: int = 1000, minutes: float = 60.0) -> None:
@@ -27,6 +29,8 @@ def main(sessions: int = 1000, minutes: float = 60.0) -> None:
     crashes = failures = done = 0
     ends_at = time.monotonic() + 60.0 * minutes
     while done < sessions and time.monotonic() < ends_at:
+        if done and done % EVERY == 0:
+            report(done, crashes, failures)
         with tempfile.TemporaryDirectory() as folder:
             command = [sys.executable, "-X", "faulthandler", __file__, "--one", folder]
             own = {"LIQUID_STUDY_CONFIG": str(Path(folder, "settings")), "LIQUID_STUDY_WORKSPACE": folder}
@@ -47,8 +51,14 @@ def main(sessions: int = 1000, minutes: float = 60.0) -> None:
             print(f"session {done}: {kind}, exit code {ended.returncode}\n{ended.stdout}{ended.stderr}", flush=True)
             for trace in Path(folder).rglob("crash.txt"):
                 print(trace.read_text(), flush=True)
+    report(done, crashes, failures)
+
+
+def report(done: int, crashes: int, failures: int) -> None:
+    """Print the counts and the upper bound of the crash rate."""
     bound = float(beta.ppf(0.95, crashes + 1, done - crashes)) if crashes < done else 1.0
-    print(f"{done} sessions: {crashes} crashes, {failures} other failures; crash rate at most {bound:.2%} (95 %)")
+    counts = f"{done} sessions: {crashes} crashes, {failures} other failures"
+    print(f"{counts}; crash rate at most {bound:.2%} (95 %)", flush=True)
 
 
 def run_one(folder: str) -> int:
