@@ -53,7 +53,7 @@ def test_every_table_is_one_that_renders() -> None:
         "| `simulated` | true, false | true if participant and device were simulated (a rehearsal). |",
         "| `force_peak_n` | number [N], or n/a | Largest magnitude of the force sent to the device. **Sealed until "
         "unblinding.** |",
-        "| `page_left` | `page` | The participant left it. |",
+        "| `page_shown` | `page` | A page of text was shown. |",
         "| `due_ns` | whole number [ns] | Time when the tick was due; its lateness is time_ns - due_ns. |",
     ],
 )
