@@ -19,6 +19,9 @@ RECORDED: dict[str, dict[str, str]] = json.loads((Path(__file__).parent / "forma
 UNEQUAL = ("at", "previous", "version", "sha256", "frames_sha256")
 """Fields of the journal that differ from run to run or with the program's version."""
 
+ADDED = ("text_sha256", "study_version")
+"""Fields that later versions write besides: of the consent that the participant read."""
+
 WALL_CLOCK = {column.name for columns in TABLES.values() for column in columns if column.kind == "time"}
 
 
@@ -29,7 +32,7 @@ def sha256(content: object) -> str:
 def journal(path: Path) -> list[dict[str, object]]:
     """Return the lines without what differs from run to run; the recorder writes its own lines whenever it is done."""
     lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    kept = [{name: value for name, value in line.items() if name not in UNEQUAL} for line in lines]
+    kept = [{name: value for name, value in line.items() if name not in UNEQUAL + ADDED} for line in lines]
     told = [line for line in kept if line["event"] != "recorded"]
     recorded = [{**line, "t_s": None} for line in kept if line["event"] == "recorded"]
     recorded.sort(key=lambda line: (line["trial"], line["attempt"]))

@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.passivity import DELIVERY_STEPS_PER_N
 from study_app.haptics.kernels.sample_validation import FAULT_NS
 from study_app.haptics.model.layout import (
     BUTTON_STOP,
@@ -168,7 +169,10 @@ def _look_at_force(counts: Any, sample: Any) -> None:
         _break_promise(counts, sample)
     hung = sample.busy_ns >= FAULT_NS and sample.status == STATUS_OK
     stopped = hung or sample.limiters & LIMITER_STOP != 0 or sample.status == STATUS_STALE_FAULT
-    if stopped and size_n != 0.0:
+    kept_n = (
+        1.0 / DELIVERY_STEPS_PER_N if hung else 0.0
+    )  # a sample keeps a command that rounds to the zero sent after it
+    if stopped and size_n > kept_n:
         counts.unstopped += 1
         _break_promise(counts, sample)
     if counts.follows == 0:

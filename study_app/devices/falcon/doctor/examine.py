@@ -17,7 +17,7 @@ import numpy as np
 
 from study_app.devices.doctor_report import Report
 from study_app.devices.falcon.device import FalconDevice
-from study_app.devices.falcon.doctor.failure_report import report
+from study_app.devices.falcon.doctor.failure_report import findings_of
 from study_app.devices.falcon.emulated import EmulatedFalcon, new_emulator
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.facts import ALL_HOMED, OPEN, Facts
@@ -52,7 +52,8 @@ def examine_device(
 ) -> Report:
     """Look a Falcon over as its `Doctor` does; see `examine`."""
     firmware = options.get("firmware")
-    return report(examine(name, firmware=None if firmware is None else Path(firmware), faults=faults, tell=progress))
+    found = examine(name, firmware=None if firmware is None else Path(firmware), faults=faults, tell=progress)
+    return Report(found.seen, findings_of(found.facts), found.failure)
 
 
 def examine(

@@ -5,21 +5,13 @@ Loads neither the compiler nor a driver, and goes from one process to another as
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from study_app.devices.doctor_report import Finding, Report
+from study_app.devices.doctor_report import Finding
 from study_app.devices.falcon.facts import Facts, Mode
 from study_app.devices.falcon.failure_modes import MODES
 
-if TYPE_CHECKING:
-    from study_app.devices.falcon.doctor.examine import Examined
-
 _NOTHING_SEEN: Final = Facts()
-
-
-def report(examined: Examined) -> Report:
-    """Return what an examination shows, mode for mode."""
-    return Report(examined.seen, findings_of(examined.facts), examined.failure)
 
 
 def findings_of(facts: Facts = _NOTHING_SEEN) -> tuple[Finding, ...]:

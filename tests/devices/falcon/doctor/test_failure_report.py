@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from study_app.devices.doctor_report import NOTHING_WRONG, lines
-from study_app.devices.falcon.doctor.failure_report import report
+from study_app.devices.doctor_report import NOTHING_WRONG, Report, lines
+from study_app.devices.falcon.doctor.failure_report import findings_of
 from study_app.devices.falcon.facts import OPEN, Facts
 from study_app.devices.falcon.failure_modes import MODES
 
@@ -37,6 +37,10 @@ WELL = Facts(
     rate_hz=1000.0,
     step_n=0.01,
 )
+
+
+def report(seen: Seen) -> Report:
+    return Report(seen.seen, findings_of(seen.facts), seen.failure)
 
 
 def test_nothing_looked_at_is_not_called_well_mode_for_mode():
