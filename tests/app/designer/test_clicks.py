@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLineEdit
 from shiboken6 import isValid
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
@@ -61,3 +61,20 @@ def test_arrow_keys_walk_the_whole_outline_of_the_empty_study(qtbot: Any, design
     designer.editing.select(("limits",))
     designer.editing.ask(SetValue(("limits", "lateness_ms"), 3))
     assert designer.editing.opened.study.document["limits"] == {"lateness_ms": 3}
+
+
+def test_a_field_that_is_clicked_after_an_id_was_typed_keeps_the_keyboard(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("liquids", "thick"))
+    name = designer.place.form.head.id
+    qtbot.mouseClick(name, LEFT)
+    name.selectAll()
+    qtbot.keyClicks(name, "honey")
+    (density,) = designer.row("liquids", "thick", "density_kg_m3").findChildren(QLineEdit)
+    qtbot.mouseClick(density, LEFT)
+    qtbot.waitUntil(lambda: "[liquids.honey]" in designer.text)
+    field = QApplication.focusWidget()
+    assert designer.row("liquids", "honey", "density_kg_m3").isAncestorOf(field)
+    field.selectAll()
+    qtbot.keyClicks(field, "1402")
+    qtbot.waitUntil(lambda: "1402" in designer.text)

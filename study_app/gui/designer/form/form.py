@@ -80,15 +80,18 @@ class FormCard(Card):
             for widget, row in zip(self.rows, form.rows, strict=True):
                 widget.show_row(row)
         else:
-            self._make(form, stays=before is not None and before.path == form.path)
+            self._make(form, before)
         self.show_help()
 
-    def _make(self, form: Form, *, stays: bool) -> None:
+    def _make(self, form: Form, before: Form | None) -> None:
+        stays = before is not None and before.path == form.path
         keyboard = QApplication.focusWidget()
         held = next((row for row in self.rows if keyboard is not None and row.isAncestorOf(keyboard)), None)
         if held is None and self.isAncestorOf(self.focusWidget()):
             held = self._focused
-        focused = None if held is None else held.row.row.path
+        focused = None
+        if held is not None and before is not None and len(before.path) == len(form.path):  # also of a renamed element
+            focused = (*form.path, *held.row.row.path[len(before.path) :])
         scrolled = self.area.verticalScrollBar().value() if stays else 0
         self._focused = None
         self.flush()
@@ -138,7 +141,7 @@ class FormCard(Card):
         if old is not None:
             take_away(old)
         QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(scrolled))
-        if focused is not None and stays:
+        if focused is not None:
             self.focus(focused)
 
     def _others(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...]) -> QuestionRows:
