@@ -86,7 +86,7 @@ class Found:
 def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
     """Return for each block of thresholds, d′ or exponents the plan for each number of trials.
 
-    No number given: the protocol's.
+    Without numbers it is the protocol's.
 
     Raises
     ------

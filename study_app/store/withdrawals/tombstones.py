@@ -11,7 +11,7 @@ from typing import Any
 from study_app.errors import StoreError
 from study_app.store.atomic import append_line, cannot_read, open_regular, read_regular
 from study_app.store.checksums import read_checksums, sha256
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
 from study_app.store.journals.parsing import parse_json
 from study_app.store.verification.fingerprints import fingerprint
 
@@ -103,7 +103,8 @@ def _tombstone(path: Path, number: int, line: bytes) -> Tombstone:
         sessions = tuple(ErasedSession(**one) for one in held.pop("sessions"))
         made = Tombstone(**held, sessions=sessions)
         texts = (made.participant, made.at, made.by, made.reason, *(one.fingerprint for one in sessions))
-        if all(isinstance(text, str) for text in texts) and all(isinstance(one.session, int) for one in sessions):
+        typed = all(isinstance(text, str) for text in texts) and all(isinstance(one.session, int) for one in sessions)
+        if typed and ID_PATTERN.fullmatch(made.participant):
             return made
     except (ValueError, KeyError, TypeError, AttributeError):
         pass

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Final
@@ -61,7 +61,7 @@ class Withdrawn:
     folders: tuple[Path, ...]
     outputs: tuple[Path, ...]
     elsewhere: tuple[Output, ...]
-    left: tuple[str, ...] = field(default=())
+    left: tuple[str, ...]
 
 
 def withdraw(
@@ -135,18 +135,14 @@ def _copies(study: StudyFolder, also: Iterable[Path]) -> list[StudyFolder]:
 
 
 def _tombstone(study: StudyFolder, participant: str, at: str, by: str, reason: str) -> Tombstone:
-    """Return the participant's tombstone, written now if there is none yet."""
+    """Return the participant's tombstone; a new one is not written yet."""
     if (known := tombstones(study).get(participant)) is not None:
         return known
     sessions = _sessions(study, participant)
     if not sessions:
         held = ", ".join(study.ids()) or "none"
         raise StoreError(f"{study.path} has no participant {participant!r}; participants: {held}")
-    for session in sessions:
-        refuse_if_open(session.path)
-    made = Tombstone(participant, at, by, reason, tuple(map(describe_session, sessions)))
-    bury(study, made)
-    return made
+    return Tombstone(participant, at, by, reason, tuple(map(describe_session, sessions)))
 
 
 def _sessions(study: StudyFolder, participant: str) -> list[SessionFolder]:
@@ -164,7 +160,7 @@ def _others(copy: StudyFolder, tombstone: Tombstone) -> list[Path]:
 
 
 def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
-    """Erase a participant's folder and rows from a study folder; return whether anything was there."""
+    """Write the tombstone, then erase folder and rows of a participant; return whether anything was there."""
     participant = tombstone.participant
     sessions = _sessions(study, participant)
     for session in sessions:

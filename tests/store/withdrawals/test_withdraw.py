@@ -215,6 +215,17 @@ def test_bad_input_erases_nothing(
     assert contents(study) == before
 
 
+def test_a_forged_tombstone_leads_out_of_no_folder(study: Path) -> None:
+    erase(study)
+    kept = study / "data" / "sub-P001" / "ses-01"
+    line = (study / "withdrawals.jsonl").read_text()
+    (study / "withdrawals.jsonl").write_text(line.replace(f'"{PERSON}"', '"P001/ses-01"'))
+    with pytest.raises(StoreError, match=r"withdrawals.jsonl, line 1 is not a withdrawal"):
+        withdraw(study, "P001/ses-01", by="AK", reason="forged")
+    assert (kept / "journal.jsonl").is_file()
+    assert not verify(study).sound
+
+
 def test_a_running_session_is_not_erased(study: Path) -> None:
     opening = open_alone(study / "data" / f"sub-{PERSON}" / "ses-01")
     before = contents(study)
