@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 from shiboken6 import isValid
 
@@ -78,3 +79,25 @@ def test_a_field_that_is_clicked_after_an_id_was_typed_keeps_the_keyboard(qtbot:
     field.selectAll()
     qtbot.keyClicks(field, "1402")
     qtbot.waitUntil(lambda: "1402" in designer.text)
+
+
+def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_typed(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("liquids", "thick"))
+    name = designer.place.form.head.id
+    qtbot.mouseClick(name, LEFT)
+    name.selectAll()
+    qtbot.keyClicks(name, "honey")
+    (density,) = designer.row("liquids", "thick", "density_kg_m3").findChildren(QLineEdit)
+    at = density.mapTo(designer.window, density.rect().center())
+    QTest.mouseClick(designer.window.windowHandle(), LEFT, pos=at)
+    qtbot.waitUntil(lambda: "[liquids.honey]" in designer.text)
+    QTest.mouseDClick(designer.window.windowHandle(), LEFT, pos=at)
+    QTest.mouseClick(designer.window.windowHandle(), LEFT, pos=at)
+    assert QApplication.focusWidget() is density, "the form was made anew under the click"
+    assert density.selectedText() == density.text()
+    qtbot.keyClicks(density, "1402")
+    qtbot.waitUntil(lambda: "density_kg_m3 = 1402" in designer.text)
+    qtbot.mouseClick(next(one for one in designer.place.form.adds if one.isVisible()), LEFT)
+    assert designer.editing.opened.study.document["liquids"]["honey"]["density_kg_m3"] == 1402
+    assert "thick" not in designer.editing.opened.study.document["liquids"]

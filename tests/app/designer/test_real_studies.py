@@ -18,10 +18,6 @@ from tests.real_windows import needs_display, virtual_display
 
 ROOT = Path(__file__).resolve().parents[3]
 LIMIT_S = 900.0
-LOST_CLICK = pytest.mark.xfail(
-    strict=False,
-    reason="a number that is typed by mouse right after an id is lost: the renamed form moves under the click",
-)
 
 
 def check_likert(study: Study) -> None:
@@ -73,14 +69,8 @@ def command(folder: Path, *words: str) -> str:
 @needs_servo
 @needs_display
 @pytest.mark.timeout(4 * LIMIT_S)
-@pytest.mark.parametrize(
-    ("user", "study"),
-    [
-        pytest.param(user, study, marks=LOST_CLICK if (user, study) == ("mouse", "twoliquids") else ())
-        for user in USERS
-        for study in STUDIES
-    ],
-)
+@pytest.mark.parametrize("user", USERS)
+@pytest.mark.parametrize("study", STUDIES)
 def test_a_study_is_made_from_the_empty_one_and_run(tmp_path: Path, user: str, study: str) -> None:
     (tmp_path / "protocols").mkdir()
     (tmp_path / "results").mkdir()

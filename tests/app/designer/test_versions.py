@@ -318,6 +318,9 @@ def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(d
     qtbot.keyClicks(head.id, "goodbye")
     qtbot.keyClick(head.id, Qt.Key.Key_Return)
     assert "[pages.goodbye]" in designer.text
+    assert designer.place.prompt is None  # what is typed next must not go to a card
+    assert head.comments.text() == "1 comment mentions “thanks”"
+    click(qtbot, head.comments)
     card = designer.place.prompt
     lines = [line.accessibleName() for line in card.lines]
     count = len(designer.text.splitlines())
@@ -325,6 +328,8 @@ def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(d
     click(qtbot, card.lines[0])
     assert designer.place.file.editor.textCursor().blockNumber() == count - 1
     assert designer.text.endswith("# The pages thanks and thanks_2 are short.\n")
+    designer.editing.select(("pages", "welcome"))
+    assert not head.comments.isVisible()
 
 
 def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from PySide6.QtCore import QObject
 
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.versions.known_runs import KnownRuns
-from study_app.authoring.writer.comments import comments_naming
-from study_app.gui.designer.versions.rename_cards import CommentsCard, UnlockCard
+from study_app.authoring.writer.comments import Comment, comments_naming
+from study_app.gui.designer.versions.rename_cards import CommentsCard, UnlockCard, title_of
 from study_app.gui.designer.view import DesignerPlace
 from study_app.protocol.source.document import Path, value_at
 from study_app.viewmodels.designer.requests import RenameElement, Request
@@ -23,7 +23,7 @@ BREAKS: Final = (
 
 
 class Renaming(QObject):
-    """Locks the ids of questions with recorded answers, and lists comments after a rename.
+    """Locks the ids of questions with recorded answers, and offers the comments that mention the old id after a rename.
 
     It notes a rename before `Editing` makes it: construct it before requests are connected to that.
     """
@@ -33,11 +33,13 @@ class Renaming(QObject):
         self.editing, self.place, self.runs = editing, place, runs
         self._unlocked: Path = ()
         self._renamed: tuple[Path, str] | None = None
+        self._listed: tuple[Path, str, tuple[Comment, ...]] = ((), "", ())
         place.asked.connect(self._note)
         editing.changed.connect(self._lock)
-        editing.edited.connect(self._list_comments)
+        editing.edited.connect(self._find_comments)
         runs.changed.connect(self._lock)
         place.form.head.unlock_asked.connect(self._explain)
+        place.form.head.comments_asked.connect(self._list_comments)
 
     def _id(self, path: Path) -> str:
         """Return the id of an element, "" where it has none."""
@@ -58,6 +60,9 @@ class Renaming(QObject):
         path = self.editing.selected
         if path != self._unlocked:
             self._unlocked = ()
+        if path != self._listed[0]:
+            self._listed = ((), "", ())
+            self.place.form.head.show_comments("")
         self.place.form.head.show_lock(path, self._why(path))
 
     def _explain(self) -> None:
@@ -74,16 +79,20 @@ class Renaming(QObject):
     def _note(self, asked: Request) -> None:
         self._renamed = (asked.path, self._id(asked.path)) if isinstance(asked, RenameElement) else None
 
-    def _list_comments(self) -> None:
+    def _find_comments(self) -> None:
         renamed, self._renamed = self._renamed, None
         opened = self.editing.opened
         if renamed is None or opened is None:
             return
         found = comments_naming(opened.study.text, renamed[1])
         if found:
-            card = CommentsCard(renamed[1], found)
-            card.line_asked.connect(self._go_to)
-            self.place.show_prompt(card, card.first)
+            self._listed = (self.editing.selected, renamed[1], found)
+            self.place.form.head.show_comments(title_of(renamed[1], found))
+
+    def _list_comments(self) -> None:
+        card = CommentsCard(*self._listed[1:])
+        card.line_asked.connect(self._go_to)
+        self.place.show_prompt(card, card.first)
 
     def _go_to(self, line: int) -> None:
         self.place.show_tab("file")

@@ -22,10 +22,12 @@ from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form_rows import Form, FormRow, Section
 from study_app.viewmodels.designer.problem_rows import ProblemRow
-from study_app.viewmodels.designer.requests import AddKey, RemoveKey
+from study_app.viewmodels.designer.requests import AddKey, RemoveKey, RenameElement
 from study_app.viewmodels.designer.special.questions import QuestionLine
 
 ACROSS = 2
+BELOW = 2
+"""Where the keys of an element begin in a path, after its section and its id."""
 
 
 class FormCard(Card):
@@ -50,9 +52,10 @@ class FormCard(Card):
         self.others: list[QuestionRow] = []
         self.adds: list[QWidget] = []
         self._focused: RowWidget | None = None
+        self._renamed: tuple[str | int, ...] = ()
         self._chosen: tuple[tuple[str | int, ...], tuple[int, ...]] | None = None
         self.head = FormHead()
-        self.head.asked.connect(self.asked)
+        self.head.asked.connect(self._ask_by_head)
         self.own = label("", "label", "bad", wraps=True)
         self.inside = QWidget()
         self.sections = QVBoxLayout(self.inside)
@@ -69,13 +72,20 @@ class FormCard(Card):
         self.column.addWidget(self.area, 1)
         self.column.addWidget(self.foot)
 
+    def _ask_by_head(self, asked: object) -> None:
+        """Ask for a step; the form of an element that it renames keeps its editors."""
+        self._renamed = (*asked.path[:-1], asked.name) if isinstance(asked, RenameElement) else ()
+        self.asked.emit(asked)
+        self._renamed = ()
+
     def show_form(self, form: Form, *, read_only: bool) -> None:
         """Show a form: in place where its rows stay the same, else anew."""
         before, self.form, self.read_only = self.form, form, read_only
         self.head.show_form(form, read_only=read_only)
         self.own.setText("\n".join(form.faults))
         self.own.setVisible(bool(form.faults))
-        same = before is not None and before.path == form.path and _shape(before) == _shape(form)
+        stays = before is not None and form.path in {before.path, self._renamed}
+        same = before is not None and stays and _shape(before) == _shape(form)
         if same and [row.key for row in self.rows] == [structure_of(row) for row in form.rows]:
             for widget, row in zip(self.rows, form.rows, strict=True):
                 widget.show_row(row)
@@ -129,7 +139,9 @@ class FormCard(Card):
                 for at, absent in enumerate(section.absent):
                     made = add_button(f"Add {absent.label}", absent.label)
                     made.setToolTip(absent.help)
-                    made.clicked.connect(lambda _checked=False, path=absent.path: self.asked.emit(AddKey(path)))
+                    made.clicked.connect(
+                        lambda _checked=False, path=absent.path: self.asked.emit(AddKey(self._now(path)))
+                    )
                     grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
                     self.adds.append(made)
                 sections.addLayout(grid)
@@ -143,6 +155,10 @@ class FormCard(Card):
         QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(scrolled))
         if focused is not None:
             self.focus(focused)
+
+    def _now(self, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
+        """Return the path of a part of the element, which may have been renamed since its editor was made."""
+        return path if self.form is None else (*self.form.path, *path[len(self.form.path) :])
 
     def _others(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...]) -> QuestionRows:
         made = QuestionRows(lines, languages)
@@ -167,7 +183,7 @@ class FormCard(Card):
         heading.addStretch()
         if removable:
             away = IconButton("cross", f"Remove {section.title} from the file", size=FIELD_PX, role="plain")
-            away.clicked.connect(lambda: self.asked.emit(RemoveKey(section.path)))
+            away.clicked.connect(lambda: self.asked.emit(RemoveKey(self._now(section.path))))
             away.setEnabled(not self.read_only)
             heading.addWidget(away)
         return heading
@@ -181,7 +197,7 @@ class FormCard(Card):
         made.field.join_asked.connect(self.join_asked)
         made.field.copy_asked.connect(self.copy_asked)
         if isinstance(made.field, EntryList):
-            made.field.changes.connect(lambda asked, after: self._change_entries(row.row.path, asked, after))
+            made.field.changes.connect(lambda asked, after: self._change_entries(made.row.row.path, asked, after))
             if self._chosen is not None and self._chosen[0] == row.row.path:
                 made.field.choose(self._chosen[1])
         made.field.came.connect(lambda: self._come(made))
@@ -269,5 +285,8 @@ def _shape(form: Form) -> object:
     return (
         others,
         form.questions.languages,
-        [(one.path, one.title, tuple(row.path for row in one.absent), one.faults) for one in form.sections],
+        [
+            (one.path[BELOW:], one.title, tuple(row.path[BELOW:] for row in one.absent), one.faults)
+            for one in form.sections
+        ],
     )

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.typed_fields import TypedLine
+from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
@@ -40,13 +41,15 @@ class Tile(Themed, QWidget):
 class FormHead(QWidget):
     """Signals: ``asked`` (a request), ``feel_asked`` (path), ``id_typed`` (path, text so far).
 
-    ``unlock_asked`` is emitted where a locked id is to be changed. What ``up``, ``down``, ``copy`` and ``delete`` do is
+    ``unlock_asked`` is emitted where a locked id is to be changed, ``comments_asked`` where the comments are to be seen
+    that mention the id before. What ``up``, ``down``, ``copy`` and ``delete`` do is
     done to every selected element.
     """
 
     asked = Signal(object)
     id_typed = Signal(object, str)
     unlock_asked = Signal()
+    comments_asked = Signal()
     feel_asked = Signal(object)
 
     def __init__(self) -> None:
@@ -64,6 +67,10 @@ class FormHead(QWidget):
         self.unlock.setProperty("dense", "true")
         self.unlock.setFont(font("label"))
         self.unlock.hide()
+        self.comments = ActionButton("", "Comments", role="plain", height=34)
+        self.comments.setProperty("dense", "true")
+        self.comments.setFont(font("label"))
+        self.comments.hide()
         self._lock: tuple[object, str] = ((), "")
         self._read_only = False
         self.refusal = label("", "label", "bad", wraps=True)
@@ -97,6 +104,7 @@ class FormHead(QWidget):
         line.addWidget(words_of_id)
         line.addWidget(self.id, 8)
         line.addWidget(self.unlock)
+        line.addWidget(self.comments)
         line.addStretch(1)
         grid.addWidget(self.id_line, 1, 0, 1, 7)
         grid.addWidget(self.refusal, 2, 0, 1, 7)
@@ -104,6 +112,7 @@ class FormHead(QWidget):
         self.id.typed.connect(self._rename)
         self.id.textEdited.connect(self._type_id)
         self.unlock.clicked.connect(self.unlock_asked)
+        self.comments.clicked.connect(self.comments_asked)
         self.feel.clicked.connect(self._ask_to_feel)
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
@@ -143,6 +152,13 @@ class FormHead(QWidget):
         """Lock the id of the element at ``path``, or with "" unlock it."""
         self._lock = (path, why)
         self._apply_lock()
+
+    def show_comments(self, words: str) -> None:
+        """Offer the comments that mention the id before, with "" none; nothing moves and the keyboard stays."""
+        if words and words != self.comments.text():
+            say(self, words)
+        self.comments.setText(words or "Comments")
+        self.comments.setVisible(bool(words))
 
     def _apply_lock(self) -> None:
         path, why = self._lock

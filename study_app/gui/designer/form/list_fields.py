@@ -56,7 +56,7 @@ class EntriesField(EntryList):
                     to = at - 1 if by < 0 else at + 2
                     button.clicked.connect(lambda _checked=False, at=at, to=to: self.move_entries((at,), to))
             opens = shown.button("arrow_right", f"Open {entry.title}")
-            opens.clicked.connect(lambda _checked=False, path=entry.path: self.open_asked.emit(path))
+            opens.clicked.connect(lambda _checked=False, at=at: self.open_asked.emit(self.place(at)))
             if kind != "tables":
                 away = shown.button("cross", f"Remove {entry.title} from {row.row.label}")
                 away.clicked.connect(lambda _checked=False, at=at: self.remove((at,)))
@@ -235,4 +235,5 @@ def structure(row: FormRow) -> object:
     count = len(row.row.value) if isinstance(row.row.value, tuple) and (row.row.kind, inner) != ("", "") else 0
     counted = count if row.row.kind in {"texts", "points"} or inner in {"texts", "points"} else 0
     choices = tuple(choice.value for choice in row.row.choices) if row.row.kind != "reference" else ()
-    return row.row.path, row.row.kind, inner, counted, choices, row.languages, row.entries, row.removable, row.instead
+    within = (row.row.path[:1], row.row.path[2:])  # a renamed element keeps its editors
+    return within, row.row.kind, inner, counted, choices, row.languages, row.entries, row.removable, row.instead

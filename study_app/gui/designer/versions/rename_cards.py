@@ -32,8 +32,9 @@ class CommentsCard(Prompt):
     line_asked = Signal(int)
 
     def __init__(self, name: str, comments: Sequence[tuple[int, str]]) -> None:
-        count = "1 comment mentions" if len(comments) == 1 else f"{len(comments)} comments mention"
-        super().__init__(f"{count} “{name}”", "A rename changes no comment. Correct them in the file where needed.")
+        super().__init__(
+            title_of(name, comments), "A rename changes no comment. Correct them in the file where needed."
+        )
         inside = QWidget()
         column = QVBoxLayout(inside)
         column.setContentsMargins(0, 0, 0, 0)
@@ -57,6 +58,12 @@ class CommentsCard(Prompt):
         self.cancel.setText("Close")
         self.column.addLayout(self.buttons)
         self.first: QWidget = self.cancel
+
+
+def title_of(name: str, comments: Sequence[tuple[int, str]]) -> str:
+    """Return how many comments mention a name."""
+    count = "1 comment mentions" if len(comments) == 1 else f"{len(comments)} comments mention"
+    return f"{count} “{name}”"
 
 
 def _cut(text: str) -> str:
