@@ -42,6 +42,11 @@ class Designer:
         self.window.activateWindow()
         self.window.go("designer")
 
+    def select(self, path: tuple[str | int, ...]) -> None:
+        """Select an element, and let the participant's page follow."""
+        self.editing.select(path)
+        QApplication.processEvents()
+
     def row(self, *path: str | int) -> Any:
         """The form's row of a place."""
         return next(row for row in self.place.form.rows if row.row.row.path == path)

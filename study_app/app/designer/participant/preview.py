@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from typing import Any, Final
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtGui import QKeySequence, QShortcut
 
 from study_app.app.designer.editing import Editing
@@ -72,8 +72,12 @@ class ParticipantPreview(QObject):
         self._ball_of: object = None
         self._since_s = 0.0
         self._photodiode = True
+        self._after_form = QTimer(self)  # of another selection the form is painted first
+        self._after_form.setSingleShot(True)
+        self._after_form.timeout.connect(self._follow)
         editing.opened_other.connect(self._begin)
-        editing.changed.connect(self._follow)
+        editing.changed.connect(self._after_form.start)
+        editing.edited.connect(self._follow)
         place.entered.connect(self._look_at_screen)
         tab = self.tab
         tab.shown.connect(self._follow)
@@ -157,7 +161,7 @@ class ParticipantPreview(QObject):
         self._found = self._moment = self._protocol = self._study = None
         self._selected, self._sound, self._answers, self._language = (), {}, {}, ""
         self._side = "questions"
-        self._follow()
+        self._after_form.start()
 
     def _look_at_screen(self) -> None:
         """Offer this machine's participant screen; it may have been set elsewhere meanwhile."""
@@ -170,6 +174,7 @@ class ParticipantPreview(QObject):
         self.tab.offer_screens((*SIZES, own))
 
     def _follow(self) -> None:
+        self._after_form.stop()
         if self.editing.opened is not None and self.tab.isVisible():
             self._show()
 

@@ -29,7 +29,7 @@ ITEM = ("questionnaires", "liquid", "items", 1)
 def live(designer: Any) -> Any:
     """The live page of the open study, with the question "Like honey" selected."""
     designer.controller.open("kitchen")
-    designer.editing.select(ITEM)
+    designer.select(ITEM)
     QApplication.processEvents()
     return designer.controller.preview.tab.page
 
@@ -62,11 +62,11 @@ def test_the_page_is_that_of_the_selected_element(designer: Any, live: Any) -> N
         (("blocks", "delays"), QuestionnairePage, "Delays, trial 1 of 2"),
         (("tasks", "explore"), TaskPage, "Liquids, trial 1 of 2"),
     ):
-        designer.editing.select(path)
+        designer.select(path)
         assert isinstance(live.page_window.page, kind)
         assert tab.view.step == step
     for liquid in ("thin", "thick"):
-        designer.editing.select(("liquids", liquid))
+        designer.select(("liquids", liquid))
         assert isinstance(live.page_window.page, TaskPage)
         found = preview._found
         trial = found.shown.schedule.steps[found.index]
@@ -140,17 +140,17 @@ def test_a_study_that_was_never_sound_shows_what_is_sound(designer: Any) -> None
         designer.file.read_text().replace('task = "reach"', 'task = "nothing"').replace("dwell_s", "dwel_s")
     )
     designer.controller.open("kitchen")
-    designer.editing.select(ITEM)
+    designer.select(ITEM)
     live = designer.controller.preview.tab.page
     assert [item.id for item in live.page_window.page.items].count("like_honey") == 1
-    designer.editing.select(("tasks", "reach"))
+    designer.select(("tasks", "reach"))
     assert "cannot be shown" in designer.controller.preview.tab.view.note
 
 
 def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live: Any) -> None:
     frames: list[None] = []
     live.frame_due.connect(lambda: frames.append(None))
-    designer.editing.select(("liquids", "thick"))
+    designer.select(("liquids", "thick"))
     qtbot.waitUntil(lambda: len(frames) > 2)
     places = {tuple(live.page_window.tank.view.position_m)}
     qtbot.waitUntil(lambda: tuple(live.page_window.tank.view.position_m) not in places)
@@ -160,7 +160,7 @@ def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live:
     qtbot.wait(120)
     assert not frames
     assert not live.page_window.isVisible()
-    designer.editing.select(("pages", "thanks"))
+    designer.select(("pages", "thanks"))
     designer.place.pane.show_tab("participant")
     assert isinstance(live.page_window.page, TextPage)
 
@@ -171,7 +171,7 @@ def test_at_100_percent_the_page_is_that_of_a_session_pixel_by_pixel(
     qtbot: Any, designer: Any, live: Any, path: Any, screen: int
 ) -> None:
     tab = designer.controller.preview.tab
-    designer.editing.select(("blocks", "liquids") if path == ITEM else path)
+    designer.select(("blocks", "liquids") if path == ITEM else path)
     tab.screens.setCurrentIndex(screen)
     tab.screens.activated.emit(screen)
     tab.zoom.chosen.emit(False)
