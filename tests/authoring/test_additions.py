@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from study_app.authoring.additions import added, duplicated
+from study_app.authoring.changes.initial_values import initial
 from study_app.authoring.fields import row_at
 from study_app.authoring.new_study import template
 from study_app.authoring.study import read
@@ -104,3 +105,12 @@ def test_a_copy_of_a_question_has_its_own_id_right_after_the_original() -> None:
     assert [item["id"] for item in items] == ["feels_liquid", "feels_liquid_2", "like_honey"]
     with pytest.raises(Refused, match="cannot be copied"):
         duplicated(before, ("format",))
+
+
+def test_a_new_liquid_exerts_a_force_and_a_new_ball_fits_the_tank() -> None:
+    study = template("empty")
+    edits, path = added(study, ("liquids",))
+    study, _ = study.edited(*edits)
+    assert study.faults == ()
+    assert study.document["liquids"][path[1]] == {"density_kg_m3": 1200}
+    assert initial(study.document, (*path, "body", "diameter_m")) == 0.068

@@ -101,7 +101,8 @@ def _in_languages(document: Mapping[str, Any], words: str) -> Any:
     return dict.fromkeys(languages, words) if len(languages) > 1 else words
 
 
-def _number(node: Node, wanted: float) -> float:
+def _number(node: Node, otherwise: float) -> float:
+    wanted = next(iter(node.get("examples", ())), otherwise)
     least, most = node.get("minimum", node.get("exclusiveMinimum", wanted)), node.get("maximum", wanted)
     number = min(max(wanted, least), most)
     return int(number) if float(number).is_integer() else number

@@ -16,9 +16,10 @@ class Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-def within(least: float, most: float, why: str) -> Any:
-    """Return the annotation of a number from ``least`` to ``most``, both included."""
-    return Field(ge=least, le=most, json_schema_extra={REASON: why})
+def within(least: float, most: float, why: str, usual: float | None = None) -> Any:
+    """Return the annotation of a number from ``least`` to ``most``, both included; an editor begins with ``usual``."""
+    examples = None if usual is None else [usual]
+    return Field(ge=least, le=most, examples=examples, json_schema_extra={REASON: why})
 
 
 Coordinate: TypeAlias = Annotated[float, within(-1000, 1000, "a scene is at most 1 km wide")]
@@ -26,11 +27,11 @@ Extent: TypeAlias = Annotated[float, within(1e-3, 1000, "from 1 mm, below what a
 Metres: TypeAlias = tuple[Coordinate, Coordinate, Coordinate]
 Flow: TypeAlias = Annotated[float, within(-100, 100, "no liquid flows faster than 100 m/s where a hand can be")]
 DensityKgM3: TypeAlias = Annotated[
-    float, within(0.01, 25_000, "hydrogen has 0.08 kg/m³, osmium, the densest element, 22 590")
+    float, within(0.01, 25_000, "hydrogen has 0.08 kg/m³, osmium, the densest element, 22 590", 1200)
 ]
 ViscosityPaS: TypeAlias = Annotated[float, within(1e-6, 1e6, "gases have 1e-5 Pa·s, honey 10, tar 100")]
-DiameterM: TypeAlias = Annotated[float, within(1e-3, 1, "the ball is moved by a hand")]
-DragCoefficient: TypeAlias = Annotated[float, within(0, 10, "a wing has 0.04, a sphere 0.47, a plate 1.2")]
+DiameterM: TypeAlias = Annotated[float, within(1e-3, 1, "the ball is moved by a hand", 0.068)]
+DragCoefficient: TypeAlias = Annotated[float, within(0, 10, "a wing has 0.04, a sphere 0.47, a plate 1.2", 0.47)]
 Alpha: TypeAlias = Annotated[float, within(0.001, 1, "at 0.001 the velocity lags the hand by 1 s; 1 does not smooth")]
 ForceLimitN: TypeAlias = Annotated[float, within(0.1, 20, "below 0.1 N a hand feels little, above 20 N it may be hurt")]
 FadeS: TypeAlias = Annotated[float, within(0.05, 2, "a faster onset is a knock, a slower one is no onset")]
