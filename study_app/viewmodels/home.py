@@ -14,6 +14,7 @@ from study_app.protocol.load import at_hand, is_scene_file, load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.protocol.source.files import find, shipped, shipped_file
+from study_app.protocol.wording.languages import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
@@ -26,8 +27,6 @@ from study_app.viewmodels.extent import counted_each, extent_of
 from study_app.viewmodels.session.stages import operator_language, step_title
 from study_app.viewmodels.sessions import SessionFacts, counted, started_words
 from study_app.workspace import workspace
-
-LANGUAGES = {"en": "English", "nl": "Dutch", "de": "German", "fr": "French", "es": "Spanish", "it": "Italian"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +127,7 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
         protocol=protocol,
         title=protocol.text(protocol.study.title, language),
         description=" ".join(protocol.study.description.split()),
-        languages=", ".join(sorted(LANGUAGES.get(code, code) for code in protocol.study.languages)),
+        languages=", ".join(sorted(language_name(code) for code in protocol.study.languages)),
         extent=", ".join(
             (
                 counted_each(extent.parts, "part"),

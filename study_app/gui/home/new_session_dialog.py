@@ -30,11 +30,12 @@ from study_app.gui.widgets.cards import Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.protocol.groups.steps import refuse_beyond_last
+from study_app.protocol.wording.languages import language_name
 from study_app.session.request import NewSession, check_row, draw_seed, study_results
 from study_app.store.sessions.participant_ids import MAX_SESSION, check_participant
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.viewmodels.device_list import device_label, device_or_default
-from study_app.viewmodels.home import LANGUAGES, StudyFacts
+from study_app.viewmodels.home import StudyFacts
 from study_app.workspace import workspace
 
 FRAME = 60  # of a window, at most
@@ -111,7 +112,7 @@ class NewSessionDialog(QDialog):
         self.operator.setMaxLength(40)
         self.operator.setText(self._machine.operator)
         for code in study.languages:
-            self.language.addItem(LANGUAGES.get(code, code), code)
+            self.language.addItem(language_name(code), code)
         preferred = device_or_default(self._machine.device)
         for name in dict.fromkeys((*list_devices(), preferred)):
             self.device.addItem(device_label(name), name)
