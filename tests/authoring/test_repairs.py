@@ -46,6 +46,7 @@ def _repaired(case: Case) -> int:
             'Use order = "constrained"',
         ),
         ("demo", ("blinding =", "blindin ="), 'Use "blinding"'),
+        ("demo", ('kind = "explore"', 'kind = "explor"'), 'Use "explore"'),
         ("demo", ('sequence = ["welcome", ', "sequence = ["), "Add to the session"),
         (
             "rek2024",

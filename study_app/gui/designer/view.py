@@ -204,6 +204,7 @@ class DesignerPlace(Place):
 
     def show_new(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
         """Show what a new study can begin from."""
+        self.new_page.card.questions.clear()
         self.new_page.show_choices(choices, chosen)
         self.stack.setCurrentWidget(self.new_page)
         self.new_page.card.questions.title.setFocus()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
@@ -97,6 +98,12 @@ def did_you_mean(word: str, permitted: Iterable[str]) -> str:
     return f"known: {', '.join(words)}" if words else ""
 
 
+def _near(word: str, permitted: str) -> str:
+    """Return "did you mean …?" for the nearest of some quoted words, "" if none is near."""
+    near = difflib.get_close_matches(word, re.findall('"([^"]*)"', permitted), n=1)
+    return f'did you mean "{near[0]}"?' if near else ""
+
+
 def faults_of(error: ValidationError, document: Mapping[str, Any], schema: Schema) -> list[Fault]:
     """Return pydantic's findings about ``document``; ``schema`` is the JSON Schema of what it should be."""
     found = [_fault(details, document, schema) for details in error.errors(include_url=False)]
@@ -122,8 +129,8 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
     if kind == "union_tag_not_found":
         return Fault((*path, _tag_key(context)), "is missing", f"one of {context.get('expected_tags', '')}".strip())
     if kind == "union_tag_invalid":
-        tags = str(context["expected_tags"]).replace("'", '"')
-        return Fault((*path, _tag_key(context)), f'"{context["tag"]}" is not one of {tags}')
+        tag, tags = context["tag"], str(context["expected_tags"]).replace("'", '"')
+        return Fault((*path, _tag_key(context)), f'"{tag}" is not one of {tags}', _near(str(tag), tags))
     if kind == "question_kind":
         tag = str(value["kind"])
         return Fault(path, f"{shown(tag)} {details['msg']}", did_you_mean(tag, context["permitted"].split(", ")))
@@ -141,8 +148,7 @@ def _sentence(kind: str, value: Any, context: Mapping[str, Any], message: str) -
         return f"is {shown(value)}, must be {words} {shown(context[key])}", ""
     if kind == "literal_error":
         permitted = str(context["expected"]).replace("'", '"')
-        near = difflib.get_close_matches(str(value), permitted.replace('"', "").replace(" or ", ", ").split(", "), n=1)
-        return f"{shown(value)} is not {permitted}", f'did you mean "{near[0]}"?' if near else ""
+        return f"{shown(value)} is not {permitted}", _near(str(value), permitted)
     if kind == "string_pattern_mismatch":
         return f"{shown(value)} is not permitted: {rule_of(str(context['pattern']))}", ""
     if kind == "too_short":

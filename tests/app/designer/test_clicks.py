@@ -64,6 +64,23 @@ def test_arrow_keys_walk_the_whole_outline_of_the_empty_study(qtbot: Any, design
     assert designer.editing.opened.study.document["limits"] == {"lateness_ms": 3}
 
 
+def test_arrow_keys_walk_the_outline_after_a_number_was_typed(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.window.resize(1366, 768)
+    designer.editing.select(("conditions", "thick"))
+    (delay,) = designer.row("conditions", "thick", "delay_ms").findChildren(QLineEdit)
+    qtbot.mouseClick(delay, LEFT)
+    qtbot.keyClicks(delay, "5")
+    qtbot.keyClick(delay, Qt.Key.Key_Return)
+    text = designer.text
+    qtbot.keyClick(designer.window, Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
+    for _ in range(4):
+        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Up)
+        QApplication.processEvents()
+        assert designer.place.outline.tree.hasFocus()
+    assert designer.text == text
+
+
 def test_a_field_that_is_clicked_after_an_id_was_typed_keeps_the_keyboard(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.editing.select(("liquids", "thick"))

@@ -56,6 +56,9 @@ def test_a_study_begins_with_the_answers_and_nothing_is_on_disk(qtbot: Any, desi
     assert document["study"]["languages"] == ("en", "nl")
     assert document["stimuli"]["damping"]["standards"] == (4, 8)
     assert not (designer.file.parent / "thicker.toml").exists()
+    designer.controller.ask_for_new("template:viscosity-jnd")
+    questions = page.card.questions
+    assert (questions.title.text(), questions.name.text(), questions.languages["nl"].isChecked()) == ("", "", False)
 
 
 @pytest.mark.parametrize(

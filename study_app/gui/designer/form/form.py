@@ -90,19 +90,19 @@ class FormCard(Card):
             for widget, row in zip(self.rows, form.rows, strict=True):
                 widget.show_row(row)
         else:
-            self._make(form, before)
+            self._make(form, before if stays else None)
         self.show_help()
 
     def _make(self, form: Form, before: Form | None) -> None:
-        stays = before is not None and before.path == form.path
+        """Make the editors anew; ``before`` is the form of the same element before, None for another element."""
         keyboard = QApplication.focusWidget()
         held = next((row for row in self.rows if keyboard is not None and row.isAncestorOf(keyboard)), None)
         if held is None and self.isAncestorOf(self.focusWidget()):
             held = self._focused
         focused = None
-        if held is not None and before is not None and len(before.path) == len(form.path):  # also of a renamed element
+        if held is not None and before is not None:
             focused = (*form.path, *held.row.row.path[len(before.path) :])
-        scrolled = self.area.verticalScrollBar().value() if stays else 0
+        scrolled = 0 if before is None else self.area.verticalScrollBar().value()
         self._focused = None
         self.flush()
         inside = QWidget()

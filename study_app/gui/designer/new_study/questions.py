@@ -75,6 +75,12 @@ class Questions(Themed, QWidget):
         self._grid.addWidget(field, row, 1)
         return shown
 
+    def clear(self) -> None:
+        """Forget the answers for the study before."""
+        self._choice = None
+        self.title.clear()
+        self.name.clear()
+
     def show_choice(self, choice: TemplateChoice) -> None:
         """Ask the questions of a template or copy; what was typed as a name stays."""
         before, self._choice = self._choice, choice
