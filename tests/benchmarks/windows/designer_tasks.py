@@ -82,16 +82,19 @@ class Tasks:
         """Delays of 0, 60, 120 and 240 ms in a Williams design, and how many people make it even."""
         user = self.user
         user.choose("Study", "New study …")
+        user.press("Template Empty study")
         user.write("Title", "Four delays", accept=False)
         user.press("Make study")
-        for title, delay in (("Oil", "60"), ("Honey", "120")):
-            user.select(title, "Conditions")
+        names = {"late": "60", "later": "120", "latest": "240"}
+        for name, delay in names.items():
+            user.add("Condition")
+            user.write("Id", name)
             user.write("Delay", delay)
-        user.add("Condition")
-        user.write("Id", "late")
-        user.write("Delay", "240")
         user.select("Liquids", "Session, in order")
-        user.choose("Add to Conditions", "late")
+        for name in names:
+            user.choose("Add to Conditions", name)
+        user.choose("Order", "Williams")
+        QTest.qWait(1500)
         words = [label.text() for label in user.window.findChildren(QLabel) if label.isVisible()]
         assert any("even" in one for one in words), words
 
