@@ -1,7 +1,6 @@
 """What is shipped: the wheel works far from the checkout, the README's commands are the ones the check runs."""
 
 import os
-import re
 import subprocess
 import sys
 import tomllib
@@ -45,6 +44,12 @@ def test_the_wheel_contains_the_fluid_solvers_tables(installed: Path) -> None:
     assert shipped == {path.name for path in tables.glob("*.csv")} >= {"steady.csv", "fits.csv", "honey-600mmps.csv"}
 
 
+def test_the_wheel_contains_the_pages_of_the_documentation(installed: Path) -> None:
+    pages, shipped = ROOT / "docs", installed / "study_app" / "docs"
+    for pattern in ("*.md", "pictures/*"):
+        assert {path.name for path in shipped.glob(pattern)} == {path.name for path in pages.glob(pattern)}
+
+
 def test_check_works_far_from_the_checkout(installed: Path, tmp_path: Path) -> None:
     environment = os.environ | {"PYTHONPATH": str(installed), "PYTHONSAFEPATH": "1"}
     program = "import study_app, sys; print(study_app.__file__); from study_app.cli import main; main()"
@@ -75,12 +80,3 @@ def test_python_is_bounded_as_the_pinned_qt_bounds_it() -> None:
     assert offered[0] == 11
     assert all(f"3.{minor}.0" in qts for minor in offered)
     assert f"3.{offered[-1] + 1}.0" not in qts
-
-
-def test_every_picture_of_the_readme_is_there() -> None:
-    readme = (ROOT / "README.md").read_text("utf-8")
-    pictures = re.findall(r'(?:\]\(|src=")(\.readme/[^)"]+)', readme)
-    assert pictures
-    for picture in pictures:
-        assert (ROOT / picture).is_file(), picture
-    assert {path.name for path in (ROOT / ".readme").iterdir()} == {Path(picture).name for picture in pictures}

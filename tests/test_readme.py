@@ -1,4 +1,4 @@
-"""README's section "What is on disk": the dictionary word for word, and every file that a session leaves."""
+"""README.md is short; the page of the results folder names every file that a session leaves."""
 
 from __future__ import annotations
 
@@ -10,32 +10,29 @@ import pytest
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import reveal
 from study_app.store.exclusions import exclude
-from study_app.store.tables.column_dictionary import dictionary_markdown
 from tests.compiled import needs_servo
 
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parent.parent
-BEGIN = "<!-- dictionary: printed by python -m study_app.store.tables.column_dictionary -->\n\n"
-END = "\n<!-- end of dictionary -->\n"
+LONGEST = 150
+"""Lines of README.md."""
+
+
+def test_the_readme_is_short_and_leads_to_every_section() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= LONGEST
+    assert text.count("![") == 4
+    assert max(len(line) for line in text.splitlines() if not line.startswith(("|", "python3", "!"))) <= 120
 
 
 @pytest.fixture(scope="module")
 def section() -> str:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    return readme.split("\n## What is on disk\n")[1].split("\n## ")[0]
-
-
-def test_the_dictionary_stands_there_as_it_is_printed(section: str) -> None:
-    assert section.count(BEGIN) == section.count(END) == 1
-    held = section.split(BEGIN)[1].split(END, maxsplit=1)[0]
-    assert held == dictionary_markdown(), (
-        "put what `python -m study_app.store.tables.column_dictionary` prints between the comments"
-    )
+    return (ROOT / "docs" / "results-folder.md").read_text(encoding="utf-8")
 
 
 def named_files(section: str) -> set[str]:
-    """Return the paths of the tree in the section, of session 1 of P007."""
+    """Return the paths of the tree in the page, of session 1 of P007."""
     tree = section.split("```\n")[1]
     assert tree.startswith("results/rek2024/\n")
     paths: set[str] = set()

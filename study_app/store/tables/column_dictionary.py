@@ -1,6 +1,6 @@
-"""The column dictionary as text: the tables of README's section "What is on disk".
+"""The column dictionary as text: the page Data dictionary of the documentation.
 
-``python -m study_app.store.tables.column_dictionary`` prints what stands there between the two comments.
+``python -m study_app.store.tables.column_dictionary`` prints it.
 """
 
 from __future__ import annotations

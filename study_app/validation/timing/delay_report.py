@@ -49,7 +49,7 @@ def text(found: Delayed) -> str:
 
 
 def markdown(found: Delayed) -> str:
-    """Return the report as Markdown, between comments, ready for a README: a row a screen and delay, loads abreast."""
+    """Return the report as Markdown, between comments, ready for docs/timing.md: a row per screen and delay."""
     one = ("mean", "p95", "p99", "worst", "late")
     heads = [f"{BESIDE[load]}: mean" if name == "mean" else name for load in found.loads for name in one]
     rows = [["screen", "asked", *heads], ["---", *["--:"] * (1 + len(heads))]]

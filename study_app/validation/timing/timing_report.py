@@ -48,7 +48,7 @@ def text(found: Timed) -> str:
 
 
 def markdown(found: Timed) -> str:
-    """Return the report as Markdown, between comments, ready for a README."""
+    """Return the report as Markdown, between comments, ready for docs/timing.md."""
     marks = ("---", "---", *["--:"] * (len(_HEADINGS) - 2))
     rows = [_HEADINGS, marks, *(_row(found, lane) for lane in found.lanes)]
     table = "\n".join(f"| {' | '.join(row)} |" for row in rows)

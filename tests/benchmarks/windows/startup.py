@@ -2,7 +2,7 @@
 
 Starts ``liquid-study --help``, ``liquid-study`` (home) and ``liquid-study run`` as a user would, on what display there
 is (without one on Qt's offscreen platform), and prints when each had answered or was first painted; then the modules
-that took longest to load until then, each without what it loads itself. Markdown, ready for the README. Run by itself:
+that took longest to load until then, each without what it loads itself. Markdown, for docs/timing.md. Run by itself:
 
     python tests/benchmarks/windows/startup.py [--runs 5]
 """

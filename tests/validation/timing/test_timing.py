@@ -315,7 +315,7 @@ def test_the_csv_holds_each_lane_once():
     assert rows[3]["overruns"] == "5"
 
 
-def test_the_markdown_is_ready_for_a_readme():
+def test_the_markdown_is_ready_for_the_page_of_timing():
     said = markdown(WELL)
     assert said.startswith(BEGIN)
     assert said.rstrip().endswith(END)
@@ -324,10 +324,10 @@ def test_the_markdown_is_ready_for_a_readme():
     assert len(table) == 2 + len(WELL.lanes)
 
 
-def test_the_readme_has_such_a_table_to_be_replaced_whole():
-    readme = (Path(__file__).resolve().parents[3] / "README.md").read_text(encoding="utf-8")
-    assert readme.count(BEGIN) == readme.count(END) == 1
-    held = readme.split(BEGIN)[1].split(END, maxsplit=1)[0]
+def test_the_page_of_timing_has_such_a_table_to_be_replaced_whole():
+    page = (Path(__file__).resolve().parents[3] / "docs" / "timing.md").read_text(encoding="utf-8")
+    assert page.count(BEGIN) == page.count(END) == 1
+    held = page.split(BEGIN)[1].split(END, maxsplit=1)[0]
     ours = markdown(WELL)
     headings = [line for line in ours.splitlines() if line.startswith("| priority")]
     assert [line for line in held.splitlines() if line.startswith("| priority")] == headings

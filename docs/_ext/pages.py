@@ -1,0 +1,47 @@
+"""What Sphinx adds to the pages: generated parts, tables of contents from their links, the Python interface."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sphinx.application import Sphinx
+
+from study_app.documentation import INDEX, sections, with_generated_parts
+
+API = "<!-- sphinx: api -->"
+MODULES = (
+    "study_app.protocol.load",
+    "study_app.protocol.orders.schedule",
+    "study_app.haptics.model.scene",
+    "study_app.haptics.model.liquid",
+    "study_app.haptics.runtime.offline",
+    "study_app.devices.base",
+    "study_app.devices.descriptor",
+    "study_app.store.folders",
+    "study_app.store.verification.verify_study",
+    "study_app.analysis.tables.study",
+    "study_app.analysis.statistics.friedman",
+    "study_app.analysis.statistics.trend",
+    "study_app.psychophysics.families",
+    "study_app.psychophysics.questplus",
+)
+
+
+def complete(_app: Sphinx, name: str, text: list[str]) -> None:
+    """Put generated parts into a page, and below a page that lists others their table of contents."""
+    text[0] = with_generated_parts(text[0]).replace(API, _api())
+    contents = sections()
+    below = tuple(contents) if name == INDEX else contents.get(name, ())
+    if below:
+        text[0] += "\n".join(("", "```{toctree}", ":hidden:", "", *(f"/{page}" for page in below), "```", ""))
+
+
+def _api() -> str:
+    parts = (f"## {module}\n\n```{{eval-rst}}\n.. automodule:: {module}\n   :members:\n```\n" for module in MODULES)
+    return "\n".join(parts)
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Connect to Sphinx."""
+    app.connect("source-read", complete)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

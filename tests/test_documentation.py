@@ -1,0 +1,169 @@
+"""The pages: commands exist or run, links lead somewhere, sections hold every page, the website has no warnings."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import click
+import pytest
+
+from study_app import documentation
+from study_app.cli import commands
+from tests.compiled import needs_servo
+from tests.documented import (
+    ROOT,
+    anchors,
+    blocks,
+    lines_to_type,
+    links,
+    mentioned_commands,
+    name,
+    pages,
+    typed_commands,
+)
+
+PROGRAM = "liquid-study"
+PAGES = [pytest.param(page, id=name(page)) for page in pages()]
+RUN = [pytest.param(page, id=name(page)) for page in pages() if any(block.run for block in blocks(page))]
+
+
+def faults(words: list[str], *, complete: bool) -> list[str]:
+    """Return what the program would refuse of a command's words; with ``complete`` also what is missing."""
+    command: click.Command = commands
+    path, rest = [PROGRAM], words[1:]
+    while isinstance(command, click.Group) and rest and not rest[0].startswith("-"):
+        if rest[0] not in command.commands:
+            if rest[0].isupper():  # a placeholder
+                return []
+            return [f"{' '.join(path)} has no command {rest[0]}"]
+        command, path, rest = command.commands[rest[0]], [*path, rest[0]], rest[1:]
+    context = click.Context(command, info_name=" ".join(path))
+    try:
+        given, left, _ = command.make_parser(context).parse_args([word for word in rest if word not in {"…", "..."}])
+    except click.UsageError as error:
+        return [f"{' '.join(words)}: {error.format_message()}"]
+    found = [f"{' '.join(words)}: {' '.join(left)} is one word too many"] if left else []
+    for parameter in command.params:
+        value = given.get(parameter.name)
+        if isinstance(parameter.type, click.Choice) and isinstance(value, str) and not value.isupper():
+            found += [f"{' '.join(words)}: {value}" for _ in [0] if value not in parameter.type.choices]
+        if complete and parameter.required and value is None:
+            found.append(f"{' '.join(words)}: {parameter.name} is missing")
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_in_a_block_exists_with_its_options(page: Path) -> None:
+    found: list[str] = []
+    for words in typed_commands(page):
+        if Path(words[0]).name == PROGRAM:
+            found += faults(words, complete=True)
+        elif Path(words[0]).stem.startswith("python") and len(words) > 1 and words[1].endswith(".py"):
+            found += [words[1]] if not (ROOT / words[1]).is_file() else []
+    assert not found
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_in_a_sentence_exists_with_its_options(page: Path) -> None:
+    assert not [fault for words in mentioned_commands(page) for fault in faults(words, complete=False)]
+
+
+def test_commands_with_a_mistake_are_found() -> None:
+    assert faults([PROGRAM, "reprot", "x"], complete=False)
+    assert faults([PROGRAM, "report", "x", "--into", "y"], complete=False)
+    assert faults([PROGRAM, "report", "x"], complete=True)
+    assert faults([PROGRAM, "check", "x", "y"], complete=True)
+    assert faults([PROGRAM, "timing", "--load", "much"], complete=True)
+    assert not faults([PROGRAM, "report", "x", "--to", "y"], complete=True)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_extras_and_scripts_that_a_page_names_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        extras = tomllib.load(file)["project"]["optional-dependencies"]
+    assert set(re.findall(r"pip install (?:-e )?'(?:\.|liquid-study)\[(\w+)\]'", text)) <= set(extras)
+    named = re.findall(r"\b((?:tests|study_app)/[a-z0-9_/]+\.(?:py|csv|c|h))\b", text)
+    assert not [path for path in named if not (ROOT / path).is_file()]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_and_pictures_within_the_checkout_exist(page: Path) -> None:
+    found: list[str] = []
+    for link in links(page):
+        path, _, anchor = link.partition("#")
+        if "://" in link or link.startswith("mailto:"):
+            continue
+        target = (page.parent / path).resolve() if path else page
+        if not target.exists():
+            found.append(link)
+        elif anchor and target.suffix == ".md":
+            text = documentation.with_generated_parts(target.read_text(encoding="utf-8"))
+            found += [link] if anchor not in anchors(text) else []
+    assert not found
+
+
+def test_every_page_is_in_one_section() -> None:
+    sections = documentation.sections()
+    listed = [page for pages_of in sections.values() for page in pages_of]
+    assert sorted([documentation.INDEX, *sections, *listed]) == list(documentation.names())
+    assert list(sections) == ["tutorials", "how-to", "explanation", "reference", "validation"]
+
+
+def test_every_picture_is_shown_on_a_page() -> None:
+    shown = {Path(link).name for page in pages() for link in links(page) if "pictures/" in link}
+    assert {path.name for path in (ROOT / "docs" / "pictures").iterdir()} == shown
+
+
+def test_generated_parts_are_made_when_a_page_is_read() -> None:
+    for page, words in {"commands": "`--participants", "data-dictionary": "`lateness_p99_ms`"}.items():
+        assert words not in documentation.source(page)
+        assert words in documentation.page(page)
+        assert "<!-- generated" not in documentation.page(page)
+
+
+@pytest.mark.slow
+@needs_servo
+@pytest.mark.parametrize("page", RUN)
+@pytest.mark.timeout(600)
+def test_the_commands_of_a_page_run_one_after_the_other(page: Path, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "results" / "sample-rek2024", tmp_path / "results" / "sample-rek2024")
+    (tmp_path / "protocols").mkdir()
+    environment = os.environ | {
+        "LIQUID_STUDY_WORKSPACE": str(tmp_path),
+        "LIQUID_STUDY_CONFIG": str(tmp_path / "config"),
+        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+    }
+    for block in blocks(page):
+        for line in lines_to_type(block) if block.run else ():
+            command = line.replace("liquid-study ", f"{sys.executable} -m study_app ")
+            done = subprocess.run(
+                ["bash", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+            )
+            assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not all(map(importlib.util.find_spec, ("sphinx", "myst_parser", "pydata_sphinx_theme"))), reason="needs extra docs"
+)
+def test_the_website_builds_without_a_warning_or_the_network(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", "-d", str(tmp_path / "trees")]
+    build = subprocess.run(
+        [*words, str(ROOT / "docs"), str(tmp_path / "html")], capture_output=True, text=True, check=False
+    )
+    assert build.returncode == 0, build.stderr
+    for page, words_on_it in {
+        "commands": "--participants",
+        "data-dictionary": "lateness_p99_ms",
+        "protocol-format": "breaking_angle_deg",
+        "api": "build_schedule",
+    }.items():
+        assert words_on_it in (tmp_path / "html" / f"{page}.html").read_text(encoding="utf-8")
