@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEventLoop, QObject, QTimer
+from PySide6.QtGui import QKeySequence, QShortcut
 
 from study_app.app.devices import DevicesController
 from study_app.app.session.garbage_collection import collecting_here
@@ -22,6 +23,7 @@ from study_app.gui.home.workspace import WorkspaceDialog
 from study_app.gui.widgets.background import Background
 from study_app.session.request import NewSession
 from study_app.store.workstation import MachineSettings, create_workspace
+from study_app.viewmodels.help import FIRST_PAGE, PAGES_OF_PLACES
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
 
 LOOK_AFTER_MS = 300  # the window stands by then
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from study_app.app.lab.initial_settings import InitialSettings
     from study_app.app.results import ResultsController
     from study_app.gui.designer.view import DesignerPlace
+    from study_app.gui.help.view import HelpPlace
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.results.view import ResultsPlace
     from study_app.lab.ab_comparison import Setting, Side
@@ -88,6 +91,7 @@ class MainController(QObject):
                 "lab": self._lab,
                 "devices": self.devices.make_place,
                 "machine": self.machine.make_place,
+                "help": self._help,
             },
             theme=theme_named(self.machine.settings.theme),
             prepares={"lab": self._prepare_lab},
@@ -98,6 +102,7 @@ class MainController(QObject):
         self.loop = QEventLoop()
         self.code = 0
         self.live: LiveSession | None = None
+        self.help: HelpPlace | None = None
         self._called_off: list[LiveSession] = []
         self.desk: ResultsController | None = None
         self.designer: DesignerController | None = None
@@ -107,6 +112,7 @@ class MainController(QObject):
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
         self.devices.looked.connect(lambda _shown: self._show_machine())
+        QShortcut(QKeySequence(QKeySequence.StandardKey.HelpContents), self.window, self.show_help)
         for desk in (self.machine, self.devices):
             desk.troubled.connect(self.window.tell)
 
@@ -184,6 +190,20 @@ class MainController(QObject):
         self.desk = ResultsController(self.results)
         self.desk.place.version_asked.connect(self.show_version)
         return self.desk.place
+
+    def _help(self) -> HelpPlace:
+        from study_app.gui.help.view import HelpPlace  # noqa: PLC0415 - only once it is needed
+
+        self.help = HelpPlace()
+        return self.help
+
+    def show_help(self) -> None:
+        """Go to the page of the documentation that is about the place one is at."""
+        page = PAGES_OF_PLACES.get(self.window.here, FIRST_PAGE)
+        self.window.place("help")
+        assert self.help is not None  # noqa: S101 - made with its place
+        self.help.open_page(page)
+        self.window.go("help")
 
     def _designer(self) -> DesignerPlace:
         from study_app.app.designer.controller import DesignerController  # noqa: PLC0415 - only once it is needed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import click
@@ -50,7 +51,8 @@ def _paragraphs(text: str) -> list[str]:
 
 
 def _option(option: click.Option, context: click.Context) -> str:
-    metavar = "" if option.is_flag else f" {option.make_metavar(context)}"
+    named = option.metavar or re.sub(r"(INTEGER|FLOAT)( RANGE)?", "N", option.make_metavar(context))
+    metavar = "" if option.is_flag else f" {named}"
     names = ", ".join(f"`{name}{metavar}`" for name in option.opts).replace("|", "\\|")
     default = option.get_default(context, call=False)
     shown = "" if option.is_flag or option.multiple or callable(default) else str(default)

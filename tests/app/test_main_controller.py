@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.main_controller import MainController
@@ -165,3 +165,13 @@ def test_the_window_is_no_larger_than_its_screen(visit: MainController) -> None:
     assert FULL.height() > room.height()  # else this shows nothing
     visit.open()
     assert visit.window.size() == FULL.boundedTo(room).expandedTo(LEAST)
+
+
+def test_f1_shows_the_page_about_the_place(visit: MainController, qtbot: Any) -> None:
+    visit.window.go("machine")
+    visit.window.activateWindow()
+    qtbot.keyClick(visit.window, Qt.Key.Key_F1)
+    assert visit.help is not None
+    assert (visit.window.here, visit.help.reader.page) == ("help", "this-machine")
+    qtbot.keyClick(visit.window, Qt.Key.Key_F1)
+    assert visit.help.reader.page == "index"

@@ -40,6 +40,7 @@ def take_places(camera: Camera, results: Path, theme: Theme) -> None:
         _take_lab(camera, visit, theme)
         _take_devices(camera, visit, theme)
         _take_machine(camera, visit, theme)
+        _take_help(camera, visit, theme)
     finally:
         window.close()
         visit.end()
@@ -88,6 +89,12 @@ def _take_devices(camera: Camera, visit: MainController, theme: Theme) -> None:
     camera.until(lambda: over, "the diagnosis")
     camera.take(dialog, f"diagnosis-{theme.name}")
     dialog.done(QDialog.DialogCode.Rejected)
+
+
+def _take_help(camera: Camera, visit: MainController, theme: Theme) -> None:
+    visit.window.go("lab")
+    visit.show_help()
+    camera.take(visit.window, f"help-{theme.name}", HOME)
 
 
 def _take_machine(camera: Camera, visit: MainController, theme: Theme) -> None:

@@ -36,6 +36,7 @@ DESTINATIONS = (
     Destination("lab", "sliders", "Liquid lab", "Lab"),
     Destination("devices", "device", "Devices", "Devices"),
     Destination("machine", "screen", "This machine", "Machine"),
+    Destination("help", "info", "Help", "Help"),
 )
 
 

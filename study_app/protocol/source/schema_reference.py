@@ -143,9 +143,11 @@ def _default(key: str, part: Node, node: Node) -> str:
 
 
 def _meaning(part: Node, root: Node) -> str:
-    if "description" in part or "$ref" not in part:
+    """Return the description of a key; without one that of the only model that it holds."""
+    models = list(dict.fromkeys(name for name, _ in _models(part, "")))
+    if "description" in part or len(models) != 1:
         return str(part.get("description", ""))
-    return str(root["$defs"][part["$ref"].rsplit("/", 1)[-1]].get("description", "")).split("\n\n", maxsplit=1)[0]
+    return str(root["$defs"][models[0]].get("description", "")).split("\n\n", maxsplit=1)[0]
 
 
 def _plain(text: str) -> str:

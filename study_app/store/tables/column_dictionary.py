@@ -64,18 +64,17 @@ _KINDS = {"integer": "whole number", "flag": "true, false", "time": "ISO 8601"}
 
 
 def dictionary_markdown() -> str:
-    """Return every file's columns, and the journal's events, as Markdown: a table a file, folded until it is opened."""
+    """Return every file's columns, and the journal's events, as Markdown: a heading and a table for each."""
     return "\n".join((*(_table(*section) for section in SECTIONS), _journal()))
 
 
 def _table(title: str, file: str, row: str, columns: Sequence[Column]) -> str:
     rows = [f"| `{column.name}` | {_kind(column)} | {_meaning(column)} |" for column in columns]
-    return _folded(title, file, row, ("| column | kind | meaning |", "| --- | --- | --- |", *rows))
+    return _section(title, file, row, ("| column | kind | meaning |", "| --- | --- | --- |", *rows))
 
 
-def _folded(title: str, file: str, row: str, lines: Sequence[str]) -> str:
-    summary = f"<summary><b>{title}</b>: <code>{file}</code>, {row}</summary>"
-    return "\n".join(("<details>", summary, "", *lines, "", "</details>", ""))
+def _section(title: str, file: str, row: str, lines: Sequence[str]) -> str:
+    return "\n".join((f"## {title}", "", f"`{file}`: {row}", "", *lines, ""))
 
 
 def _journal() -> str:
@@ -90,7 +89,7 @@ def _journal() -> str:
     rows = [
         f"| `{event.name}` | {listed} | {event.description} |" for event, listed in zip(EVENTS, fields, strict=True)
     ]
-    return _folded("Journal", "journal.jsonl", "one line per event", (*head, *rows))
+    return _section("Journal", "journal.jsonl", "one line per event", (*head, *rows))
 
 
 def _kind(column: Column) -> str:

@@ -1,0 +1,53 @@
+"""The list of pages in Help, its search, and the text of a page for a reader without HTML."""
+
+from __future__ import annotations
+
+import re
+
+from study_app import documentation
+from study_app.viewmodels.help import PAGES_OF_PLACES, anchor_of, entries, found, text_of
+
+
+def test_every_page_is_listed_once_below_the_heading_of_its_section() -> None:
+    rows = entries()
+    assert sorted(row.page for row in rows) == list(documentation.names())
+    assert [row.page for row in rows if row.heads] == ["index", *documentation.sections()]
+    names = [row.page for row in rows]
+    assert names.index("tutorials") < names.index("first-session") < names.index("how-to")
+
+
+def test_titles_have_no_marks() -> None:
+    assert not [row.title for row in entries() if re.search(r"[`*\\\[\]]", row.title)]
+
+
+def test_a_search_finds_pages_with_all_words_and_titles_first() -> None:
+    assert found("") == entries()
+    pages = [row.page for row in found("photodiode")]
+    assert pages[0] == "photodiode"
+    assert "timing" in pages
+    assert found("photodiode zebra") == ()
+    assert not any(row.heads for row in found("photodiode"))
+
+
+def test_a_search_finds_generated_parts() -> None:
+    assert "data-dictionary" in [row.page for row in found("lateness_p99_ms")]
+    assert "protocol-format" in [row.page for row in found("breaking_span_m")]
+    assert "commands" in [row.page for row in found("--answers-only")]
+
+
+def test_texts_have_neither_comments_nor_html_nor_empty_cells() -> None:
+    for page in documentation.names():
+        text = text_of(page)
+        prose = re.sub(r"```.*?```|`[^`]*`", "", text, flags=re.DOTALL)
+        assert "<!--" not in text, page
+        assert not re.search(r"<(img|details|summary|b)\b", prose), page
+        assert "| |" not in text, page
+
+
+def test_every_place_has_a_page_that_exists() -> None:
+    assert set(PAGES_OF_PLACES.values()) <= set(documentation.names())
+
+
+def test_anchors_are_those_of_links() -> None:
+    assert anchor_of("Tables and report") == "tables-and-report"
+    assert anchor_of("“125 ms” & more: a test?") == "125-ms--more-a-test"
