@@ -17,6 +17,9 @@ INDEX: Final = "index"
 ELSE: Final = "how-to"
 """The section of pages that no section lists."""
 
+FOLDERS: Final = {"decisions": "explanation"}
+"""The section of pages in a folder that no section lists."""
+
 _GENERATED: Final = re.compile(r"<!-- generated: ([\w.]+):(\w+) -->")
 _LISTED: Final = re.compile(r"^- \[[^]]+\]\(([\w/-]+)\.md\)", re.MULTILINE)
 _TITLE: Final = re.compile(r"^# (.+)$", re.MULTILINE)
@@ -67,5 +70,7 @@ def sections() -> dict[str, tuple[str, ...]]:
     for section, pages in listed.items():
         listed[section] = [one for one in dict.fromkeys(pages) if one in known and one not in placed]
         placed.update(listed[section])
-    listed[ELSE] += [name for name in known if name not in placed]
+    for name in known:
+        if name not in placed:
+            listed[FOLDERS.get(name.split("/")[0], ELSE)].append(name)
     return {section: tuple(pages) for section, pages in listed.items()}

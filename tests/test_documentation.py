@@ -31,7 +31,14 @@ from tests.documented import (
 
 PROGRAM = "liquid-study"
 PAGES = [pytest.param(page, id=name(page)) for page in pages()]
-RUN = [pytest.param(page, id=name(page)) for page in pages() if any(block.run for block in blocks(page))]
+LONG = {"docs/export.md", "docs/own-study.md", "docs/preregistration.md", "docs/threshold.md", "results/README.md"}
+"""Pages whose commands take half a minute or more."""
+
+RUN = [
+    pytest.param(page, id=name(page), marks=pytest.mark.nightly if name(page) in LONG else ())
+    for page in pages()
+    if any(block.run for block in blocks(page))
+]
 
 
 def faults(words: list[str], *, complete: bool) -> list[str]:
@@ -134,7 +141,8 @@ def test_generated_parts_are_made_when_a_page_is_read() -> None:
 @pytest.mark.parametrize("page", RUN)
 @pytest.mark.timeout(600)
 def test_the_commands_of_a_page_run_one_after_the_other(page: Path, tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "results" / "sample-rek2024", tmp_path / "results" / "sample-rek2024")
+    for study in ("sample-rek2024", "rek2024"):
+        shutil.copytree(ROOT / "results" / "sample-rek2024", tmp_path / "results" / study)
     (tmp_path / "protocols").mkdir()
     environment = os.environ | {
         "LIQUID_STUDY_WORKSPACE": str(tmp_path),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 from pathlib import Path
 from typing import Any
 
@@ -99,7 +100,7 @@ class PageReader(Themed, QTextBrowser):
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
         path = name.toString() if isinstance(name, QUrl) else name
-        picture = QImage(str(self._folder / path))
+        picture = QImage(str(self._folder / self._here(path)))
         ratio = self.devicePixelRatioF()
         width = round(self._text_width() * ratio)
         if picture.width() > width:
@@ -114,6 +115,10 @@ class PageReader(Themed, QTextBrowser):
             at = self.verticalScrollBar().value() / max(1, self.verticalScrollBar().maximum())
             self._draw()
             self.verticalScrollBar().setValue(round(at * self.verticalScrollBar().maximum()))
+
+    def _here(self, path: str) -> str:
+        """Return where a path of the page leads to, from the folder of the pages."""
+        return posixpath.normpath(posixpath.join(posixpath.dirname(self.page), path))
 
     def _text_width(self) -> int:
         return max(200, min(WIDEST_TEXT, self.viewport().width() - 2 * MARGIN))
@@ -200,4 +205,4 @@ class PageReader(Themed, QTextBrowser):
         elif not path:
             self._scroll_to(anchor)
         elif path.endswith(ENDING):
-            self.page_asked.emit(path.removesuffix(ENDING), anchor)
+            self.page_asked.emit(self._here(path.removesuffix(ENDING)), anchor)
