@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -117,20 +118,23 @@ def report(results: Path, to: Path) -> None:
 @BY
 @click.option("--reason", required=True, metavar="TEXT", help="Reason; recorded with the time.")
 def unblind(results: Path, by: str, reason: str) -> None:
-    """Open the sealed key of a study and write the sealed columns; name, time and reason are recorded."""
-    from study_app.store.blinded.unblinding import unblind as unblind_study
-    from study_app.store.exclusions import named
+    """Open the sealed key of a study and write the sealed columns; name, time and reason are recorded.
 
-    found = unblind_study(results, by=by, reason=reason)
-    for block, codes in found.codes.items():
-        for code, condition in codes.items():
-            standard, of_track, _ = condition.partition("/")
-            shown = f"standard {standard}" if standard else "all levels"
-            click.echo(f"{block}  {code}  {shown if of_track else condition}")
-    for row in found.excluded:
-        click.echo(f"excluded  {named(row)}: {row.reason}")
-    for sentence in found.left:
-        click.echo(f"warning: {sentence}", err=True)
+    In a merged study the key of each site is opened; for one site name its folder, such as pooled/sites/A.
+    """
+    from study_app.store.exclusions import named
+    from study_app.store.sites.unblind_sites import unblind_folder
+
+    for prefix, found in unblind_folder(results, by=by, reason=reason).items():
+        for block, codes in found.codes.items():
+            for code, condition in codes.items():
+                standard, of_track, _ = condition.partition("/")
+                shown = f"standard {standard}" if standard else "all levels"
+                click.echo(f"{block}  {prefix}{code}  {shown if of_track else condition}")
+        for row in found.excluded:
+            click.echo(f"excluded  {named(row)}: {row.reason}")
+        for sentence in found.left:
+            click.echo(f"warning: {sentence}", err=True)
 
 
 @click.command()
@@ -144,8 +148,10 @@ def exclude(results: Path, participant: str, session: int, trial: int | None, by
     """Exclude a session or a trial from the analysis, with a reason; nothing is deleted."""
     from study_app.store.exclusions import exclude as exclude_from
     from study_app.store.exclusions import named
+    from study_app.store.sites.merged import own_place
 
-    click.echo(named(exclude_from(results, participant, session, trial=trial, by=by, reason=reason)))
+    new = exclude_from(*own_place(results, participant), session, trial=trial, by=by, reason=reason)
+    click.echo(named(replace(new, participant=participant)))
 
 
 @click.command()
@@ -159,8 +165,10 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
     """Reverse an exclusion: the session or trial counts again; name, time and reason are recorded."""
     from study_app.store.exclusions import include as include_in
     from study_app.store.exclusions import named
+    from study_app.store.sites.merged import own_place
 
-    click.echo(f"counts again: {named(include_in(results, participant, session, trial=trial, by=by, reason=reason))}")
+    taken = include_in(*own_place(results, participant), session, trial=trial, by=by, reason=reason)
+    click.echo(f"counts again: {named(replace(taken, participant=participant))}")
 
 
 @click.command()
@@ -177,9 +185,10 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
 )
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
     """Erase what a participant gave; date, operator, reason and checksums remain."""
+    from study_app.store.sites.merged import own_place
     from study_app.store.withdrawals.withdraw import withdraw as withdraw_from
 
-    done = withdraw_from(results, participant, by=by, reason=reason, also=also)
+    done = withdraw_from(*own_place(results, participant), by=by, reason=reason, also=also)
     for folder in done.folders:
         click.echo(f"erased     participant {participant} from {folder}")
     for path in done.outputs:
@@ -191,6 +200,48 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
         click.echo(f"warning: output of {output.at} outside of the results folder: {output.to} ({state})", err=True)
     for sentence in done.left:
         click.echo(f"warning: {sentence}", err=True)
+
+
+def _site(_context: click.Context, _parameter: click.Parameter, words: tuple[str, ...]) -> dict[str, Path]:
+    """Return the folders of sites by their names."""
+    sites: dict[str, Path] = {}
+    for text in words:
+        name, equals, folder = text.partition("=")
+        if not (name and equals and folder):
+            raise click.BadParameter(f"{text!r} is not NAME=DIR, such as A=results/rek2024")
+        if name in sites:
+            raise click.BadParameter(f"site {name!r} is given twice")
+        sites[name] = Path(folder)
+    return sites
+
+
+@click.command()
+@click.option(
+    "--site",
+    "sites",
+    multiple=True,
+    required=True,
+    callback=_site,
+    metavar="NAME=DIR",
+    help="A site's name and its study folder; repeatable. The name precedes the site's IDs: A-P001.",
+)
+@click.option("--to", required=True, type=Target(), metavar="DIR", help="New folder, or a merged study to add to.")
+def merge(sites: dict[str, Path], to: Path) -> None:
+    """Merge the study folders of several sites that ran one protocol; they are copied, unchanged.
+
+    Each site keeps its sealed key. The merged folder is RESULTS for report, export, plot, verify, unblind, exclude and
+    withdraw; participants are SITE-ID there.
+    """
+    from study_app.store.sites.merge import merge as merge_sites
+
+    with progress() as show:
+        show("copying")
+        made = merge_sites(sites, to)
+    for site in made.sites:
+        many = "1 session" if site.sessions == 1 else f"{site.sessions} sessions"
+        new = "merged" if site.name in sites else "kept  "
+        click.echo(f"{new}  site {site.name}: {many}, key {site.key_hash[:12]}")
+    click.echo(f"study {made.study}, protocol {made.protocol_hash[:12]}: {to}")
 
 
 @click.command()
@@ -235,11 +286,11 @@ def reproduce(session: Path) -> None:
 )
 def verify(results: Path, fingerprints: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings, Psych-DS."""
-    from study_app.store.verification.verify_study import verify as verify_study
+    from study_app.store.sites.verify_sites import verify_folder
 
     with progress() as show:
         show("checking every file")
-        found = verify_study(results, fingerprints)
+        found = verify_folder(results, fingerprints)
     for kind, findings in (
         ("error", (*found.errors, *found.psychds.errors)),
         ("warning", (*found.warnings, *found.psychds.warnings)),

@@ -33,7 +33,7 @@ def studies() -> None:
     """List the known protocols and the studies in the workspace."""
     from study_app.errors import ProtocolError
     from study_app.protocol.load import at_hand, is_scene_file, load
-    from study_app.store.folders import StudyFolder
+    from study_app.store.sites.merged import folders_of, sessions_in
     from study_app.store.workstation import recent_protocols
     from study_app.workspace import workspace as workspace_here
 
@@ -50,8 +50,10 @@ def studies() -> None:
             click.echo(f"  {name}  cannot be used: {error.problems[0]}")
     click.echo(f"Studies in {here.results.absolute()}")
     for folder in _studies(here.results):
-        count = len(StudyFolder(folder).sessions())
-        click.echo(f"  {folder.name}  {count} session{'' if count == 1 else 's'}")
+        places = folders_of(folder)
+        count = len(sessions_in(places.values()))
+        sites = "" if "" in places else f", sites {', '.join(prefix[:-1] for prefix in places)}"
+        click.echo(f"  {folder.name}  {count} session{'' if count == 1 else 's'}{sites}")
 
 
 @click.command()
@@ -59,19 +61,18 @@ def studies() -> None:
 @RESULTS
 def sessions(named: str | None, results: Path | None) -> None:
     """List the sessions of a study, or of every study in the workspace, with the names that commands accept."""
-    from study_app.store.exclusions import exclusions
-    from study_app.store.folders import StudyFolder
-    from study_app.store.tables.participants import participants
+    from study_app.store.sites.merged import all_exclusions, session_in
+    from study_app.store.sites.merged_rows import participants_of
     from study_app.workspace import workspace as workspace_here
 
     at = workspace_here().results
     folders = list(_studies(at)) if named is None and results is None else [study_at(named, results)]
     for folder in folders:
-        left_out = {row.what for row in exclusions(folder)}
-        place = folder.name if folder.parent.resolve() == at.resolve() else str(folder / "data")
-        for row in participants(StudyFolder(folder)):
+        left_out = {row.what for row in all_exclusions(folder)}
+        inside = folder.parent.resolve() == at.resolve()
+        for row in participants_of(folder):
             who, number = row["participant"], row["session"]
-            name = f"{place}/{who}/{number}" if place == folder.name else f"{place}/sub-{who}/ses-{number:02d}"
+            name = f"{folder.name}/{who}/{number}" if inside else str(session_in(folder, who, number).path)
             started = str(row["session_started_at"] or "")[:STARTED].replace("T", " ")
             mark = "  excluded" if (who, number, None) in left_out else ""
             click.echo(f"{name}  {started}  {row['status']}{mark}")
@@ -79,4 +80,6 @@ def sessions(named: str | None, results: Path | None) -> None:
 
 def _studies(results: Path) -> Iterator[Path]:
     """Yield the studies' folders, sorted."""
-    yield from sorted(path.parent for path in results.glob("*/data") if path.is_dir())
+    from study_app.store.sites.merged_rows import study_folders
+
+    yield from study_folders(results)

@@ -14,7 +14,7 @@ EXIT_FOUND = 3
 
 GROUPS: Final = {
     "Study": "new edit check design power preregister run resume rehearse studies sessions workspace",
-    "Data": "export plot report unblind exclude include withdraw verify rebuild reproduce replay",
+    "Data": "export plot report unblind exclude include withdraw merge verify rebuild reproduce replay",
     "Model": "scene simulate identify figures",
     "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds screenshots",
     "Devices": "devices emulate-falcon",
@@ -118,7 +118,7 @@ def session_at(named: str, results: Path | None) -> Path:
 
     With ``results``, a study's folder, the name is PARTICIPANT/NUMBER.
     """
-    from study_app.store.folders import StudyFolder
+    from study_app.store.sites.merged import session_in
     from study_app.workspace import workspace
 
     path = Path(named)
@@ -127,7 +127,7 @@ def session_at(named: str, results: Path | None) -> Path:
     study, rest = (Path(path.parts[0]), path.parts[1:]) if results is None else (results.absolute(), path.parts)
     number = rest[1] if len(rest) == 2 else "1"
     if len(rest) in (1, 2) and number.isdecimal():
-        place = StudyFolder(workspace().results / study).session(rest[0], int(number)).path
+        place = session_in(workspace().results / study, rest[0], int(number)).path
         return place if place.is_dir() else path
     return path
 

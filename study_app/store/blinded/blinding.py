@@ -120,7 +120,7 @@ def open_or_draw_key(
         _refuse_if_lost(study)
         content = _seal(protocol, drawn, random or secrets.SystemRandom().random, files)
         create_folder(study.blinding, {study.key.name: content}, mode=0o600)
-    key = _verified_key(study)
+    key = verified_key(study)
     if key.drawn != drawn:
         kinds = {"system": "real sessions", "seed": "a rehearsal"}
         raise StoreError(
@@ -140,7 +140,7 @@ def check_conditions(folder: Path, protocol: Protocol) -> None:
     """
     study = StudyFolder(folder)
     if is_there(study.key):
-        _refuse_other_conditions(study, _verified_key(study), protocol)
+        _refuse_other_conditions(study, verified_key(study), protocol)
 
 
 def _refuse_other_conditions(study: StudyFolder, key: Key, protocol: Protocol) -> None:
@@ -160,7 +160,7 @@ def same_conditions(folder: Path, protocol: Protocol) -> bool:
     StoreError
         The key is missing, unreadable or not the one the sessions ran under.
     """
-    return _verified_key(StudyFolder(folder)).tables_hash == _tables_hash(protocol)
+    return verified_key(StudyFolder(folder)).tables_hash == _tables_hash(protocol)
 
 
 def reveal(folder: Path, by: str, reason: str) -> Codes:
@@ -179,7 +179,7 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
         raise StoreError(
             f"{folder} is not a study folder (it has no {study.key.name}): name one such as results/rek2024"
         )
-    key = _verified_key(study)
+    key = verified_key(study)
     record = {
         "at": datetime.now().astimezone().isoformat(timespec="seconds"),
         "by": by.strip(),
@@ -200,7 +200,7 @@ def revealed_key(folder: Path) -> Key | None:
         It was revealed, and is now missing, unreadable or changed.
     """
     study = StudyFolder(folder)
-    return _verified_key(study) if reveals(folder) else None
+    return verified_key(study) if reveals(folder) else None
 
 
 def reveals(folder: Path) -> tuple[dict[str, str], ...]:
@@ -288,7 +288,7 @@ def _shares(protocol: Protocol) -> dict[str, int]:
     return {name: group.share for name, group in protocol.groups.items()}
 
 
-def _verified_key(study: StudyFolder) -> Key:
+def verified_key(study: StudyFolder) -> Key:
     """Read the key and compare its hash with what every session published."""
     key = read_key(study.path)
     for session in study.sessions():

@@ -34,6 +34,7 @@ from study_app.store.sessions.begin import make_recorder, note_allocation, surro
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
 from study_app.store.sessions.open_session import Place, SessionStore
 from study_app.store.sessions.participant_ids import refuse_never_begun
+from study_app.store.sites.merged import refuse_merged
 from study_app.store.tables.participants import write_participants
 from study_app.store.tables.study_description import write_description
 
@@ -90,6 +91,7 @@ def reopen(
     """
     study_folder, folder = locate(session_folder)
     refuse_never_begun(folder)
+    refuse_merged(study_folder.path)
     opening = open_alone(folder.path)
     try:
         left = _left(study_folder, folder, protocol, source)

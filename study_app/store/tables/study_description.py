@@ -18,6 +18,7 @@ from study_app.store.atomic import is_there, read_own, write_file
 from study_app.store.blinded.blinding import reveals
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.parsing import check_study_name, parse_json
+from study_app.store.sites.merged import refuse_merged
 from study_app.store.tables.cells import variable
 from study_app.store.tables.columns import LATER, SEALED, every_column
 
@@ -135,13 +136,14 @@ def described_study(folder: StudyFolder) -> str | None:
 
 
 def check_study(folder: StudyFolder, study: str) -> None:
-    """Refuse a folder that holds another study, or studies in folders of their own, or that lies within one.
+    """Refuse a folder of another study, of merged sites, of studies in folders of their own, or within one of these.
 
     Raises
     ------
     StoreError
         Says what the folder is, and which one to use.
     """
+    refuse_merged(folder.path)
     described = described_study(folder)
     if described is not None:
         if described != study:

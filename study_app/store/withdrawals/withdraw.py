@@ -29,6 +29,7 @@ from study_app.store.exclusions import exclusion_bytes, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals.parsing import parse_json
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
+from study_app.store.sites.merged import merged_above
 from study_app.store.tables.participants import write_participants
 from study_app.store.tables.study_description import described_study
 from study_app.store.verification.fingerprints import place_of
@@ -71,7 +72,7 @@ def withdraw(
 
     Erased are the participant's folder, the rows of tables and lists, and outputs in the results folder. A tombstone
     remains, and the participant's ID is not used again. Withdrawing again finishes what was interrupted, and reaches
-    further copies.
+    further copies. Where a folder is the copy of a site in a merged study, outputs of the merged study are erased, too.
 
     Parameters
     ----------
@@ -104,10 +105,11 @@ def withdraw(
     try:
         tombstone = _tombstone(study, participant, at, by.strip(), reason.strip())
         erased = [study.path] if _erase(study, tombstone) else []
-        outputs, elsewhere = _outputs(study)
+        outputs, elsewhere = _outputs(study.path)
     finally:
         opening.release()
     left = [*_names(study, participant)]
+    reached = [study.path]
     for copy in copies:
         opening = open_alone(copy.path)
         try:
@@ -116,8 +118,12 @@ def withdraw(
             elif _erase(copy, tombstone):
                 erased.append(copy.path)
                 left += _names(copy, participant)
+            reached += [copy.path] if _is_buried(copy, tombstone) else []
         finally:
             opening.release()
+    for merged in dict.fromkeys(filter(None, map(merged_above, reached))):
+        of_merged, merged_elsewhere = _outputs(merged)
+        outputs, elsewhere = (*outputs, *of_merged), (*elsewhere, *merged_elsewhere)
     return Withdrawn(tombstone, tuple(erased), outputs, elsewhere, tuple(left))
 
 
@@ -157,6 +163,13 @@ def _others(copy: StudyFolder, tombstone: Tombstone) -> list[Path]:
         for session in _sessions(copy, tombstone.participant)
         if describe_session(session).begun not in begun
     ]
+
+
+def _is_buried(copy: StudyFolder, tombstone: Tombstone) -> bool:
+    """Return whether a copy held the sessions that were erased, and now has a tombstone for them."""
+    known = tombstones(copy).get(tombstone.participant)
+    begun = {one.begun for one in tombstone.sessions if one.begun}
+    return known is not None and any(one.begun in begun for one in known.sessions)
 
 
 def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
@@ -227,9 +240,9 @@ def _keep_exclusions(study: StudyFolder, participant: str) -> bool:
     return kept != rows
 
 
-def _outputs(study: StudyFolder) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
-    own, results = study.path.resolve(), workspace().results.resolve()
-    return erase_outputs(study.path, results if own.is_relative_to(results) else own)
+def _outputs(study: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
+    own, results = study.resolve(), workspace().results.resolve()
+    return erase_outputs(study, results if own.is_relative_to(results) else own)
 
 
 def _names(study: StudyFolder, participant: str) -> Iterator[str]:

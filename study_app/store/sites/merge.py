@@ -1,0 +1,286 @@
+"""Merging: the results folders of sites are copied, unchanged, into a folder of one study.
+
+A new merged study is made under a temporary name and renamed. Further sites are copied into its folder first, where
+they do not count; then its list of sites is replaced in one step. A program that is killed leaves the old state or the
+new one, and perhaps folders that the next merge removes. Each site keeps its key: as sealed, or as opened, as it was.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+from study_app.errors import StoreError
+from study_app.store import receipt
+from study_app.store.atomic import (
+    cannot_write,
+    is_there,
+    open_regular,
+    paths_in,
+    sweep,
+    sync_folder,
+    temporaries,
+    temporary_path,
+    write_file,
+)
+from study_app.store.blinded.blinding import Key, verified_key
+from study_app.store.folders import ID_PATTERN, StudyFolder
+from study_app.store.sessions.folder_lock import create_opened, is_open, open_alone, refuse_if_open
+from study_app.store.sessions.unstarted_sessions import never_begun
+from study_app.store.sites.merged import FOLDER, Merged, Site, merged_above, read_merged
+from study_app.store.tables.study_description import described_study
+from study_app.store.withdrawals.tombstones import describe_session
+
+MAX_SITE_LENGTH: Final = 16
+LEFT_BEHIND: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
+"""What programs leave in a folder while they have it open, or when they are killed."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """What is known of a folder that is, or is to be, a site of a merged study.
+
+    ``protocol_hash`` is empty and ``pilot`` None where all participants withdrew; ``begun`` are the sessions' folders
+    by the SHA-256 of their journals' first lines.
+    """
+
+    name: str
+    study: str
+    protocol_hash: str
+    pilot: bool | None
+    key: Key
+    begun: Mapping[str, Path]
+
+
+def merge(given: Mapping[str, Path], to: Path, *, now: datetime | None = None) -> Merged:
+    """Copy the results folders of sites into the merged study ``to``, which is made, or gets further sites.
+
+    Parameters
+    ----------
+    given : mapping of str to Path
+        The sites' folders by the sites' names, which precede the participants' IDs.
+    to : Path
+        The merged study's folder.
+    now : datetime, optional
+        Wall time with its zone; by default the system's.
+
+    Raises
+    ------
+    StoreError
+        A name cannot be used or is used already, a folder is not the results of a study, is open in a program, or of
+        another protocol than the others (both hashes are named), a session is in two of them, or a file cannot be read
+        or written. The sites that are listed have not changed then.
+    """
+    merged = read_merged(to)
+    _check_names(given, merged)
+    _check_places(given, to, merged)
+    there = () if merged is None else tuple(_source(name, merged.folder(name)) for name in merged.names)
+    new = tuple(_source(name, path) for name, path in given.items())
+    if empty := next((name for name, one in zip(given, new, strict=True) if not one.begun), None):
+        raise StoreError(f"site {empty}: {given[empty]} holds no sessions: merge it when it does")
+    ran = new[0].protocol_hash if merged is None else merged.protocol_hash
+    _check_alike((*there, *new), ran)
+    _check_sessions((*there, *new))
+    at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
+    sites = tuple(Site(one.name, at, one.key.hash, len(one.begun)) for one in new)
+    if merged is None:
+        made = Merged(to, new[0].study, ran, sites)
+        _create(made, given)
+    else:
+        made = Merged(to, merged.study, merged.protocol_hash, (*merged.sites, *sites))
+        with open_alone(to):
+            if read_merged(to) != merged:
+                raise StoreError(f"{to} was changed by another program meanwhile: merge again")
+            _add(made, given)
+    return made
+
+
+def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
+    if not given:
+        raise StoreError("no site is given: name each as --site A=DIR")
+    used = {} if merged is None else {name.lower(): name for name in merged.names}
+    for name in given:
+        if not ID_PATTERN.fullmatch(name) or len(name) > MAX_SITE_LENGTH:
+            raise StoreError(
+                f"site {name!r} cannot be used as a name: only letters A-Z, a-z and digits 0-9 are permitted, at most "
+                f"{MAX_SITE_LENGTH}; for example A or Utrecht"
+            )
+        if (other := used.get(name.lower())) is not None:
+            held = "is merged already" if merged is not None and other in merged.names else "is given twice"
+            raise StoreError(f"site {name!r} {held} (capitals make no difference): use another name")
+        used[name.lower()] = name
+
+
+def _check_places(given: Mapping[str, Path], to: Path, merged: Merged | None) -> None:
+    target = to.resolve()
+    if merged is None and is_there(to) and (not to.is_dir() or any(to.iterdir())):
+        raise StoreError(f"{to} is not a merged study and not empty: name a new folder with --to")
+    for above in (target, *target.parents):
+        if described_study(StudyFolder(above)) is not None:
+            raise StoreError(f"{to} is, or lies within, the results folder {above}: name a folder outside of it")
+    for name, path in given.items():
+        if read_merged(path) is not None or merged_above(path) is not None:
+            raise StoreError(f"site {name}: {path} belongs to a merged study: name the folder of the site itself")
+        place = path.resolve()
+        if place.is_relative_to(target):
+            raise StoreError(f"site {name}: {path} lies within {to}: name a folder outside of it with --to")
+
+
+def _source(name: str, path: Path) -> _Source:
+    """Read what must agree between sites."""
+    study = StudyFolder(path)
+    described = described_study(study)
+    if described is None:
+        raise StoreError(
+            f"site {name}: {path} is not the results folder of a study (no {study.description.name}): name one such as "
+            "results/rek2024"
+        )
+    refuse_if_open(path)
+    sessions = [session for session in study.sessions() if not never_begun(session.path)]
+    for session in sessions:
+        refuse_if_open(session.path)
+    receipts = [receipt.read(session.receipt) for session in sessions]
+    hashes = dict.fromkeys(str(one["protocol_hash"]) for one in receipts)
+    if len(hashes) > 1:
+        raise StoreError(
+            f"site {name}: sessions in {path} ran under {len(hashes)} protocols (SHA-256 {', '.join(hashes)}): only "
+            "sites of one protocol, unchanged to the byte, can be merged"
+        )
+    return _Source(
+        name,
+        described,
+        next(iter(hashes), ""),
+        any(one["pilot"] for one in receipts) if receipts else None,
+        verified_key(study),
+        {describe_session(session).begun or str(session.path): session.path for session in sessions},
+    )
+
+
+def _check_alike(sources: tuple[_Source, ...], protocol_hash: str) -> None:
+    """Refuse sites of other protocols, and rehearsals or pilots next to participants."""
+    first = next((one for one in sources if one.protocol_hash), sources[0])
+    for other in sources:
+        if other.study != first.study or other.protocol_hash not in ("", protocol_hash):
+            raise StoreError(
+                f"site {other.name} ran the protocol {other.study} with SHA-256 {other.protocol_hash}, site "
+                f"{first.name} {first.study} with SHA-256 {protocol_hash}: only sites of one protocol, unchanged "
+                "to the byte, can be merged"
+            )
+        if other.key.drawn != first.key.drawn or other.pilot not in (None, first.pilot):
+            raise StoreError(
+                f"site {other.name} holds {_kind(other)}, site {first.name} {_kind(first)}: only sessions of one kind "
+                "can be merged"
+            )
+
+
+def _kind(source: _Source) -> str:
+    return "pilot sessions" if source.pilot else "rehearsals" if source.key.drawn == "seed" else "real sessions"
+
+
+def _check_sessions(sources: tuple[_Source, ...]) -> None:
+    """Refuse a session that is in two sites: it would count twice."""
+    seen: dict[str, Path] = {}
+    for one in sources:
+        for begun, path in one.begun.items():
+            if (other := seen.get(begun)) is not None:
+                raise StoreError(f"{path} is a copy of {other}, and would count twice: merge each session once")
+            seen[begun] = path
+
+
+def _create(merged: Merged, given: Mapping[str, Path]) -> None:
+    """Make the folder, whole or not at all."""
+    target = merged.path.absolute()
+    half = temporary_path(target)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _remove_killed(target)
+        opening = create_opened(half)
+        (half / FOLDER).mkdir()
+        for name, path in given.items():
+            _copy(path, half / FOLDER / name)
+        write_file(half / merged.manifest.name, merged.content())
+        sync_folder(half / FOLDER)
+        if opening is not None:
+            opening.release()
+        sync_folder(half)
+        if target.is_dir():
+            target.rmdir()
+        half.rename(target)
+        sync_folder(target.parent)
+    except OSError as error:  # shutil.Error, too
+        raise cannot_write(merged.path, error) from error
+    finally:
+        shutil.rmtree(half, ignore_errors=True)
+
+
+def _remove_killed(target: Path) -> None:
+    """Remove what merges that were killed left next to ``target``."""
+    for path in temporaries(target.parent):
+        if path.name.startswith(f".{target.name}.") and path.is_dir() and not is_open(path):
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _add(merged: Merged, given: Mapping[str, Path]) -> None:
+    """Copy further sites into the folder; they count from the moment on at which they are listed."""
+    place = merged.path / FOLDER
+    sweep(place)
+    copies: list[Path] = []
+    try:
+        for name, path in given.items():
+            copy = merged.folder(name)
+            if is_there(copy):  # of a merge that was killed: it is not listed
+                shutil.rmtree(copy)
+            half = temporary_path(copy)
+            copies.append(half)
+            _copy(path, half)
+            half.rename(copy)
+            copies[-1] = copy
+        sync_folder(place)
+        write_file(merged.manifest, merged.content())
+    except (OSError, StoreError) as error:
+        for copy in copies:
+            shutil.rmtree(copy, ignore_errors=True)
+        raise error if isinstance(error, StoreError) else cannot_write(merged.path, error) from error
+
+
+def _copy(path: Path, to: Path) -> None:
+    """Copy a results folder and flush it to the disk; links stay links, for `verify` to judge.
+
+    Raises
+    ------
+    StoreError
+        A program began to write there meanwhile.
+    """
+    before = _state(path)
+    shutil.copytree(path, to, symlinks=True, ignore=LEFT_BEHIND, copy_function=_copy_file)
+    for place in (to, *(one for one in paths_in(to) if one.is_dir() and not one.is_symlink())):
+        sync_folder(place)
+    refuse_if_open(path)
+    if _state(path) != before:
+        raise StoreError(f"{path} was changed while it was copied: merge when no program uses it")
+
+
+def _state(path: Path) -> list[tuple[Path, int, int]]:
+    """Return what changes when a file in a folder does."""
+    found = [(one, one.lstat()) for one in paths_in(path)]
+    return [(one, held.st_size, held.st_mtime_ns) for one, held in found if not one.is_dir()]
+
+
+def _copy_file(source: str, to: str, *, follow_symlinks: bool = True) -> str:
+    with open_regular(Path(source)) as file, Path(to).open("xb") as copy:
+        shutil.copyfileobj(file, copy)
+        copy.flush()
+        os.fsync(copy.fileno())
+    shutil.copystat(source, to, follow_symlinks=follow_symlinks)
+    return to
+
+
+def unlisted(merged: Merged) -> tuple[Path, ...]:
+    """Return what lies next to the sites and is none: left by a merge that was killed, or put there by somebody."""
+    place = merged.path / FOLDER
+    return tuple(sorted(path for path in place.iterdir() if path.name not in merged.names)) if place.is_dir() else ()

@@ -1,0 +1,204 @@
+"""A merged study's folder: which sites it holds, and which participant of which site an ID names.
+
+::
+
+    pooled/
+      sites.json      which sites there are; a folder below sites/ that it does not list does not count
+      sites/A/        the results folder of site A, as it was (see `store.folders`), with its sealed key
+      sites/B/
+
+There are no merged tables on the disk: whoever reads the folder makes them from the sites, so that a withdrawal, an
+exclusion or an opened key at a site is in them at once. In them a participant is SITE-ID, such as A-P007. Neither a
+site nor an ID holds a dash, so that equal IDs of two sites are two participants.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final
+
+from study_app.errors import StoreError
+from study_app.store.atomic import cannot_read, read_regular
+from study_app.store.exclusions import Exclusion, exclusions
+from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
+from study_app.store.journals.parsing import check_study_name, parse_json
+
+MANIFEST: Final = "sites.json"
+FOLDER: Final = "sites"
+FORMAT: Final = 1
+DASH: Final = "-"
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A site of a merged study, as ``sites.json`` lists it.
+
+    Attributes
+    ----------
+    name : str
+        Letters and digits.
+    merged_at : str
+        When its folder was merged: wall time with its zone.
+    key_hash : str
+        SHA-256 of its sealed key.
+    sessions : int
+        How many sessions it had then.
+    """
+
+    name: str
+    merged_at: str
+    key_hash: str
+    sessions: int
+
+
+@dataclass(frozen=True, slots=True)
+class Merged:
+    """A merged study: its folder, the study's name, the SHA-256 of the one protocol that all sites ran, the sites."""
+
+    path: Path
+    study: str
+    protocol_hash: str
+    sites: tuple[Site, ...]
+
+    @property
+    def manifest(self) -> Path:
+        """The list of sites."""
+        return self.path / MANIFEST
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the sites."""
+        return tuple(site.name for site in self.sites)
+
+    def folder(self, site: str) -> Path:
+        """Return the results folder of a site."""
+        return self.path / FOLDER / site
+
+    def content(self) -> bytes:
+        """Return ``sites.json``."""
+        held = {
+            "format": FORMAT,
+            "study": self.study,
+            "protocol_hash": self.protocol_hash,
+            "sites": [asdict(site) for site in self.sites],
+        }
+        return f"{json.dumps(held, indent=2)}\n".encode()
+
+
+def read_merged(folder: Path) -> Merged | None:
+    """Return the merged study in ``folder``; None where it is none.
+
+    Raises
+    ------
+    StoreError
+        Its list of sites cannot be read.
+    """
+    path = folder / MANIFEST
+    try:
+        held = parse_json(read_regular(path))
+        if held["format"] != FORMAT:
+            raise StoreError(f"{path} has format {held['format']!r}, this version reads {FORMAT}: use a newer version")
+        sites = tuple(Site(**site) for site in held["sites"])
+        if sites and all(map(_is_site, sites)) and isinstance(held["protocol_hash"], str):
+            return Merged(folder, check_study_name(held["study"]), held["protocol_hash"], sites)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    except (ValueError, KeyError, TypeError):
+        pass
+    raise StoreError(f"{path} does not list the sites of a merged study: restore it from a copy")
+
+
+def _is_site(site: Site) -> bool:
+    texts = all(isinstance(text, str) for text in (site.name, site.merged_at, site.key_hash))
+    return texts and isinstance(site.sessions, int) and ID_PATTERN.fullmatch(site.name) is not None
+
+
+def folders_of(folder: Path) -> dict[str, Path]:
+    """Return the results folders in ``folder`` by what precedes their IDs: "A-" of site A, "" where it is not merged.
+
+    Raises
+    ------
+    StoreError
+        The list of sites cannot be read.
+    """
+    merged = read_merged(folder)
+    return {"": folder} if merged is None else {f"{name}{DASH}": merged.folder(name) for name in merged.names}
+
+
+def own_place(folder: Path, participant: str) -> tuple[Path, str]:
+    """Return the results folder that holds a participant, and the participant's ID there.
+
+    Raises
+    ------
+    StoreError
+        The study is merged, and the ID names none of its sites.
+    """
+    folders = folders_of(folder)
+    if "" in folders:
+        return folder, participant
+    site, dash, own = participant.partition(DASH)
+    if (place := folders.get(f"{site}{dash}")) is None or not own:
+        known = ", ".join(name.removesuffix(DASH) for name in folders)
+        raise StoreError(
+            f"{folder} holds several sites ({known}), and {participant!r} names none of them: give SITE-ID, such as "
+            f"{next(iter(folders))}P007"
+        )
+    return place, own
+
+
+def session_in(folder: Path, participant: str, number: int) -> SessionFolder:
+    """Return where a session lies or would lie, in a merged study by the participant's ID with the site.
+
+    Raises
+    ------
+    StoreError
+        The study is merged, and the ID names none of its sites.
+    """
+    place, own = own_place(folder, participant)
+    return StudyFolder(place).session(own, number)
+
+
+def all_exclusions(folder: Path) -> tuple[Exclusion, ...]:
+    """Return what is left out of a study, merged or not.
+
+    Raises
+    ------
+    StoreError
+        A list cannot be read.
+    """
+    return tuple(
+        Exclusion(f"{prefix}{row.participant}", row.session, row.trial, row.rule_or_person, row.reason, row.excluded_at)
+        for prefix, place in folders_of(folder).items()
+        for row in exclusions(place)
+    )
+
+
+def sessions_in(folders: Iterable[Path]) -> tuple[SessionFolder, ...]:
+    """Return the sessions of some results folders."""
+    return tuple(session for folder in folders for session in StudyFolder(folder).sessions())
+
+
+def merged_above(folder: Path) -> Path | None:
+    """Return the merged study of which ``folder`` is a copy of a site; None where it is none."""
+    place = folder.resolve()
+    inside = place.parent.name == FOLDER and (place.parents[1] / MANIFEST).is_file()
+    return place.parents[1] if inside else None
+
+
+def refuse_merged(folder: Path) -> None:
+    """Refuse to run sessions in a merged study, or in its copy of a site.
+
+    Raises
+    ------
+    StoreError
+        It is one.
+    """
+    if (folder / MANIFEST).is_file():
+        raise StoreError(f"{folder} is a merged study, which holds copies: run sessions in the folder of a site")
+    if (above := merged_above(folder)) is not None:
+        raise StoreError(f"{folder} is the copy of a site in the merged study {above}: run sessions in the site's own")

@@ -1,0 +1,33 @@
+"""Lists of studies and sessions that merged studies are in, too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from study_app.store.folders import StudyFolder
+from study_app.store.sites.merged import MANIFEST, folders_of
+from study_app.store.tables.csv_files import Row
+from study_app.store.tables.participants import participants
+
+
+def participants_of(folder: Path) -> list[Row]:
+    """Return one row per session of a study; in a merged one by site, with the site in the participants' IDs.
+
+    Raises
+    ------
+    StoreError
+        The list of sites cannot be read.
+    """
+    return [
+        {**row, "participant": f"{prefix}{row['participant']}"}
+        for prefix, place in folders_of(folder).items()
+        for row in participants(StudyFolder(place))
+    ]
+
+
+def study_folders(results: Path) -> Iterator[Path]:
+    """Yield the folders of studies and of merged studies under ``results``, sorted."""
+    found = {path.parent for path in results.glob("*/data") if path.is_dir()}
+    found |= {path.parent for path in results.glob(f"*/{MANIFEST}") if not path.parent.name.startswith(".")}
+    yield from sorted(found)

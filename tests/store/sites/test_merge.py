@@ -1,0 +1,304 @@
+"""Merging sites: folders are copied unchanged, whole or not at all, and every site stays provable."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from study_app.cli import commands
+from study_app.errors import StoreError
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store.blinded.blinding import reveals
+from study_app.store.exclusions import exclusions
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.sites.merge import merge
+from study_app.store.sites.merged import all_exclusions, own_place, read_merged
+from study_app.store.sites.merged_rows import participants_of
+from study_app.store.sites.unblind_sites import all_opened, reveals_of
+from study_app.store.sites.verify_sites import verify_folder
+from study_app.store.tables.study_description import check_study
+from study_app.store.verification.verify_study import verify
+from study_app.store.withdrawals.output_log import write_output
+from study_app.store.withdrawals.withdraw import withdraw
+from tests.studies import made_up
+
+pytestmark = pytest.mark.slow
+
+KILLED = """
+import os, shutil, signal, sys
+from pathlib import Path
+from study_app.store import atomic
+from study_app.store.sites import merge as merging
+
+left = int(sys.argv[3])
+
+def stop(*words, **options):
+    global left
+    left -= 1
+    if left < 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+for module, name in ((merging, "_copy_file"), (merging, "write_file"), (merging, "sync_folder"), (Path, "rename")):
+    def watched(*words, whole=getattr(module, name), **options):
+        stop()
+        return whole(*words, **options)
+    setattr(module, name, watched)
+merging.merge({"C": Path(sys.argv[1])}, Path(sys.argv[2]))
+print(left)
+"""
+
+
+@pytest.fixture(scope="module")
+def labs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Return the folders of three sites, each with its own key; do not change them."""
+    root = tmp_path_factory.mktemp("labs")
+    felt = made_up("demo")
+    return {
+        site: rehearse_answers("demo", participants=2, seed=seed, results=root / site / "demo", felt=felt)
+        for seed, site in enumerate("ABC", start=1)
+    }
+
+
+@pytest.fixture
+def pooled(labs: dict[str, Path], results: Path) -> Path:
+    """Return a merged study of sites A and B."""
+    merge({site: labs[site] for site in "AB"}, results / "pooled")
+    return results / "pooled"
+
+
+@pytest.fixture
+def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the results folder of the workspace."""
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    return tmp_path / "results"
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(commands, [str(word) for word in words])
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_sites_are_copied_unchanged_and_sound(labs: dict[str, Path], pooled: Path) -> None:
+    for site in "AB":
+        assert contents(pooled / "sites" / site) == contents(labs[site])
+        assert verify(pooled / "sites" / site).sound
+        copy = labs[site] / "fingerprints.txt"
+        assert verify(pooled / "sites" / site, copy).sound
+    found = verify_folder(pooled)
+    assert (found.sound, found.sessions) == (True, 4)
+    key = StudyFolder(pooled / "sites/A").key
+    assert key.stat().st_mode & 0o777 == StudyFolder(labs["A"]).key.stat().st_mode & 0o777
+
+
+def test_a_site_can_be_added_later(labs: dict[str, Path], pooled: Path) -> None:
+    before = contents(pooled)
+    made = merge({"C": labs["C"]}, pooled)
+    assert made.names == ("A", "B", "C")
+    assert read_merged(pooled) == made
+    after = contents(pooled)
+    assert {name: after[name] for name in before if name != "sites.json"} == {
+        name: content for name, content in before.items() if name != "sites.json"
+    }
+    assert verify_folder(pooled).sessions == 6
+
+
+def test_equal_ids_of_two_sites_are_two_participants(pooled: Path) -> None:
+    rows = participants_of(pooled)
+    assert [row["participant"] for row in rows] == ["A-P001", "A-P002", "B-P001", "B-P002"]
+    assert own_place(pooled, "B-P001") == (pooled / "sites/B", "P001")
+    for wrong in ("P001", "D-P001", "B-"):
+        with pytest.raises(StoreError, match=r"several sites \(A, B\)"):
+            own_place(pooled, wrong)
+
+
+def test_another_protocol_is_refused_with_both_hashes(labs: dict[str, Path], results: Path) -> None:
+    other = shutil.copytree(labs["B"], results / "other")
+    for receipt in other.glob("data/sub-*/ses-*/receipt.json"):
+        held = json.loads(receipt.read_text())
+        receipt.write_text(json.dumps(held | {"protocol_hash": "f" * 64}))
+    first = json.loads(next(labs["A"].glob("data/sub-*/ses-*/receipt.json")).read_text())["protocol_hash"]
+    with pytest.raises(StoreError, match=rf"site B ran .* {'f' * 64}, site A demo with SHA-256 {first}"):
+        merge({"A": labs["A"], "B": other}, results / "pooled")
+    assert not (results / "pooled").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("A={A}", "a={B}"), "site 'a' is given twice"),
+        (("A-1={A}",), "only letters A-Z, a-z and digits 0-9"),
+        (("A={A}", "B={A}"), "is a copy of"),
+        (("A={A}/data",), "is not the results folder of a study"),
+        (("A={A}", "B={pooled}"), "belongs to a merged study"),
+        (("A={A}", "B={pooled}/sites/B"), "belongs to a merged study"),
+        (("A={A}", "B=nowhere"), "is not the results folder of a study"),
+    ],
+)
+def test_what_cannot_be_merged_is_refused(
+    words: tuple[str, ...], says: str, labs: dict[str, Path], pooled: Path, results: Path
+) -> None:
+    sites = [part for word in words for part in ("--site", word.format(**labs, pooled=pooled))]
+    done = run("merge", *sites, "--to", results / "new")
+    assert isinstance(done.exception, StoreError)
+    assert says in str(done.exception)
+    assert not (results / "new").exists()
+
+
+def test_an_open_folder_and_a_used_target_are_refused(labs: dict[str, Path], results: Path, tmp_path: Path) -> None:
+    lab = Path(shutil.copytree(labs["A"], tmp_path / "lab"))
+    with open_alone(lab / "data/sub-P001/ses-01"), pytest.raises(StoreError, match="is open in another program"):
+        merge({"A": lab}, results / "pooled")
+    with pytest.raises(StoreError, match="not empty"):
+        merge({"A": lab}, tmp_path)
+    with pytest.raises(StoreError, match=r"lies within, the results folder"):
+        merge({"B": labs["B"]}, lab / "pooled")
+    assert list(results.parent.glob("**/.*.tmp")) == []
+
+
+def test_a_folder_that_changes_while_it_is_copied_is_refused(
+    labs: dict[str, Path], results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = Path(shutil.copytree(labs["A"], tmp_path / "lab"))
+    copytree = shutil.copytree
+
+    def copy_while_a_session_ends(*words: object, **options: object) -> object:
+        (lab / "fingerprints.txt").write_text("another line")
+        return copytree(*words, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("shutil.copytree", copy_while_a_session_ends)
+    with pytest.raises(StoreError, match="was changed while it was copied"):
+        merge({"A": lab}, results / "pooled")
+    assert list(results.iterdir()) == []
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_a_killed_merge_leaves_the_old_state_or_the_new_one(exists: bool, labs: dict[str, Path], results: Path) -> None:
+    to, old, states = results / "killed", dict[str, bytes](), []
+    for kill_at in (0, 3, 10, *range(20, 60, 2), *range(60, 90)):
+        shutil.rmtree(to, ignore_errors=True)
+        if exists:
+            merge({"A": labs["A"]}, to)
+            old = contents(to)
+        words = [sys.executable, "-c", KILLED, str(labs["C"]), str(to), str(kill_at)]
+        done = subprocess.run(words, check=False, capture_output=True, text=True)
+        merged = read_merged(to)
+        listed = () if merged is None else merged.names
+        states.append(listed)
+        if merged is not None:
+            assert verify_folder(to).sound
+        if "C" not in listed:
+            assert done.returncode == -signal.SIGKILL
+            held = {} if merged is None else contents(to)
+            assert {name: held.get(name) for name in old} == old
+            assert merge({"C": labs["C"]}, to).names[-1] == "C"
+        assert contents(to / "sites/C") == contents(labs["C"])
+        assert [path.name for path in (to / "sites").iterdir() if path.name not in ("A", "C")] == []
+        if done.returncode == 0:
+            break
+    assert {"C" in listed for listed in states} == {False, True}
+
+
+def test_what_is_no_listed_site_does_not_count_and_is_named(labs: dict[str, Path], pooled: Path) -> None:
+    shutil.copytree(labs["C"], pooled / "sites/C")
+    assert len(participants_of(pooled)) == 4
+    assert "sites/C: is no site that sites.json lists" in "\n".join(map(str, verify_folder(pooled).warnings))
+
+
+def test_verify_finds_what_was_changed_after_merging(labs: dict[str, Path], pooled: Path) -> None:
+    response = next((pooled / "sites/B").glob("data/sub-P001/ses-01/*responses*"))
+    response.write_bytes(response.read_bytes() + b"x")
+    assert any(str(one).startswith("sites/B/data/sub-P001/ses-01/") for one in verify_folder(pooled).errors)
+    shutil.rmtree(pooled / "sites/A/data/sub-P001")
+    assert "is missing, but fingerprints.txt lists it" in "\n".join(map(str, verify_folder(pooled).errors))
+    shutil.rmtree(pooled / "sites/B")
+    assert "sites/B: is missing" in "\n".join(map(str, verify_folder(pooled).errors))
+    shutil.copytree(labs["C"], pooled / "sites/B")
+    assert "is not the key that site B was merged with" in "\n".join(map(str, verify_folder(pooled).errors))
+
+
+def test_a_damaged_list_of_sites_is_refused(pooled: Path) -> None:
+    for text in ("{", "[]", '{"format": 1}', '{"format": 1, "study": "demo", "protocol_hash": "", "sites": [{}]}'):
+        (pooled / "sites.json").write_text(text)
+        with pytest.raises(StoreError, match="does not list the sites"):
+            read_merged(pooled)
+    (pooled / "sites.json").write_text('{"format": 2}')
+    with pytest.raises(StoreError, match="format 2"):
+        read_merged(pooled)
+
+
+def test_keys_stay_sealed_and_are_opened_each(labs: dict[str, Path], pooled: Path) -> None:
+    assert reveals_of(pooled) == ()
+    one = run("unblind", pooled / "sites/B", "--by", "AK", "--reason", "closed")
+    assert one.exit_code == 0
+    assert not all_opened(pooled)
+    done = run("unblind", pooled, "--by", "AK", "--reason", "closed")
+    assert done.exit_code == 0
+    assert all_opened(pooled)
+    assert [(one["site"], one["by"]) for one in reveals_of(pooled)] == [("A", "AK"), ("B", "AK"), ("B", "AK")]
+    assert {line.split()[1].partition("-")[0] for line in done.output.splitlines()} == {"A", "B"}
+    assert reveals(labs["A"]) == ()
+    assert verify_folder(pooled).sound
+
+
+def test_exclusions_go_to_the_site(pooled: Path) -> None:
+    assert run("exclude", pooled, "--participant", "B-P001", "--by", "AK", "--reason", "x").output == (
+        "participant B-P001, session 1\n"
+    )
+    assert [row.participant for row in all_exclusions(pooled)] == ["B-P001"]
+    assert [row.participant for row in exclusions(pooled / "sites/B")] == ["P001"]
+    assert exclusions(pooled / "sites/A") == ()
+    assert run("include", pooled, "--participant", "B-P001", "--by", "AK", "--reason", "x").exit_code == 0
+    assert all_exclusions(pooled) == ()
+
+
+def test_no_session_runs_in_a_merged_study(pooled: Path) -> None:
+    for folder in (pooled, pooled / "sites/A"):
+        with pytest.raises(StoreError, match=r"run sessions in (the folder of a site|the site's own)"):
+            check_study(StudyFolder(folder), "demo")
+
+
+def test_a_withdrawal_reaches_the_merged_copy_of_that_site_alone(
+    labs: dict[str, Path], pooled: Path, results: Path, tmp_path: Path
+) -> None:
+    lab = Path(shutil.copytree(labs["A"], tmp_path / "lab"))
+    write_output(pooled, results / "tables", {"table.csv": b"of A-P001"})
+    done = withdraw(lab, "P001", by="AK", reason="asked", also=[results])
+    assert done.folders == (lab, pooled / "sites/A")
+    assert (pooled / "sites/B/data/sub-P001/ses-01/journal.jsonl").is_file()
+    assert [path.name for path in done.outputs] == ["table.csv"]
+    assert list((results / "tables").iterdir()) == []
+    assert [row["participant"] for row in participants_of(pooled)] == ["A-P002", "B-P001", "B-P002"]
+    assert verify_folder(pooled).sound
+
+
+def test_a_participant_of_a_merged_study_withdraws_from_copy_and_site(
+    labs: dict[str, Path], pooled: Path, tmp_path: Path
+) -> None:
+    lab = Path(shutil.copytree(labs["B"], tmp_path / "lab"))
+    words = ("--participant", "B-P002", "--by", "AK", "--reason", "asked", "--also", lab)
+    done = run("withdraw", pooled, *words)
+    assert done.exit_code == 0, done.exception
+    assert not (pooled / "sites/B/data/sub-P002").exists()
+    assert not (lab / "data/sub-P002").exists()
+    assert (pooled / "sites/A/data/sub-P002").is_dir()
+    assert verify_folder(pooled).sound
+    assert run("withdraw", pooled, "--participant", "P002", "--by", "AK", "--reason", "asked").exit_code != 0
+
+
+def test_studies_and_sessions_list_a_merged_study(pooled: Path) -> None:
+    assert "  pooled  4 sessions, sites A, B" in run("studies").output
+    names = [line.split()[0] for line in run("sessions", "pooled").output.splitlines()]
+    assert names == ["pooled/A-P001/1", "pooled/A-P002/1", "pooled/B-P001/1", "pooled/B-P002/1"]
+    for name in names:
+        assert "reproduced" in run("reproduce", name).output
