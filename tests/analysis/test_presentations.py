@@ -12,8 +12,8 @@ from study_app.analysis.export.codebook import codebook_bytes
 from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
 from study_app.analysis.findings.delay_trend import FINDING as TREND
 from study_app.analysis.findings.detection_threshold import FINDING as THRESHOLD
+from study_app.analysis.findings.factors.session_comparison import FINDING as SESSIONS
 from study_app.analysis.findings.other_assumptions import FINDING as AGAIN
-from study_app.analysis.findings.session_comparison import FINDING as SESSIONS
 from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
 from study_app.analysis.report.block_section import block
 from study_app.analysis.report.methods_paragraph import methods

@@ -39,8 +39,9 @@ class Asked:
     """A block's answers as arrays, settings in their order; NaN where one is missing.
 
     ``values`` (participants, settings) are the medians of ``single`` answers (participants, settings, presentations);
-    ``sessions`` of the same shape are the sessions in which these were given. ``verdicts_only``: leave out what decides
-    no verdict, for thousands of simulated studies.
+    ``sessions`` of the same shape are the sessions in which these were given. ``sites`` are those of
+    the participants of a merged study. ``verdicts_only``: leave out what decides no verdict, for thousands of simulated
+    studies.
     """
 
     block: Block
@@ -54,6 +55,7 @@ class Asked:
     sessions: Mapping[str, Array]
     planning: bool = True
     verdicts_only: bool = False
+    sites: tuple[str, ...] = ()
 
     @property
     def n(self) -> int:
@@ -102,9 +104,10 @@ def asked(
     }
     single = {item: answers_ for item, (answers_, _) in given.items()}
     sessions = {item: numbers for item, (_, numbers) in given.items()}
-    return of_tables(
+    found = of_tables(
         block, study.decided, people, single, sessions, seed=seed, each=each, failures=failures, planning=planning
     )
+    return replace(found, sites=tuple(map(study.site_of, people))) if study.sites else found
 
 
 def of_tables(

@@ -13,7 +13,7 @@ from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.tables.study import Study
-from study_app.store.blinded import blinding
+from study_app.store.sites.unblind_sites import reveals_of
 from study_app.store.tables.column import MISSING, Column
 from study_app.store.tables.columns import SEALED
 from study_app.store.tables.formulas import COMPUTED
@@ -33,6 +33,7 @@ def head(study: Study) -> dict[str, Any]:
         "title": study.title,
         "version": study.version,
         "participants": study.n,
+        **({"sites": list(study.sites)} if study.sites else {}),
         "sessions": len(study.participants),
         "sessions_left_out": study.left_out,
         "sessions_excluded": len(study.excluded_sessions),
@@ -50,7 +51,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         "missing": MISSING,
         "blinded": not study.revealed,
         "sealed_columns": [] if study.revealed else sorted(SEALED | names_of_sealed(study)),
-        "key_opened": list(blinding.reveals(study.folder)),
+        "key_opened": list(reveals_of(study.folder)),
         "doubts": [
             {"file": doubt.path.relative_to(study.folder).as_posix(), "what": doubt.what} for doubt in study.doubts
         ],

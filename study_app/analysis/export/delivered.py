@@ -7,6 +7,7 @@ from typing import Final
 
 import pandas as pd
 
+from study_app.analysis.tables.study import Study
 from study_app.store.tables.column import Column, header, optional
 from study_app.store.tables.columns import PARTICIPANTS
 
@@ -32,6 +33,19 @@ class Delivered:
     name: str
     columns: tuple[Column, ...]
     frame: pd.DataFrame
+
+
+SITE: Final = Column("site", "text", "The site whose participant this is: the part of the ID before the dash.")
+
+
+def with_site(study: Study, table: Delivered) -> Delivered:
+    """Return a table of a merged study with the column ``site`` after that of participants; any other as it is."""
+    if not study.sites or "participant" not in header(table.columns):
+        return table
+    place = header(table.columns).index("participant") + 1
+    sites = pd.array([study.site_of(str(one)) for one in table.frame["participant"]], dtype="string")
+    columns = (*table.columns[:place], SITE, *table.columns[place:])
+    return delivered(table.name, columns, table.frame.assign(site=sites))
 
 
 def delivered(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) -> Delivered:

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.export.delivered import JUDGED, Delivered, delivered
+from study_app.analysis.export.delivered import JUDGED, Delivered, delivered, with_site
 from study_app.analysis.export.level_tables import level_tables
 from study_app.analysis.tables.compared_blocks import Setting
 from study_app.analysis.tables.measures import AGREEMENT, LEVELS, QUARTILES
@@ -76,7 +76,7 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
     trials = trials if study.revealed else unsealed(trials)
     responses = tables_of(study.protocol_format)["responses"]
     about = achieved if responses is RESPONSES else _may_miss(achieved)
-    return (
+    tables = (
         delivered("responses", (*responses, *JUDGED, *about), _named(study, _with_delay_error(study))),
         delivered(
             "trials",
@@ -86,6 +86,7 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
         delivered("aggregate", (*_aggregate_head(), *opened, *MEASURED), _aggregate(study)),
         *level_tables(study),
     )
+    return tuple(with_site(study, table) for table in tables)
 
 
 def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:

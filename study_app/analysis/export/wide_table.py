@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis.designs.questions import scored
-from study_app.analysis.export.delivered import Delivered
+from study_app.analysis.export.delivered import Delivered, with_site
 from study_app.analysis.tables.asked_questions import AskedQuestion, AskedScore
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting, setting_name
 from study_app.analysis.tables.measures import Array, by_participant
@@ -67,7 +67,7 @@ def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
         *(_column(name, one, frame) for name, one in named.items()),
         *(_question_column(name, one, frame) for name, one in others.items()),
     )
-    return Delivered("wide", columns, frame), {**named, **others}
+    return with_site(study, Delivered("wide", columns, frame)), {**named, **others}
 
 
 def _others(study: Study) -> dict[str, QuestionCells]:

@@ -1,4 +1,7 @@
-"""What is asked of the answers of a block: a module a finding, whose ``FINDING`` says all that the others need."""
+"""What is asked of the answers of a block: a module a finding, whose ``FINDING`` says all that the others need.
+
+Modules of folders in this one, such as ``factors``, are findings, too.
+"""
 
 from __future__ import annotations
 
@@ -13,5 +16,6 @@ from study_app.discovery import modules_of
 @cache
 def all_findings() -> tuple[Finding[Any], ...]:
     """Return the ``FINDING`` of every module of this folder, in the order of their places."""
-    found = (module.FINDING for module in modules_of(sys.modules[__name__]))
-    return tuple(sorted(found, key=lambda finding: finding.place))
+    here = list(modules_of(sys.modules[__name__]))
+    modules = [inner for one in here for inner in (modules_of(one) if hasattr(one, "__path__") else [one])]
+    return tuple(sorted((module.FINDING for module in modules), key=lambda finding: finding.place))

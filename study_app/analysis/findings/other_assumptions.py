@@ -56,7 +56,9 @@ def asked_again(answers: Asked, columns: Array | None, what: str) -> tuple[Other
         models = {}
         for item in answers.block.items:
             answers.each(item.short)
-            models[item.id] = ordinal(answers.single[item.id], columns, sessions=answers.sessions[item.id])
+            models[item.id] = ordinal(
+                answers.single[item.id], columns, sessions=answers.sessions[item.id], sites=answers.sites or None
+            )
         mixed = tuple(
             alone(model, item, answers.decided, f"{answers.block.id}: mixed model") for item, model in models.items()
         )
@@ -80,6 +82,8 @@ def asked_again(answers: Asked, columns: Array | None, what: str) -> tuple[Other
 def _no_model(answers: Asked) -> str:
     if answers.k < 2:
         return "there is one setting"
+    if answers.sites and not answers.block.revealed:
+        return "each site has settings of its own until the keys of all sites are open"
     if answers.n < FEW:
         return f"with {counted(answers.n)}, below {FEW}, its estimates and errors would not hold"
     if answers.n > MANY:

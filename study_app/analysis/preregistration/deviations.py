@@ -10,6 +10,7 @@ from study_app.analysis.report.html_page import bullets, heading, paragraph
 from study_app.analysis.results.words import counted, listed
 from study_app.analysis.tables.study import Study
 from study_app.store.exclusions import named
+from study_app.store.sites.merged import folders_of
 
 SHOWN = 20
 
@@ -34,7 +35,7 @@ def deviations(study: Study) -> Deviations | None:
     AnalysisError
         The preregistration cannot be read.
     """
-    committed = read(study.folder)
+    committed = next(filter(None, map(read, folders_of(study.folder).values())), None)
     planned = (study.protocol.get("analysis") or {}).get("participants")
     if committed is None:
         return None if planned is None else Deviations(None, tuple(_participants(study, planned)))

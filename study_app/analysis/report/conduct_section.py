@@ -10,7 +10,7 @@ from study_app.analysis.report.html_page import bullets, heading, paragraph, tab
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.delivered_delay import Delivered
 from study_app.analysis.results.words import counted, listed, ms, name, number, settings_noun, short
-from study_app.analysis.tables.group_means import group_counts, group_means
+from study_app.analysis.tables.group_means import By, group_counts, group_means
 from study_app.analysis.tables.performance import DEFINITIONS as TRIAL_DEFINITIONS
 from study_app.analysis.tables.performance import OF_REACHES, OF_TRIALS, Performance
 from study_app.analysis.tables.reaches import DEFINITIONS as REACH_DEFINITIONS
@@ -18,6 +18,7 @@ from study_app.analysis.tables.study import Study
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.exclusions import named
 
+TESTED_BY_BLOCK: Final = "Sites are compared in the section of each block."
 UNITS: Final = {"s": "s", "m": "m", "mm": "mm", "n": "N", "percent": "%"}
 SHOWN: Final = 20
 """So many exclusions and doubts are listed; all of them stand in report.json."""
@@ -32,6 +33,10 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         f"{listed([f'{count} {status}' for status, count in states.most_common()])}. Counted: "
         f"{counted(study.n, 'participant')}."
     )
+    if study.sites:
+        here = Counter(map(study.site_of, study.people))
+        people = listed([f"{site} with {counted(here[site], 'participant')}" for site in study.sites])
+        yield paragraph(f"Merged sites: {people}, counted.")
     if study.withdrawn:
         yield paragraph(f"{counted(study.withdrawn, 'participant').capitalize()} withdrew; their data were erased.")
     masked = Counter(map(str, study.participants["motors_masked"].dropna()))
@@ -52,14 +57,14 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
     yield from _orders(results)
 
 
-def groups(study: Study, results: Results) -> Iterator[str]:
-    """Yield the section on groups: their sizes, and the answers in each block by group; nothing without groups."""
-    counts = group_counts(study)
+def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
+    """Yield the section on groups, or sites: their sizes, and the answers in each block; nothing without any."""
+    counts = group_counts(study, by)
     if not counts:
         return
-    yield heading(2, "Groups")
-    yield table(("Group", "participants"), [[group, str(count)] for group, count in counts.items()])
-    means = list(group_means(study))
+    yield heading(2, f"{by.capitalize()}s")
+    yield table((by.capitalize(), "participants"), [[group, str(count)] for group, count in counts.items()])
+    means = list(group_means(study, by))
     for found in results.blocks:
         rows = [
             [
@@ -75,11 +80,11 @@ def groups(study: Study, results: Results) -> Iterator[str]:
         ]
         if rows:
             yield heading(3, found.title)
-            head = ("Statement", settings_noun(found).capitalize(), "Group", "n", "mean", "SD")
+            head = ("Statement", settings_noun(found).capitalize(), by.capitalize(), "n", "mean", "SD")
             yield table(head, rows, words=3)
     yield paragraph(
-        "Mean and standard deviation over participants, each with the mean of their answers. Differences between "
-        "groups are described, not tested.",
+        "Mean and standard deviation over participants, each with the mean of their answers. "
+        + ("Differences between groups are described, not tested." if by == "group" else TESTED_BY_BLOCK),
         "soft",
     )
 

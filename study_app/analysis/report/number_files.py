@@ -21,9 +21,10 @@ from study_app.analysis.results.block_results import Results
 from study_app.analysis.results.section_failures import Failure, Failures
 from study_app.analysis.results.words import name
 from study_app.analysis.tables.study import Study
-from study_app.store.blinded import blinding
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
+from study_app.store.sites.merged import MANIFEST, folders_of
+from study_app.store.sites.unblind_sites import reveals_of
 from study_app.store.tables.column import Column, optional
 from study_app.store.tables.csv_files import csv_bytes
 
@@ -81,7 +82,7 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
         "study": lambda: {
             **head(study),
             "blinded": not study.revealed,
-            "key_opened": list(blinding.reveals(study.folder)),
+            "key_opened": list(reveals_of(study.folder)),
         },
         "sessions": lambda: sessions(study),
         "exclusions": lambda: [asdict(one) for one in study.exclusions],
@@ -90,7 +91,7 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
         **{what: partial(plain, text) for what, text in texts.items()},
         "results": lambda: plain(results),
     }
-    if (study.folder / PREREGISTRATION).exists():
+    if any((place / PREREGISTRATION).exists() for place in folders_of(study.folder).values()):
         parts["preregistration"] = lambda: plain(deviations(study))
     held = {name: failures.attempt(f"report.json, {name}", make) for name, make in parts.items()}
     content = {
@@ -120,11 +121,12 @@ def sessions(study: Study) -> list[dict[str, Any]]:
 
 def files(study: Study) -> dict[str, str]:
     """Return the SHA-256 of every file that the numbers come from; recordings are in their session's checksums."""
-    place = StudyFolder(study.folder)
-    found = [place.exclusions, place.key, place.reveals, study.folder / PREREGISTRATION]
-    for session in place.sessions():
-        tables = [session.table(study.name, name) for name in ("responses", "trials")]
-        found += [session.receipt, session.journal, session.checksums, *tables]
+    found = [study.folder / MANIFEST]
+    for place in map(StudyFolder, folders_of(study.folder).values()):
+        found += [place.exclusions, place.key, place.reveals, place.path / PREREGISTRATION]
+        for session in place.sessions():
+            tables = [session.table(study.name, name) for name in ("responses", "trials")]
+            found += [session.receipt, session.journal, session.checksums, *tables]
     return {_within(study, path): sha256(path) for path in found if path.is_file()}
 
 

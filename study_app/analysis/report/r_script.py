@@ -96,6 +96,28 @@ equivalent <- function(what, table, first, second, bound, p, low, high, level, d
   same(paste(what, "interval, high"), high, limits[2])
   same(paste(what, "difference p by t"), different, t.test(d)$p.value)
 }}
+# The same, one column a session: medians over the settings that a participant answered in all of these.
+by_session <- function(block, item, sessions, codes, columns = codes) {{
+  rows <- answers[answers$block == block & answers$item == item & !is.na(answers$response), ]
+  cells <- tapply(rows$response, list(rows$participant, factor(rows$code, codes, columns),
+                                      factor(rows$session, sessions)), median)
+  common <- apply(!is.na(cells), c(1, 2), all)
+  t(sapply(seq_len(nrow(cells)), function(person)
+    apply(matrix(cells[person, common[person, ], ], ncol = length(sessions)), 2, median)))
+}}
+# Sites of a merged study: "level" compares medians over settings, "profile" ranks of settings, or differences of two.
+sites <- function(what, table, kind, H, p) {{
+  x <- whole(table); site <- factor(answers$site[match(rownames(x), answers$participant)])
+  y <- if (kind == "level") cbind(apply(x, 1, median)) else if (ncol(x) == 2) cbind(x[, 2] - x[, 1]) else
+    t(apply(x, 1, rank))
+  if (ncol(y) == 1) {{
+    found <- kruskal.test(y[, 1], site)
+    same(paste(what, "sites,", kind, "H"), H, unname(found$statistic))
+    return(same(paste(what, "sites,", kind, "p by chi2"), p, found$p.value))
+  }}
+  y <- sweep(y, 2, colMeans(y)); n <- as.vector(table(site))
+  same(paste(what, "sites,", kind, "H"), H, (nrow(y) - 1) * sum(rowsum(y, site)^2 / n) / sum(y^2))
+}}
 hits <- function(what, block, items, codes, right, hits) {{
   ratings <- lapply(items, function(item) wide(block, item, codes))
   people <- Reduce(union, lapply(ratings, rownames)); found <- 0

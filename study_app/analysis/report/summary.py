@@ -66,6 +66,11 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "The key is sealed: settings are codes, and only counts and comparisons without an order are shown. Who "
             "decides by them to go on or to stop makes chance findings likelier."
         )
+        if study.sites:
+            yield (
+                "Each site has a key of its own: until the keys of all sites are open, the code of a setting begins "
+                "with its site, and settings of different sites cannot be compared."
+            )
     if study.simulated:
         yield "These participants were SIMULATED: nothing here is evidence about people."
     if study.pilot:

@@ -30,7 +30,7 @@ from study_app.analysis.results.section_failures import Failure, Failures, Progr
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study import Study, load_study
 from study_app.errors import AnalysisError
-from study_app.store.blinded import blinding
+from study_app.store.sites.unblind_sites import reveals_of
 from study_app.store.withdrawals.output_log import write_output
 
 HASHES_SHOWN = 12
@@ -155,6 +155,7 @@ def _page(
         ),
         ("What the words mean", lambda: block_section.verdicts_mean(results)),
         ("Groups", lambda: conduct_section.groups(study, results)),
+        ("Sites", lambda: conduct_section.groups(study, results, "site")),
         ("Motion and force", lambda: conduct_section.motion(results)),
         ("How it was run", lambda: conduct_section.conduct(study, results)),
         ("Preregistration", lambda: preregistration_section(study)),
@@ -227,7 +228,7 @@ def _again(study: Study, results: Results) -> Iterator[str]:
         ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),
         ("Seed of the analysis", str(results.seed)),
         *((f"Version of {library}", version) for library, version in number_files.versions().items()),
-        ("Key opened", "; ".join(f"{one['at']} by {one['by']}: {one['reason']}" for one in _reveals(study)) or "no"),
+        ("Key opened", "; ".join(map(_opened, reveals_of(study.folder))) or "no"),
     ]
     yield table(("Setting", "Value"), rows, words=2)
     hashes = number_files.files(study)
@@ -246,5 +247,6 @@ def _again(study: Study, results: Results) -> Iterator[str]:
     )
 
 
-def _reveals(study: Study) -> tuple[dict[str, str], ...]:
-    return blinding.reveals(study.folder)
+def _opened(reveal: Mapping[str, str]) -> str:
+    site = f"site {reveal['site']}, " if "site" in reveal else ""
+    return f"{site}{reveal['at']} by {reveal['by']}: {reveal['reason']}"

@@ -47,7 +47,12 @@ def _measured(block: Block, code: str | None, delay_ms: float | None, rows: pd.D
 
 
 def orders(study: Study) -> dict[str, Evenness]:
-    """Return how even the orders of trials were, as run (block id → counts), excluded trials included."""
+    """Return how even the orders of trials were, as run (block id → counts), excluded trials included.
+
+    Of a merged study that is sealed nothing is known, since each site has codes of its own.
+    """
+    if study.sites and not study.revealed:
+        return {}
     here = study.participants.loc[study.participants["counted"], ["participant", "session"]]
     rows = study.trials[study.trials["phase"] == "main"].merge(here, on=["participant", "session"])
     rows = rows.drop_duplicates(["participant", "session", "trial"], keep="last")

@@ -168,6 +168,9 @@ def test_name(outcome: Outcome) -> str:
     """Return a test as a sentence names it."""
     return {
         "Friedman": "Friedman's test",
+        "Kruskal-Wallis": "the Kruskal–Wallis test",
+        "Kruskal-Wallis of differences": "the Kruskal–Wallis test of differences between the two settings",
+        "permutation test of rank profiles": "a permutation test of the ranks of the settings",
         "Wilcoxon signed ranks": "Wilcoxon's signed ranks",
         "Page's trend": "Page's test of a trend",
     }.get(outcome.test, outcome.test)

@@ -6,6 +6,7 @@ curvature of the quadrature, not from Laplace's approximation, whose are too sma
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -64,6 +65,7 @@ def ordinal(
     columns: ArrayLike | None = None,
     *,
     sessions: ArrayLike | None = None,
+    sites: Sequence[str] | None = None,
     intercepts: bool = True,
 ) -> Ordinal:
     """Test whether settings move answers up or down.
@@ -78,6 +80,8 @@ def ordinal(
     sessions : array of the shape of ``values``, optional
         In which session each answer was given: a factor besides the settings, which is not tested. It is left out where
         all answers are of one, or where the effects of sessions and settings cannot be separated.
+    sites : sequence of str, optional
+        The site of each participant of a merged study: another such factor.
     intercepts : bool
         Whether each participant has an intercept of his or her own. Without, answers are taken as independent, which
         shrinks the effects: for comparison only.
@@ -97,13 +101,20 @@ def ordinal(
     if reason:
         return _outcome(rows, used, levels, design.shape[1], intercepts, None, 0.0, reason)
     answers = _answers(rows, levels, design, intercepts)
-    factor = _factor(None if sessions is None else np.asarray(sessions).reshape(array.shape)[used], rows, answers)
+    of_sessions = _factor(None if sessions is None else np.asarray(sessions).reshape(array.shape)[used], rows, answers)
+    site = None if sites is None else np.unique(list(sites), return_inverse=True)[1].astype(np.float64)[used]
+    of_sites = _factor(None if site is None else np.broadcast_to(site[:, None, None], rows.shape), rows, answers)
+    factor = _independent(answers.design, of_sessions, of_sites)
+    factors = [
+        *(["sessions"] if of_sessions.shape[1] else []),
+        *(["sites"] if factor.shape[1] > of_sessions.shape[1] else []),
+    ]
     whole = fit(Answers(answers.level, np.hstack([answers.design, factor]), answers.starts))
     without = fit(Answers(answers.level, factor, answers.starts))
     ratio = max(0.0, 2 * (whole.log_likelihood - without.log_likelihood))
     bad = whole.errors is None or bool((np.abs(whole.effects) > FAR).any() or (whole.errors > FAR).any())
     note = SEPARATED if bad else ""
-    return _outcome(rows, used, levels, design.shape[1], intercepts, whole, ratio, note, factor.shape[1])
+    return _outcome(rows, used, levels, design.shape[1], intercepts, whole, ratio, note, factor.shape[1], factors)
 
 
 def _design(settings: int, columns: ArrayLike | None) -> Array:
@@ -148,6 +159,13 @@ def _factor(sessions: Array | None, rows: Array, answers: Answers) -> Array:
     return found if np.linalg.matrix_rank(together) == together.shape[1] else found[:, :0]
 
 
+def _independent(design: Array, first: Array, second: Array) -> Array:
+    """Return the columns of two factors; without the second where it adds nothing to the first and the settings."""
+    both = np.hstack([first, second])
+    together = np.column_stack([np.ones(len(design)), design, both])
+    return both if np.linalg.matrix_rank(together) == together.shape[1] else first
+
+
 def _outcome(
     rows: Array,
     used: NDArray[np.bool_],
@@ -157,12 +175,13 @@ def _outcome(
     model: Model | None,
     ratio: float,
     note: str,
-    sessions: int = 0,
+    of_factors: int = 0,
+    factors: Sequence[str] = (),
 ) -> Ordinal:
     found = None if note else model
     coefficients = () if found is None else _coefficients(found)[:columns]
     single = coefficients[0] if len(coefficients) == 1 else None
-    parameters = columns + sessions + max(0, len(levels) - 1) + intercepts
+    parameters = columns + of_factors + max(0, len(levels) - 1) + intercepts
     errors = None if found is None else found.errors
     return Ordinal(
         test="cumulative logit" + (" mixed model" if intercepts else " model"),
@@ -172,7 +191,7 @@ def _outcome(
         statistic=None if found is None else ratio,
         p=None if found is None else float(chi_square.sf(ratio, columns)),
         method=f"random intercepts, adaptive Gauss-Hermite quadrature, {NODES} nodes"
-        + ("; sessions as a factor" if sessions else "")
+        + "".join(f"; {factor} as a factor" for factor in factors)
         if intercepts
         else "no intercepts",
         effect_name="log odds of a higher answer",

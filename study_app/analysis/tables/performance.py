@@ -20,8 +20,8 @@ from study_app.analysis.tables.reaches import Reach, Targets, reaches, targets_o
 from study_app.analysis.tables.study import Study
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_NAMES
-from study_app.store.folders import StudyFolder
 from study_app.store.recording_files import read_samples
+from study_app.store.sites.merged import session_in
 
 OF_TRIALS: Final = ("duration_s", "path_m", "force_mean_n", "force_peak_n", "at_limit_percent")
 OF_REACHES: Final = ("movement_time_s", "path_mm", "overshoot_mm", "submovements")
@@ -179,7 +179,7 @@ def _why_not(folder: Path, row: Mapping[Any, Any]) -> str:
 
 
 def _file(folder: Path, row: Mapping[Any, Any]) -> Path:
-    return StudyFolder(folder).session(str(row["participant"]), int(row["session"])).path / str(row["recording"])
+    return session_in(folder, str(row["participant"]), int(row["session"])).path / str(row["recording"])
 
 
 def _of_trials(study: Study, rows: pd.DataFrame) -> list[Moved]:

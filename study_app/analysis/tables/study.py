@@ -34,6 +34,8 @@ from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.sessions.open_session import Place
 from study_app.store.sessions.unstarted_sessions import never_begun
+from study_app.store.sites.merged import DASH, Merged, read_merged
+from study_app.store.sites.unblind_sites import all_opened
 from study_app.store.tables.columns import INTERVALS, SEALED
 from study_app.store.tables.study_description import has_intervals
 from study_app.store.verification.integrity import Doubt, doubts
@@ -57,7 +59,8 @@ class Study:
     ``answered`` has the rows of all questions as they were recorded, of which ``responses`` are those of statements;
     ``own_dynamics`` are the device's, where receipts record a measurement; ``estimator`` names that of the velocity,
     "device" where the device measured it; None where receipts do not say it. ``withdrawn`` is how many participants
-    withdrew, so that their data were erased.
+    withdrew, so that their data were erased. ``sites`` are the names of the sites of a merged study, whose participants
+    are SITE-ID.
     """
 
     folder: Path
@@ -80,11 +83,16 @@ class Study:
     own_dynamics: OwnDynamics | None = None
     estimator: str | None = None
     withdrawn: int = 0
+    sites: tuple[str, ...] = ()
 
     @property
     def people(self) -> tuple[str, ...]:
         """The participants of sessions that count, in the order of their ids."""
         return tuple(sorted(self.participants.loc[self.participants["counted"], "participant"].unique()))
+
+    def site_of(self, participant: str) -> str:
+        """Return the site of a participant of a merged study; otherwise nothing."""
+        return participant.partition(DASH)[0] if self.sites else ""
 
     @property
     def n(self) -> int:
@@ -178,6 +186,8 @@ def load_study(folder: Path) -> Study:
     StoreError
         The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
 
+    A merged study (see `store.sites.merged`) is sealed until the key of every site was opened.
+
     Examples
     --------
     >>> study = load_study(Path("results/sample-rek2024"))
@@ -188,11 +198,29 @@ def load_study(folder: Path) -> Study:
     0        P001   L2  feels_liquid         6
     1        P001   L2     immersive         5
     """
-    place = StudyFolder(Path(folder))
+    merged = read_merged(Path(folder))
+    return _load(Path(folder)) if merged is None else _load_sites(merged)
+
+
+def _load_sites(merged: Merged) -> Study:
+    """Read a merged study; a site from which all participants withdrew has nothing to read."""
+    from study_app.analysis.tables.pooled_sites import pool  # noqa: PLC0415 - it makes studies
+
+    places = {name: StudyFolder(merged.folder(name)) for name in merged.names}
+    opened = all_opened(merged.path)
+    sites = {name: _load(place.path, sealed=not opened) for name, place in places.items() if place.sessions()}
+    if not sites:
+        raise AnalysisError(f"{merged.path} holds no sessions: all participants of its sites withdrew")
+    return pool(merged, sites, sum(len(tombstones(place)) for place in places.values()))
+
+
+def _load(folder: Path, *, sealed: bool = False) -> Study:
+    """Read the results in a folder that is not merged; ``sealed``: as if its key was not opened."""
+    place = StudyFolder(folder)
     sessions = [session for session in place.sessions() if not never_begun(session.path)]
     if not sessions:
         raise AnalysisError(_no_sessions(place.path))
-    key = _key(place, sessions)
+    key = None if sealed else _key(place, sessions)
     listed = exclusions(place.path)
     records = [read_session(sessions[0], key)]
     records += [read_session(session, key, like=records[0]) for session in sessions[1:]]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import random
 import re
 import shutil
 from pathlib import Path
 
 import pytest
 
+from study_app.analysis.report.write_report import report
+from tests.analysis.conftest import Results
 from tests.analysis.report.pages import numbers, run_in_r
 
 pytestmark = pytest.mark.slow
@@ -58,3 +61,20 @@ def test_r_finds_a_number_that_was_changed(of_twelve: Path, tmp_path: Path) -> N
     assert done.returncode == 1
     assert done.stdout.count("DIFFERS") == 1
     assert done.stdout.rstrip().endswith("numbers that differ: 1")
+
+
+@pytest.mark.parametrize("sessions", [2, 3])
+def test_r_compares_sessions(sessions: int, rek: Results, tmp_path: Path) -> None:
+    for number in range(1, 9):
+        draw = random.Random(number)  # noqa: S311 - reproducible
+        for session in range(1, 1 + (sessions if number > 2 else 1)):
+            rek.add(f"P{number:03d}", lambda *_, draw=draw: draw.randint(1, 7), session=session)
+    rek.open()
+    report(rek.folder, tmp_path / "report")
+    done = run_in_r(tmp_path / "report")
+    assert (done.returncode, done.stderr) == (0, "")
+    blocks = numbers(tmp_path / "report")["results"]["blocks"]
+    tested = [one for block in blocks for one in block["by_session"] if one["outcome"]["statistic"] is not None]
+    assert len(tested) == 14
+    assert {one["outcome"]["n"] for one in tested} == {6}
+    assert done.stdout.count(", sessions " + ("Wilcoxon V" if sessions == 2 else "Friedman chi2")) == len(tested)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -10,11 +10,13 @@ import numpy as np
 from study_app.analysis.designs.block_tests import Asked
 from study_app.analysis.designs.verdicts import FDR, in_family
 from study_app.analysis.report.item_tests import table_of_tests
+from study_app.analysis.report.r_syntax import r_number, r_text, r_vector
 from study_app.analysis.report.test_rows import judged_row
+from study_app.analysis.results.block_results import BlockFound
 from study_app.analysis.results.finding import Finding
 from study_app.analysis.results.item_test import Tested
 from study_app.analysis.results.not_tested import NotTested
-from study_app.analysis.statistics.friedman import friedman
+from study_app.analysis.statistics.friedman import Friedman, friedman
 from study_app.analysis.statistics.multiple_comparisons import false_discovery
 from study_app.analysis.statistics.paired import paired
 from study_app.analysis.tables.measures import medians
@@ -54,6 +56,18 @@ def compared_sessions(answers: Asked, numbers: Sequence[int]) -> tuple[tuple[Tes
     return ps, ()
 
 
+def _calls(found: BlockFound, codes: str) -> Iterator[str]:
+    numbers = r_vector(map(str, found.sessions))
+    for one in FINDING.of(found):
+        outcome = one.outcome
+        table = f"by_session({r_text(found.id)}, {r_text(one.item)}, {numbers}, {codes})"
+        what = r_text(f"{one.item}, sessions")
+        if isinstance(outcome, Friedman) and outcome.n > 1 and outcome.statistic is not None:
+            yield f"friedman({what}, {table}, {r_number(outcome.statistic)}, {r_number(outcome.p_chi2 or 0.0)})"
+        elif not isinstance(outcome, Friedman) and outcome.statistic is not None and outcome.p is not None:
+            yield f"pair({what}, {table}, 1, 2, {r_number(outcome.statistic)}, {r_number(outcome.p)})"
+
+
 FINDING: Final[Finding[tuple[Tested, ...]]] = Finding(
     key="by_session",
     place=12,
@@ -68,4 +82,5 @@ FINDING: Final[Finding[tuple[Tested, ...]]] = Finding(
     section=lambda found, _results, _pictures: table_of_tests(
         "Do sessions differ?", found, FINDING.of(found), [f"session {number}" for number in found.sessions]
     ),
+    calls=_calls,
 )

@@ -1,0 +1,223 @@
+"""A merged study in the analysis: participants of all sites, codes that mean the same, and the site as a factor."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.export.export import export
+from study_app.analysis.figures.plotting import plot
+from study_app.analysis.findings.factors.site_comparison import FINDING as SITES
+from study_app.analysis.report.write_report import report
+from study_app.analysis.tables.group_means import group_counts, group_means
+from study_app.analysis.tables.pooled_sites import pool
+from study_app.analysis.tables.study import Study, load_study
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import exclude
+from study_app.store.sites.merge import merge
+from study_app.store.sites.merged import Merged
+from study_app.store.sites.unblind_sites import unblind_folder
+from study_app.store.withdrawals.withdraw import withdraw
+from tests.analysis.made_up import delays, everybody, liquids, study
+from tests.analysis.report.pages import numbers, read, run_in_r
+from tests.studies import made_up
+
+pytestmark = pytest.mark.slow
+
+MERGED = Merged(Path("nowhere"), "made_up", "", ())
+
+
+@pytest.fixture(scope="module")
+def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a merged study of two sites with three participants each; do not change it."""
+    root = tmp_path_factory.mktemp("labs")
+    folders = {
+        site: rehearse_answers("rek2024", participants=3, seed=seed, results=root / site, felt=made_up("rek2024"))
+        for seed, site in enumerate("AB", start=1)
+    }
+    merge(folders, root / "pooled")
+    return root / "pooled"
+
+
+@pytest.fixture(scope="module")
+def opened(sealed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the same with both keys open."""
+    folder = tmp_path_factory.mktemp("opened") / "pooled"
+    merge(_copied(sealed, folder.parent), folder)
+    unblind_folder(folder, "AK", "closed")
+    return folder
+
+
+def _copied(merged: Path, to: Path) -> dict[str, Path]:
+    return {site: Path(shutil.copytree(merged / "sites" / site, to / site)) for site in "AB"}
+
+
+def test_codes_of_sealed_sites_are_never_pooled(sealed: Path, tmp_path: Path) -> None:
+    found = load_study(sealed)
+    assert not found.revealed
+    assert found.people == ("A-P001", "A-P002", "A-P003", "B-P001", "B-P002", "B-P003")
+    for block in found.blocks:
+        codes = [code.partition("-") for code in block.codes]
+        assert {site for site, _, _ in codes} == {"A", "B"}
+        for site in "AB":
+            own = load_study(sealed / "sites" / site)
+            assert [code for one, _, code in codes if one == site] == list(
+                next(one for one in own.blocks if one.id == block.id).codes
+            )
+    rows = found.responses
+    assert (rows["code"].str.partition("-")[0] == rows["participant"].str.partition("-")[0]).all()
+    report(sealed, tmp_path, failed=pytest.fail)
+    page = read(tmp_path)
+    assert "Each site has a key of its own" in page
+    for condition in ("light_oil", "delay_75"):
+        assert condition not in page
+
+
+def test_a_study_is_sealed_until_the_last_key_is_open(sealed: Path, tmp_path: Path) -> None:
+    folders = _copied(sealed, tmp_path)
+    merge(folders, tmp_path / "pooled")
+    unblind(tmp_path / "pooled/sites/B", "AK", "closed")
+    half = load_study(tmp_path / "pooled")
+    assert not half.revealed
+    assert half.trials["force_mean_n"].isna().all()
+    export(tmp_path / "pooled", tmp_path / "out")
+    (table,) = (tmp_path / "out").glob("*trials*.csv")
+    assert "force_mean_n" not in table.read_text().splitlines()[0]
+
+
+def test_answers_are_pooled_by_condition(opened: Path) -> None:
+    found = load_study(opened)
+    assert found.revealed
+    for site in "AB":
+        own = load_study(opened / "sites" / site)
+        names = {pair: setting.condition for pair, setting in own.settings.items()}
+        mine = found.responses[found.responses["participant"].str.startswith(f"{site}-")]
+        assert [
+            (f"{site}-{one.participant}", one.block, names[one.block, one.code], one.item, one.response)
+            for one in own.responses.itertuples()
+        ] == [(one.participant, one.block, one.code, one.item, one.response) for one in mine.itertuples()]
+    for block, first in zip(found.blocks, load_study(opened / "sites/A").blocks, strict=True):
+        assert [one.condition for one in block.settings] == [one.condition for one in first.settings]
+        assert block.codes == tuple(one.condition for one in first.settings)
+    recorded = {code for site in "AB" for (_, code) in load_study(opened / "sites" / site).settings}
+    assert not recorded & set(found.responses["code"])
+
+
+def test_exported_tables_have_the_site(opened: Path, tmp_path: Path) -> None:
+    export(opened, tmp_path, extras=["wide", "parquet", "sav", "psych-ds"], failed=pytest.fail)
+    for name in ("responses", "trials", "wide"):
+        with (tmp_path / f"study-rek2024_description-{name}_data.csv").open(encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        assert {(row["participant"][:2], row["site"]) for row in rows} == {("A-", "A"), ("B-", "B")}
+    book = json.loads((tmp_path / "codebook.json").read_bytes())
+    assert book["study"]["sites"] == ["A", "B"]
+    assert [one["site"] for one in book["key_opened"]] == ["A", "B"]
+    columns = book["files"]["study-rek2024_description-responses_data.csv"]
+    assert columns[2]["name"] == "site"
+    assert (tmp_path / "psych-ds/materials/rek2024.toml").is_file()
+    plot(opened, tmp_path / "plots")
+
+
+def test_the_report_compares_sites_and_r_agrees(opened: Path, tmp_path: Path) -> None:
+    report(opened, tmp_path, failed=pytest.fail)
+    page = read(tmp_path)
+    for words in ("Do sites differ?", "Do differences between the liquids depend on the site?", "Merged sites: A with"):
+        assert words in page
+    held = numbers(tmp_path)
+    assert {name.split("/")[0] for name in held["files"]} == {"sites.json", "sites"}
+    for block in held["results"]["blocks"]:
+        assert len(block["by_site"]["level"]) == len(block["by_site"]["profile"]) == len(block["items"])
+    done = run_in_r(tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("sites, level H") == sum(
+        one["outcome"]["statistic"] is not None
+        for block in held["results"]["blocks"]
+        for one in block["by_site"]["level"]
+    )
+    assert "sites, profile H" in done.stdout
+
+
+def test_sites_are_described(opened: Path) -> None:
+    found = load_study(opened)
+    assert group_counts(found, "site") == {"A": 3, "B": 3}
+    one = next(group_means(found, "site"))
+    rows = found.responses.query("counted and block == @one.block and item == @one.item and code == @one.code")
+    own = rows[rows["participant"].str.startswith("A-")]["response"].astype(float)
+    assert (one.group, one.n, one.mean) == ("A", 3, pytest.approx(own.mean()))
+
+
+def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(opened: Path, tmp_path: Path) -> None:
+    merge(_copied(opened, tmp_path), tmp_path / "pooled")
+    exclude(tmp_path / "pooled/sites/B", "P001", 1, by="AK", reason="coughed")
+    withdraw(tmp_path / "pooled/sites/A", "P002", by="AK", reason="asked")
+    found = load_study(tmp_path / "pooled")
+    assert found.people == ("A-P001", "A-P003", "B-P002", "B-P003")
+    assert [row.participant for row in found.exclusions] == ["B-P001"]
+    assert found.withdrawn == 1
+    for person in ("P001", "P003"):
+        withdraw(tmp_path / "pooled/sites/A", person, by="AK", reason="asked")
+    assert load_study(tmp_path / "pooled").people == ("B-P002", "B-P003")
+
+
+def pooled_of(first: Study, second: Study) -> Study:
+    return pool(MERGED, {"A": first, "B": second}, 0)
+
+
+def test_planted_differences_between_sites_are_found_and_nothing_else() -> None:
+    rng = np.random.default_rng(2)
+
+    def noise() -> int:
+        return int(rng.integers(0, 2))
+
+    def at(site: str) -> Study:
+        def answer(_person: int, _session: int, code: str, item: str) -> int:
+            level = int(code[1:])
+            if item == "harder":  # the same level, but the other way round
+                return 2 + (4 - level if site == "B" else level) + noise()
+            return 2 + noise() + (3 if site == "B" else 0)
+
+        return study(liquids(3), list(everybody(liquids(3), 12, answer)))
+
+    (block,) = evaluate(pooled_of(at("A"), at("B")), planning=False).blocks
+    tests = SITES.of(block)
+    assert {one.item: one.verdict for one in tests.level} == {"different": "suggested", "harder": "not shown"}
+    assert {one.item: one.verdict for one in tests.profile} == {"different": "not shown", "harder": "suggested"}
+    (alone,) = evaluate(at("A"), planning=False).blocks
+    assert SITES.of(alone) == SITES.empty
+
+
+def test_two_settings_are_compared_by_their_differences() -> None:
+    def at(change: int) -> Study:
+        settings = delays([0, 100])
+
+        def answer(person: int, _session: int, code: str, _item: str) -> int:
+            return 3 + person % 2 + change * (code == "D2")
+
+        return study(settings, list(everybody(settings, 10, answer)))
+
+    (block,) = evaluate(pooled_of(at(0), at(2)), planning=False).blocks
+    (first, *_) = SITES.of(block).profile
+    assert first.outcome.test == "Kruskal-Wallis of differences"
+    assert first.verdict == "suggested"
+
+
+def test_the_mixed_model_has_the_site_as_a_factor() -> None:
+    from study_app.analysis.findings.other_assumptions import FINDING as OTHERS
+
+    rng = np.random.default_rng(4)
+
+    def at(higher: int) -> Study:
+        settings = delays([0, 50, 100])
+        return study(settings, list(everybody(settings, 9, lambda *_: int(rng.integers(1, 5)) + higher)))
+
+    (block,) = evaluate(pooled_of(at(0), at(2)), planning=False).blocks
+    assert all(one.outcome.method.endswith("; sites as a factor") for one in OTHERS.of(block).mixed)
+    (alone,) = evaluate(at(0), planning=False).blocks
+    assert not any("sites" in one.outcome.method for one in OTHERS.of(alone).mixed)
