@@ -29,11 +29,10 @@ from study_app.analysis.worker_messages import (
 from study_app.errors import StoreError
 from study_app.store import receipt
 from study_app.store.atomic import cannot_read
-from study_app.store.blinded import blinding
-from study_app.store.blinded.unblinding import unblind
-from study_app.store.exclusions import exclude, exclusions, include
-from study_app.store.folders import StudyFolder
-from study_app.store.tables.participants import participants
+from study_app.store.exclusions import exclude, include
+from study_app.store.sites.merged import all_exclusions, folders_of, own_place, sessions_in
+from study_app.store.sites.merged_rows import participants_of, study_folders
+from study_app.store.sites.unblind_sites import all_opened, reveals_of, unblind_folder
 from study_app.workers.messages import Stopped
 
 if TYPE_CHECKING:
@@ -62,11 +61,14 @@ def carry_out(order: Order, tell: Tell, stop: Callable[[], bool]) -> Done:
         case ReadStudy():
             _read(order.folder, tell, stop)
         case LeaveOut():
-            exclude(order.folder, order.participant, order.session, trial=order.trial, by=order.by, reason=order.reason)
+            place = own_place(order.folder, order.participant)
+            exclude(*place, order.session, trial=order.trial, by=order.by, reason=order.reason)
         case TakeBack():
-            include(order.folder, order.participant, order.session, trial=order.trial, by=order.by, reason=order.reason)
+            place = own_place(order.folder, order.participant)
+            include(*place, order.session, trial=order.trial, by=order.by, reason=order.reason)
         case OpenKey():
-            return Done(warnings=unblind(order.folder, by=order.by, reason=order.reason).left)
+            opened = unblind_folder(order.folder, by=order.by, reason=order.reason)
+            return Done(warnings=tuple(line for site in opened.values() for line in site.left))
         case WriteTables() | WriteReport():
             return _write(order, tell, stop)
     return Done()
@@ -75,13 +77,16 @@ def carry_out(order: Order, tell: Tell, stop: Callable[[], bool]) -> Done:
 def _studies(results: Path) -> Iterator[StudyAt]:
     """Yield the studies' folders under ``results``, which need not exist."""
     try:
-        folders = sorted(path for path in results.iterdir() if (path / "data").is_dir())
+        folders = list(study_folders(results))
     except FileNotFoundError:
         return
     except OSError as error:
         raise cannot_read(results, error) from error
     for folder in folders:
-        sessions = StudyFolder(folder).sessions()
+        try:
+            sessions = sessions_in(folders_of(folder).values())
+        except StoreError:  # said when the study is read
+            sessions = ()
         first: dict[str, Any] = {}
         if sessions:
             with contextlib.suppress(StoreError):  # said when the study is read
@@ -101,9 +106,8 @@ def _read(folder: Path, tell: Tell, stop: Callable[[], bool]) -> None:
     from study_app.analysis.tables.study import load_study  # noqa: PLC0415
 
     tell(Progress("reading sessions", 0.0))
-    opened = blinding.reveals(folder)
-    rows = tuple(participants(StudyFolder(folder)))
-    tell(SessionsFound(folder, rows, exclusions(folder), opened[-1] if opened else None))
+    opened = reveals_of(folder) if all_opened(folder) else ()
+    tell(SessionsFound(folder, tuple(participants_of(folder)), all_exclusions(folder), opened[-1] if opened else None))
     _go_on(stop)
     tell(Progress("reading answers", 0.1))
     study = load_study(folder)

@@ -33,10 +33,9 @@ from study_app.analysis.worker_messages import (
     WriteReport,
     WriteTables,
 )
-from study_app.app.results_rows import left_out, opened
+from study_app.app.results_rows import exclusions_at, left_out, opened
 from study_app.gui.application import open_here
 from study_app.gui.results.view import ResultsPlace
-from study_app.store.folders import StudyFolder
 from study_app.viewmodels.results import FigureShown, Going, ResultsView, StudyChoice, Trouble
 from study_app.viewmodels.sessions import session_facts
 from study_app.workers.messages import Crashed, Refused
@@ -235,7 +234,7 @@ class ResultsController(QObject):
         self._show(
             sessions=tuple(facts),
             left_out=tuple(map(left_out, found.exclusions)),
-            exclusions_file=StudyFolder(found.folder).exclusions,
+            exclusions_file=exclusions_at(found.folder),
             sealed=reveal is None,
             opened=None if reveal is None else opened(reveal),
         )

@@ -82,4 +82,5 @@ def _studies(results: Path) -> Iterator[Path]:
     """Yield the studies' folders, sorted."""
     from study_app.store.sites.merged_rows import study_folders
 
-    yield from study_folders(results)
+    if results.is_dir():
+        yield from study_folders(results)

@@ -15,6 +15,7 @@ from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
+from study_app.store.sites.merged import session_in
 from study_app.store.tables.participants import participants_at_once
 
 Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]
@@ -93,7 +94,7 @@ def session_facts(
 ) -> list[SessionFacts]:
     """Return the rows of a study's participants as facts; ``listed`` is what is excluded from the analysis."""
     reasons = {(one.participant, one.session): one.reason for one in listed if one.trial is None}
-    placed = [(row, StudyFolder(study).session(row["participant"], int(row["session"]))) for row in rows]
+    placed = [(row, session_in(study, row["participant"], int(row["session"]))) for row in rows]
     counts = [journal.count_events(session.journal, "recording_lost", "device_reconnected") for _, session in placed]
     return [
         SessionFacts(

@@ -30,15 +30,19 @@ from study_app.analysis.worker_messages import (
     SessionsFound,
     StudiesFound,
     StudyFound,
+    TakeBack,
     WriteReport,
     WriteTables,
 )
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.protocol.load import load
+from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
+from study_app.store.sites.merge import merge
+from study_app.viewmodels.sessions import session_facts
 from study_app.workers.messages import Refused, Stopped
-from tests.studies import rehearsed
+from tests.studies import made_up, rehearsed
 
 pytestmark = pytest.mark.slow
 
@@ -212,3 +216,28 @@ def test_the_process_answers_stops_and_is_gone_when_closed(study: Path, tmp_path
 
 def test_stopped_is_a_failure_the_user_understands() -> None:
     assert issubclass(Stopped, StudyError)
+
+
+def test_a_merged_study_is_found_read_decided_on_and_opened(whole: Path, tmp_path: Path) -> None:
+    other = rehearse_answers("demo", participants=2, seed=2, results=tmp_path / "labs/demo", felt=made_up("demo"))
+    pooled = tmp_path / "results" / "pooled"
+    merge({"A": whole, "B": other}, pooled)
+    (found,) = of_kind(StudiesFound, told(FindStudies(pooled.parent)))
+    assert [(one.folder, one.simulated) for one in found.studies] == [(pooled, True)]
+    answers = told(ReadStudy(pooled))
+    (listed,) = of_kind(SessionsFound, answers)
+    assert [row["participant"] for row in listed.rows] == ["A-P001", "A-P002", "A-P003", "B-P001", "B-P002"]
+    assert listed.reveal is None
+    facts = session_facts(pooled, listed.rows, (), {})
+    assert [one.folder.is_dir() for one in facts] == [True] * 5
+    told(LeaveOut(pooled, "B-P002", 1, None, "AK", "coughed"))
+    assert [row.participant for row in exclusions(pooled / "sites/B")] == ["P002"]
+    assert told(OpenKey(pooled, "AK", "closed"))[-1] == Done()
+    again = told(ReadStudy(pooled))
+    (listed,) = of_kind(SessionsFound, again)
+    assert listed.reveal is not None
+    assert [row.participant for row in listed.exclusions] == ["B-P002"]
+    (study_found,) = of_kind(StudyFound, again)
+    assert (study_found.revealed, study_found.n) == (True, 4)
+    told(TakeBack(pooled, "B-P002", 1, None, "AK", "a mistake"))
+    assert exclusions(pooled / "sites/B") == ()

@@ -27,7 +27,13 @@ def participants_of(folder: Path) -> list[Row]:
 
 
 def study_folders(results: Path) -> Iterator[Path]:
-    """Yield the folders of studies and of merged studies under ``results``, sorted."""
-    found = {path.parent for path in results.glob("*/data") if path.is_dir()}
-    found |= {path.parent for path in results.glob(f"*/{MANIFEST}") if not path.parent.name.startswith(".")}
-    yield from sorted(found)
+    """Yield the folders of studies and of merged studies under ``results``, sorted.
+
+    Raises
+    ------
+    OSError
+        The folder is not there, or cannot be read.
+    """
+    for folder in sorted(results.iterdir()):
+        if (folder / "data").is_dir() or (not folder.name.startswith(".") and (folder / MANIFEST).is_file()):
+            yield folder
