@@ -10,6 +10,7 @@ from typing import Final
 from study_app.analysis.designs.block_tests import SEALED, Asked, asked, facts, untested
 from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.designs.questions import questions_found, scores_found
+from study_app.analysis.designs.site_thresholds import site_thresholds
 from study_app.analysis.findings import all_findings
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.conduct import delivered, orders
@@ -71,6 +72,8 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, planning
     asked_ = failures.attempt("the answers to other questions", lambda: questions_found(study))
     scores = failures.attempt("scores of questionnaires", lambda: scores_found(study))
     levels = failures.attempt("the answers at each level", lambda: levels_found(study))
+    known = () if isinstance(levels, Failure) else levels
+    of_sites = failures.attempt("thresholds by site", lambda: tuple(site_thresholds(study, known, SEED)))
     moved = failures.attempt("motion and force", lambda: _performance(study, progress))
     return Results(
         decided=study.decided,
@@ -83,7 +86,8 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, planning
         failures=tuple(failures.found),
         questions=() if isinstance(asked_, Failure) else asked_,
         scores=() if isinstance(scores, Failure) else scores,
-        levels=() if isinstance(levels, Failure) else levels,
+        levels=known,
+        site_thresholds=() if isinstance(of_sites, Failure) else of_sites,
     )
 
 

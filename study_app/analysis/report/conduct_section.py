@@ -9,7 +9,18 @@ from typing import Final
 from study_app.analysis.report.html_page import bullets, heading, paragraph, table
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.delivered_delay import Delivered
-from study_app.analysis.results.words import counted, listed, ms, name, number, settings_noun, short
+from study_app.analysis.results.words import (
+    counted,
+    listed,
+    ms,
+    name,
+    number,
+    p_value,
+    settings_noun,
+    short,
+    statistic,
+    test_name,
+)
 from study_app.analysis.tables.group_means import By, group_counts, group_means
 from study_app.analysis.tables.performance import DEFINITIONS as TRIAL_DEFINITIONS
 from study_app.analysis.tables.performance import OF_REACHES, OF_TRIALS, Performance
@@ -82,9 +93,36 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
             yield heading(3, found.title)
             head = ("Statement", settings_noun(found).capitalize(), by.capitalize(), "n", "mean", "SD")
             yield table(head, rows, words=3)
+    if by == "site":
+        yield from _site_thresholds(results)
+    if not results.blocks:
+        return
     yield paragraph(
         "Mean and standard deviation over participants, each with the mean of their answers. "
         + ("Differences between groups are described, not tested." if by == "group" else TESTED_BY_BLOCK),
+        "soft",
+    )
+
+
+def _site_thresholds(results: Results) -> Iterator[str]:
+    """Yield the thresholds of blocks of levels by site, with their comparison."""
+    if not results.site_thresholds:
+        return
+    yield heading(3, "Thresholds")
+    rows = []
+    for one in results.site_thresholds:
+        each = [
+            f"{site}: {median:.3g} (n = {size})"
+            for site, median, size in zip(one.sites, one.medians, map(one.of_sites.count, one.sites), strict=True)
+        ]
+        where = "–" if one.standard is None else f"{one.standard:g}"
+        tested = one.outcome
+        rows.append([one.title, "; ".join(each), where, statistic(tested), p_value(tested.p), number(tested.effect)])
+    yield table(("Block", "Median by site", "Standard", "Statistic", "p", "Share between sites"), rows, words=2)
+    methods = dict.fromkeys(one.outcome.method for one in results.site_thresholds if one.outcome.p is not None)
+    yield paragraph(
+        f"Median of the participants' thresholds; {test_name(results.site_thresholds[0].outcome)} "
+        f"({'; '.join(methods) or 'not computed'}), exploratory, p not adjusted.",
         "soft",
     )
 

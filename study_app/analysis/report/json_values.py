@@ -14,7 +14,7 @@ from study_app.analysis.tables.compared_blocks import Setting
 from study_app.errors import AnalysisError
 
 OF_FORMAT_2: Final = {
-    Results: frozenset({"questions", "scores", "levels"}),
+    Results: frozenset({"questions", "scores", "levels", "site_thresholds"}),
     LevelsFound: frozenset({"withheld"}),
     Setting: frozenset({"link"}),
 }

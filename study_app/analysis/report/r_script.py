@@ -8,7 +8,7 @@ from typing import Final
 from study_app.analysis.findings import all_findings
 from study_app.analysis.report.answers.level_r_script import level_lines
 from study_app.analysis.report.number_files import tests
-from study_app.analysis.report.r_syntax import r_vector
+from study_app.analysis.report.r_syntax import r_number, r_text, r_vector
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.statistics.trend import EXACT_UP_TO
 from study_app.analysis.tables.study import Study
@@ -118,6 +118,11 @@ sites <- function(what, table, kind, H, p) {{
   y <- sweep(y, 2, colMeans(y)); n <- as.vector(table(site))
   same(paste(what, "sites,", kind, "H"), H, (nrow(y) - 1) * sum(rowsum(y, site)^2 / n) / sum(y^2))
 }}
+threshold_sites <- function(what, thresholds, site, H, p) {{
+  found <- kruskal.test(thresholds, factor(site))
+  same(paste(what, "thresholds by site, H"), H, unname(found$statistic))
+  same(paste(what, "thresholds by site, p by chi2"), p, found$p.value)
+}}
 hits <- function(what, block, items, codes, right, hits) {{
   ratings <- lapply(items, function(item) wide(block, item, codes))
   people <- Reduce(union, lapply(ratings, rownames)); found <- 0
@@ -154,12 +159,24 @@ def r_script(study: Study, results: Results) -> str:
         exact=EXACT_UP_TO,
         numeric=TEXTS if study.protocol_format > 1 else NUMBERS,
     )
-    return start + "\n".join([*calls, *of_levels]) + "\n" + END.format(numbers=_numbers(results) + compared)
+    of_sites = list(_site_calls(results))
+    compared += 2 * len(of_sites)
+    return start + "\n".join([*calls, *of_levels, *of_sites]) + "\n" + END.format(numbers=_numbers(results) + compared)
 
 
 def _numbers(results: Results) -> int:
     """Return how many statistics, p and ends of intervals the report's tests have."""
     return sum(row[name] is not None for row in tests(results) for name in ("statistic", "p", "low", "high"))
+
+
+def _site_calls(results: Results) -> Iterator[str]:
+    """Yield the calls that compare thresholds between sites."""
+    for one in results.site_thresholds:
+        if one.outcome.statistic is not None and one.outcome.p_chi2 is not None:
+            what = one.block if one.standard is None else f"{one.block} at {one.standard:g}"
+            values = f"c({', '.join(map(r_number, one.thresholds))}), {r_vector(one.of_sites)}"
+            ends = f"{r_number(one.outcome.statistic)}, {r_number(one.outcome.p_chi2)}"
+            yield f"threshold_sites({r_text(what)}, {values}, {ends})"
 
 
 def _calls(found: BlockFound) -> Iterator[str]:

@@ -14,6 +14,7 @@ from study_app.analysis.results.levels import LevelsFound
 from study_app.analysis.results.not_tested import NotTested
 from study_app.analysis.results.question_answers import QuestionFound, ScoreFound
 from study_app.analysis.results.section_failures import Failure
+from study_app.analysis.results.site_thresholds import SiteThresholds
 from study_app.analysis.tables.compared_blocks import Item, Kind, Setting
 from study_app.analysis.tables.performance import Performance
 from study_app.analysis.tables.planned_analysis import Decided
@@ -59,8 +60,8 @@ class BlockFound:
 class Results:
     """All that was found in a study; ``failures`` are the parts that could not be computed.
 
-    ``questions`` and ``scores`` are the answers to questions other than statements, ``levels`` the blocks of levels;
-    JSON omits them where there are none.
+    ``questions`` and ``scores`` are the answers to questions other than statements, ``levels`` the blocks of levels,
+    ``site_thresholds`` their thresholds at the sites of a merged study; JSON omits them where there are none.
     """
 
     decided: Decided
@@ -74,3 +75,4 @@ class Results:
     questions: tuple[QuestionFound, ...] = ()
     scores: tuple[ScoreFound, ...] = ()
     levels: tuple[LevelsFound, ...] = ()
+    site_thresholds: tuple[SiteThresholds, ...] = ()

@@ -9,12 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import kruskal
 
+from study_app.analysis.designs.site_thresholds import site_thresholds
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.export import export
 from study_app.analysis.figures.plotting import plot
 from study_app.analysis.findings.factors.site_comparison import FINDING as SITES
 from study_app.analysis.report.write_report import report
+from study_app.analysis.results.levels import LevelsFound, ThresholdFound
 from study_app.analysis.tables.group_means import group_counts, group_means
 from study_app.analysis.tables.pooled_sites import pool
 from study_app.analysis.tables.study import Study, load_study
@@ -221,3 +224,31 @@ def test_the_mixed_model_has_the_site_as_a_factor() -> None:
     assert all(one.outcome.method.endswith("; sites as a factor") for one in OTHERS.of(block).mixed)
     (alone,) = evaluate(at(0), planning=False).blocks
     assert not any("sites" in one.outcome.method for one in OTHERS.of(alone).mixed)
+
+
+def test_thresholds_are_compared_between_sites_at_each_standard() -> None:
+    found = LevelsFound(
+        "b",
+        "Block",
+        "2ifc",
+        True,
+        (),
+        "share",
+        "correct",
+        thresholds=tuple(
+            ThresholdFound(person, standard, 20, threshold, None, None)
+            for standard, higher in ((1.0, 0.0), (2.0, 5.0))
+            for person, threshold in (
+                (None, 3.0),
+                *((f"A-P{number}", 1.0 + number / 10) for number in range(5)),
+                *((f"B-P{number}", 1.05 + higher + number / 10) for number in range(5)),
+            )
+        ),
+    )
+    pooled = pooled_of(study(delays([0]), []), study(delays([0]), []))
+    first, second = site_thresholds(pooled, [found], 1)
+    assert (first.standard, first.sites, first.medians) == (1.0, ("A", "B"), pytest.approx((1.2, 1.25)))
+    assert second.outcome.p == pytest.approx(2 / 252)
+    assert first.outcome.p > 0.5
+    assert second.outcome.statistic == pytest.approx(kruskal(second.thresholds[:5], second.thresholds[5:]).statistic)
+    assert list(site_thresholds(study(delays([0]), []), [found], 1)) == []
