@@ -28,8 +28,10 @@ from study_app.store.sites.merge import merge
 from study_app.store.sites.merged import Merged
 from study_app.store.sites.unblind_sites import unblind_folder
 from study_app.store.withdrawals.withdraw import withdraw
+from tests.analysis.levels.conftest import ADAPTIVE
 from tests.analysis.made_up import delays, everybody, liquids, study
 from tests.analysis.report.pages import numbers, read, run_in_r
+from tests.protocol.trials.studies import text_of_damper
 from tests.studies import made_up
 
 pytestmark = pytest.mark.slow
@@ -252,3 +254,35 @@ def test_thresholds_are_compared_between_sites_at_each_standard() -> None:
     assert first.outcome.p > 0.5
     assert second.outcome.statistic == pytest.approx(kruskal(second.thresholds[:5], second.thresholds[5:]).statistic)
     assert list(site_thresholds(study(delays([0]), []), [found], 1)) == []
+
+
+def test_a_merged_study_of_levels_is_reported_sealed_and_opened(tmp_path: Path) -> None:
+    (tmp_path / "adaptive.toml").write_text(text_of_damper("adaptive", ADAPTIVE, (4, 8)))
+    folders = {
+        site: rehearse_answers(
+            tmp_path / "adaptive.toml", participants=2, seed=seed, results=tmp_path / site / "adaptive", felt={}
+        )
+        for seed, site in enumerate("AB", start=1)
+    }
+    merge(folders, tmp_path / "pooled")
+    sealed = load_study(tmp_path / "pooled")
+    assert {one.code[:2] for block in sealed.levels for one in block.settings} == {"A-", "B-"}
+    report(tmp_path / "pooled", tmp_path / "sealed", failed=pytest.fail)
+    unblind_folder(tmp_path / "pooled", "AK", "closed")
+    found = load_study(tmp_path / "pooled")
+    for block in found.levels:
+        own = [next(one for one in load_study(path).levels if one.id == block.id) for path in site_folders(tmp_path)]
+        assert [one.condition for one in block.settings] == [one.condition for one in own[0].settings]
+        assert {one.condition for one in own[1].settings} == {one.condition for one in own[0].settings}
+    assert set(found.intervals["participant"]) == {"A-P001", "A-P002", "B-P001", "B-P002"}
+    report(tmp_path / "pooled", tmp_path / "opened", failed=pytest.fail)
+    assert "Median by site" in read(tmp_path / "opened")
+    held = numbers(tmp_path / "opened")["results"]
+    assert [one["standard"] for one in held["site_thresholds"] if one["block"] == "staircase"] == [4.0, 8.0]
+    done = run_in_r(tmp_path / "opened")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "staircase at 8 thresholds by site, H" in done.stdout
+
+
+def site_folders(root: Path) -> list[Path]:
+    return [root / "pooled/sites" / site for site in "AB"]
