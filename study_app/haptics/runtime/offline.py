@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -19,7 +20,7 @@ from study_app.haptics.model.estimators.device import CODE as DEVICE
 from study_app.haptics.model.estimators.given import CODE as GIVEN
 from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.limits import damping_limits
-from study_app.haptics.model.motion import Motion, read
+from study_app.haptics.model.motion import Floats, Motion, read
 from study_app.haptics.model.scene import Given, Scene
 from study_app.haptics.runtime.pack import pack
 
@@ -75,32 +76,66 @@ def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None
     StudyError
         The scene wants a given velocity and there is none.
     """
-    estimator = scene.velocity
-    if motion.velocity_mps is not None:
-        scene = scene.model_copy(update={"velocity": Given()})
-    elif isinstance(scene.velocity, Given):
-        raise StudyError("the scene takes the velocity as given, but the motion has no vx_mps, vy_mps, vz_mps")
-    if dynamics is None:
-        model = pack(scene, limits=damping_limits(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))
-        safety = new_safety()
-    else:
-        model = pack(scene, dynamics=dynamics)
-        safety = new_safety(delay_ticks=min(dynamics.delay_ticks(scene.rate_hz), MOST_DELAY))
-    safety[0].fade, safety[0].fade_s = 1.0, 0.0
-    samples = records(SAMPLE, len(motion.t_s))
-    samples.position_m = motion.position_m
-    samples.velocity_mps = 0.0 if motion.velocity_mps is None else motion.velocity_mps
-    _run(model, safety[0], samples, motion.t_s)
-    return samples
+    along = ModelAlong(scene, dynamics, given=motion.velocity_mps is not None)
+    return along.follow(motion.t_s, motion.position_m, motion.velocity_mps)
+
+
+class ModelAlong:
+    """A scene's model along a motion that comes piece by piece; see `samples_along`.
+
+    Parameters
+    ----------
+    scene : Scene
+        What the body moves in.
+    dynamics : Dynamics, optional
+        Of a device; by default the loop is that of `simulate`.
+    given : bool
+        Whether each piece brings velocities.
+
+    Raises
+    ------
+    StudyError
+        The scene wants a given velocity and there is none.
+    """
+
+    def __init__(self, scene: Scene, dynamics: Dynamics | None = None, *, given: bool = False) -> None:
+        estimator = scene.velocity
+        if given:
+            scene = scene.model_copy(update={"velocity": Given()})
+        elif isinstance(scene.velocity, Given):
+            raise StudyError("the scene takes the velocity as given, but the motion has no vx_mps, vy_mps, vz_mps")
+        if dynamics is None:
+            self._model = pack(scene, limits=damping_limits(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))
+            self._safety = new_safety()
+        else:
+            self._model = pack(scene, dynamics=dynamics)
+            self._safety = new_safety(delay_ticks=min(dynamics.delay_ticks(scene.rate_hz), MOST_DELAY))
+        self._safety[0].fade, self._safety[0].fade_s = 1.0, 0.0
+        self._before_s = math.nan
+
+    def follow(self, t_s: Floats, position_m: Floats, velocity_mps: Floats | None = None) -> Any:
+        """Return the samples (n,) of the next piece: times (n,) [s], places and velocities (n, 3) of the scene."""
+        samples = records(SAMPLE, len(t_s))
+        if len(samples) == 0:
+            return samples
+        samples.position_m = position_m
+        samples.velocity_mps = 0.0 if velocity_mps is None else velocity_mps
+        _run(self._model, self._safety[0], samples, t_s, self._before_s)
+        self._before_s = float(t_s[-1])
+        return samples
 
 
 @kernel
-def _run(model: Any, safety: Record, samples: Any, t_s: Any) -> None:
-    """Take the samples one after another, positions in the scene frame; fill in the rest of them."""
+def _run(model: Any, safety: Record, samples: Any, t_s: Any, before_s: float) -> None:
+    """Take the samples one after another, positions in the scene frame; fill in the rest of them.
+
+    ``before_s`` is the time of the sample before them, NaN where there is none.
+    """
     parameters, state = model.parameters[0], model.state[0]
     for k in range(len(samples)):
         sample = samples[k]
-        interval_s = clamp(t_s[k] - t_s[k - 1]) if k > 0 else parameters.period_s
+        earlier_s = t_s[k - 1] if k > 0 else before_s
+        interval_s = parameters.period_s if math.isnan(earlier_s) else clamp(t_s[k] - earlier_s)
         place(state, sample.position_m[0], sample.position_m[1], sample.position_m[2])
         if parameters.estimator == GIVEN:
             for axis in range(3):
