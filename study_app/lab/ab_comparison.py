@@ -118,6 +118,22 @@ class Workbench:
             return replace(self, held=key if held and goes_on else None)
         return self._edited(self.felt, edited, held=key if held else None, goes_on=goes_on)
 
+    def put(self, scene: Scene, key: str | None = None) -> Workbench:
+        """Return this with the felt setting as ``scene``; changes of one ``key`` after another are one step for undo.
+
+        Raises
+        ------
+        StudyError
+            Nothing may be edited now.
+        """
+        self._refuse_blind("edited")
+        held = None if key is None else (self.felt, key)
+        if scene == self.in_hand.scene:
+            return replace(self, held=held)
+        return self._edited(
+            self.felt, replace(self.in_hand, scene=scene), held=held, goes_on=held is not None and self.held == held
+        )
+
     def choose(self, side: Side, name: str, scene: Scene) -> Workbench:
         """Return this with another liquid on a side.
 

@@ -1,0 +1,264 @@
+"""Parameters of a liquid from a stream of measured force: the present estimate, or why there is none.
+
+The drag coefficient alone follows each batch of rows by recursive least squares (``recursive_drag``). With length and
+scaling of the wake the newest rows are searched once a second of the stream (``wake_fit``); whoever shows windows may
+let an executor do so. A value counts only where the motion identifies it (``information``).
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from study_app.errors import StudyError
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.scene import Scene
+from study_app.lab.estimation.information import NEEDED, information, interval
+from study_app.lab.estimation.liquid_model import DRAG, NAMES, LiquidModel, refusal, values_of
+from study_app.lab.estimation.recursive_drag import RecursiveDrag
+from study_app.lab.estimation.rows import GAP_S, Rows, joined, no_rows
+from study_app.lab.estimation.wake_fit import WakeFit, WakeSearch
+from study_app.lab.parameters import the_liquid
+
+MEMORY_S: Final = 10.0
+LEAST_S: Final = 1.0
+"""Before so much was measured nothing is estimated."""
+SEARCH_S: Final = 2.0
+"""Time of the stream between two searches for the wake."""
+KEPT_S: Final = 15.0
+MISFIT: Final = 0.2
+"""Of the measured force: where more than that is left and is not noise, the model is another liquid's. [choice]"""
+_RATE_ROWS: Final = 20
+_SLOWEST_HZ: Final = 50.0
+_MOST_DRAG: Final = 10.0
+"""What the scene's model permits."""
+WORDS: Final = {"drag_coefficient": "the drag coefficient", "length": "the length", "scaling": "the scaling"}
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Values by name with their 95 % intervals, empty where nothing can be said yet.
+
+    ``identified`` is whether the motion identifies them: only then may they be used. ``reason`` is why not, in a
+    sentence. ``smallest`` is the smallest eigenvalue of the information matrix, of `NEEDED`. ``rms_n`` is that of the
+    residual, ``force_rms_n`` that of the measured force [N]; ``seconds`` is how long was measured.
+    """
+
+    values: dict[str, float]
+    intervals: dict[str, tuple[float, float]]
+    identified: bool
+    reason: str
+    smallest: float = 0.0
+    rms_n: float = 0.0
+    force_rms_n: float = 0.0
+    seconds: float = 0.0
+
+
+NOTHING: Final = Estimate({}, {}, identified=False, reason="nothing was measured yet")
+
+
+class OnlineEstimator:
+    """An estimator that takes rows as they come.
+
+    Parameters
+    ----------
+    scene : Scene
+        With one liquid; its values are where the search begins.
+    names : tuple of str
+        ``("drag_coefficient",)``, or with ``"length"``, ``"scaling"`` or both.
+    memory_s : float
+        A row of this age counts by 1/e.
+    executor : Executor, optional
+        Searches for the wake; by default `take` does so itself.
+
+    Raises
+    ------
+    StudyError
+        A parameter that the liquid does not have, or that its force does not depend on.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        names: tuple[str, ...] = (DRAG,),
+        *,
+        memory_s: float = MEMORY_S,
+        executor: Executor | None = None,
+    ) -> None:
+        if unknown := [name for name in names if name not in NAMES]:
+            raise StudyError(f"{unknown[0]!r} cannot be estimated online: choose among {', '.join(NAMES)}")
+        if DRAG not in names:
+            raise StudyError(f"the drag coefficient is estimated with the wake: add {DRAG}")
+        the_liquid(scene)
+        if why := refusal(scene, names):
+            raise StudyError(why)
+        self.names = names
+        self._scene, self._memory_s, self._executor = resolve(scene), memory_s, executor
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all rows: the next one is the first of a liquid at rest."""
+        self._rate_hz: float | None = None
+        self._waiting = self._kept = no_rows()
+        self._last_s = math.nan
+        self._seconds = 0.0
+        self._model: LiquidModel | None = None
+        self._drag = RecursiveDrag(self._memory_s)
+        self._dropped = False
+        self._searched_s = -math.inf
+        self._pending: Future[WakeFit] | None = None
+        self._known: dict[str, float] | None = None
+        self._estimate = NOTHING
+
+    @property
+    def estimate(self) -> Estimate:
+        """The estimate from all rows so far."""
+        if self._pending is not None and self._pending.done():
+            self._finish(self._pending.result())
+        return self._estimate
+
+    def take(self, rows: Rows) -> None:
+        """Take the next rows; a gap in time begins the estimation again.
+
+        Raises
+        ------
+        StudyError
+            The rows come too slowly.
+        """
+        if len(rows) == 0:
+            return
+        gaps = np.flatnonzero(np.diff(rows.t_s, prepend=self._last_s) > GAP_S)
+        if len(gaps):
+            self.restart()
+            rows = rows.part(int(gaps[-1]))
+        self._last_s = float(rows.t_s[-1])
+        if self._rate_hz is None:
+            self._waiting = joined(self._waiting, rows)
+            if len(self._waiting) < _RATE_ROWS:
+                return
+            rows = self._waiting
+            self._rate_hz = rate_of(rows)
+        self._seconds += float(np.count_nonzero(rows.usable)) / self._rate_hz
+        if self.names == (DRAG,):
+            self._recur(rows)
+        else:
+            self._search(rows)
+
+    def _recur(self, rows: Rows) -> None:
+        """Follow rows by recursive least squares."""
+        assert self._rate_hz is not None  # noqa: S101 - known before
+        if self._model is None:
+            self._model = LiquidModel(self._scene, self._rate_hz)
+        g_n, h_n = self._model.follow(rows)
+        self._drag.take(rows.t_s, g_n, rows.force_n - h_n, rows.usable)
+        value = self._drag.value
+        if self._seconds < LEAST_S or not math.isfinite(value):
+            self._estimate = _waits(self._seconds)
+            return
+        variance_n2, following = self._drag.residual
+        found = information(np.array([[value**2 * self._drag.normal_n2]]), variance_n2, following)
+        fit = WakeFit({DRAG: value}, found, following, math.sqrt(3 * variance_n2), self._drag.force_rms_n)
+        self._estimate = self._judged(fit)
+
+    def _search(self, rows: Rows) -> None:
+        """Keep rows, and search them now and then."""
+        assert self._rate_hz is not None  # noqa: S101 - known before
+        self._kept = joined(self._kept, rows)
+        oldest = int(np.searchsorted(self._kept.t_s, self._kept.t_s[-1] - KEPT_S))
+        if oldest:
+            self._kept, self._dropped = self._kept.part(oldest), True
+        if self._seconds < LEAST_S:
+            self._estimate = _waits(self._seconds)
+            return
+        if self._last_s - self._searched_s < SEARCH_S or (self._pending is not None and not self._pending.done()):
+            return
+        self._searched_s = self._last_s
+        search = WakeSearch(
+            self._scene,
+            self.names,
+            self._kept,
+            self._rate_hz,
+            from_rest=not self._dropped,
+            memory_s=self._memory_s,
+        )
+        from_values = values_of(self._scene) | (self._known or {})
+        start = round(from_values["length"]), from_values["scaling"]
+        if self._executor is None:
+            self._finish(search.run(*start, anew=self._known is None))
+        else:
+            self._pending = self._executor.submit(search.run, *start, anew=self._known is None)
+
+    def _finish(self, fit: WakeFit) -> None:
+        """Take over what a search found."""
+        self._pending = None
+        self._estimate = self._judged(fit)
+        self._known = dict(fit.values) if self._estimate.identified else None
+
+    def _judged(self, fit: WakeFit) -> Estimate:
+        """Return what is to be said of values that were found."""
+        half = fit.information.half
+        reason = self._doubt(fit)
+        intervals = {n: interval(it, float(h)) for (n, it), h in zip(fit.values.items(), half, strict=True) if it > 0}
+        return Estimate(
+            fit.values,
+            intervals,
+            not reason,
+            reason,
+            fit.information.smallest,
+            fit.rms_n,
+            fit.force_rms_n,
+            self._seconds,
+        )
+
+    def _doubt(self, fit: WakeFit) -> str:
+        """Return why values that were found must not be used, "" where they may."""
+        if not all(math.isfinite(it) and it > 0 for it in fit.values.values()):
+            return "the measured force does not oppose the motion: check its signs and its unit"
+        if fit.values[DRAG] > _MOST_DRAG:
+            return f"a drag coefficient of {fit.values[DRAG]:.3g} is not permitted: check the unit of the force"
+        if fit.edge:
+            return "the wake may be longer than what was measured: move on, with stops and turns"
+        if not fit.information.identified:
+            vague = [WORDS[n] for n, it in zip(self.names, fit.information.vague, strict=True) if it]
+            return (
+                f"this motion does not identify {_listed(vague or [WORDS[n] for n in self.names])} within 5 %: "
+                f"smallest eigenvalue {fit.information.smallest:.3g}, {NEEDED:.0f} needed"
+            )
+        if _misfit_n(fit) > MISFIT * fit.force_rms_n:
+            share = 100 * _misfit_n(fit) / fit.force_rms_n
+            also = "" if len(self.names) > 1 else "; estimate the wake, too"
+            return (
+                f"the model misses {share:.0f} % of the force: its other parameters are not those of the liquid{also}"
+            )
+        return ""
+
+
+def rate_of(rows: Rows) -> float:
+    """Return the rate of rows [Hz].
+
+    Raises
+    ------
+    StudyError
+        They come too slowly.
+    """
+    rate_hz = 1 / float(np.median(np.diff(rows.t_s)))
+    if rate_hz < _SLOWEST_HZ:
+        raise StudyError(f"the force comes at {rate_hz:.3g} rows per second: measure at least {_SLOWEST_HZ:g}")
+    return min(rate_hz, 5000.0)
+
+
+def _misfit_n(fit: WakeFit) -> float:
+    """Return how much of the residual is not noise [N]: neighbouring rows share it."""
+    return math.sqrt(max(fit.following, 0.0)) * fit.rms_n
+
+
+def _waits(seconds: float) -> Estimate:
+    return Estimate({}, {}, identified=False, reason=f"{seconds:.1f} s measured, {LEAST_S:g} s needed", seconds=seconds)
+
+
+def _listed(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

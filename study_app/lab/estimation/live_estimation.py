@@ -1,0 +1,198 @@
+"""The lab's estimation: where the force comes from, what is estimated, and what of it goes into the felt setting."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
+
+from study_app.errors import StudyError
+from study_app.haptics.model.scene import Scene
+from study_app.lab.ab_comparison import Workbench, other
+from study_app.lab.changes import changed
+from study_app.lab.estimation.application import applicable, stepped
+from study_app.lab.estimation.estimator import NOTHING, Estimate, OnlineEstimator
+from study_app.lab.estimation.growing_csv import GrowingCsv
+from study_app.lab.estimation.liquid_model import DRAG, NAMES, PLACES, SCALING, values_of
+from study_app.lab.estimation.lsl_stream import LslForce
+from study_app.lab.estimation.rows import Rows, no_rows
+from study_app.lab.estimation.telemetry_force import DeviceForce, OtherLiquidForce, as_measured
+
+if TYPE_CHECKING:
+    from study_app.haptics.runtime.telemetry import Reader
+    from study_app.lab.live import Live
+
+Source: TypeAlias = Literal["off", "other", "device", "file", "lsl"]
+
+OF_TELEMETRY: Final = ("other", "device")
+NO_LIVE: Final = "no device is open"
+OWN_FORCE: Final = "the device's own force answers to the setting itself: it is compared, not applied"
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """Where the force comes from, by ``path`` for a file, and which parameters are estimated."""
+
+    source: Source = "off"
+    names: tuple[str, ...] = (DRAG,)
+    path: Path | None = None
+
+
+class LiveEstimation:
+    """An estimation next to the lab's servo; whoever owns it calls `poll` with each frame.
+
+    Parameters
+    ----------
+    executor : Executor, optional
+        Searches for the wake; by default `poll` does so itself.
+    """
+
+    def __init__(self, executor: Executor | None = None) -> None:
+        self._executor = executor
+        self.chosen = Chosen()
+        self.follows = False
+        self.trouble = ""
+        self._live: Live | None = None
+        self._basis: tuple[Scene, Scene | None] | None = None
+        self._estimator: OnlineEstimator | None = None
+        self._file: GrowingCsv | None = None
+        self._lsl: LslForce | None = None
+        self._device_force = DeviceForce()
+        self._sensor: OtherLiquidForce | None = None
+        self._last_ns: int | None = None
+        self._reader: Reader | None = None
+
+    def choose(self, chosen: Chosen) -> None:
+        """Estimate from another source, or other parameters, from now on.
+
+        Raises
+        ------
+        StudyError
+            The source cannot be opened; then none is.
+        """
+        self.close()
+        if chosen.source == "file" and chosen.path is not None:
+            self._file = GrowingCsv(chosen.path)
+        elif chosen.source == "lsl":
+            self._lsl = LslForce()
+        self.chosen = chosen
+
+    def close(self) -> None:
+        """Estimate nothing from now on."""
+        if self._lsl is not None:
+            self._lsl.close()
+        self._file = self._lsl = self._basis = self._estimator = None
+        self.chosen, self.follows, self.trouble = replace(self.chosen, source="off"), False, ""
+
+    @property
+    def estimate(self) -> Estimate:
+        """The present estimate."""
+        return NOTHING if self._estimator is None else self._estimator.estimate
+
+    @property
+    def applies(self) -> bool:
+        """Whether estimates of this source may be applied."""
+        return self.chosen.source not in {"off", "device"}
+
+    def poll(self, live: Live | None, bench: Workbench) -> dict[str, float]:
+        """Take what was measured since; return what continuous application sets now: values by the lab's names."""
+        if self.chosen.source == "off":
+            return {}
+        if bench.blind:
+            self._basis = self._estimator = None  # begins again afterwards: nothing is known of it meanwhile
+            self.follows = False
+            return {}
+        try:
+            self._begin(live, bench)
+            rows = self._rows(bench)
+            if self._estimator is not None:
+                if self._device_force.began:
+                    self._estimator.restart()
+                self._estimator.take(rows)
+        except StudyError as error:
+            self.close()
+            self.trouble = str(error)
+            return {}
+        return self._following(bench)
+
+    def applied(self, bench: Workbench) -> Workbench:
+        """Return a workbench whose felt setting has the estimated values, as far as they may be applied."""
+        if self._live is None or not self.applies:
+            return bench
+        scene, live = bench.in_hand.scene, self._live
+        values = applicable(scene, self.estimate, live.device.dynamics, live.device.force_limit_n)
+        return set_values(bench, values)
+
+    def _begin(self, live: Live | None, bench: Workbench) -> None:
+        """Begin again where the device or what is not estimated of the settings changed."""
+        scene = bench.in_hand.scene
+        planted = bench.setting(other(bench.felt)).scene if self.chosen.source == "other" else None
+        basis = (_without(scene, self.chosen.names), planted)
+        if basis == self._basis and live is self._live:
+            return
+        if live is None and self.chosen.source in OF_TELEMETRY:
+            raise StudyError(NO_LIVE)
+        self._basis, self._live = basis, live
+        self._last_ns = None
+        of_telemetry = self.chosen.source in OF_TELEMETRY
+        self._estimator = OnlineEstimator(
+            as_measured(scene) if of_telemetry else scene, self.chosen.names, executor=self._executor
+        )
+        self._device_force = DeviceForce()
+        self._sensor = None if planted is None else OtherLiquidForce(planted)
+        self._reader = None if live is None else live.servo.telemetry.reader()
+
+    def _rows(self, bench: Workbench) -> Rows:
+        """Return what was measured since."""
+        if self._file is not None:
+            return self._file.poll()
+        if self._lsl is not None:
+            return self._lsl.poll()
+        if self._reader is None:
+            return no_rows()
+        samples = self._reader.read()
+        if self._sensor is not None:
+            return self._sensor.take(samples)
+        return self._device_force.take(samples, bench.in_hand.scene)
+
+    def _following(self, bench: Workbench) -> dict[str, float]:
+        """Return the values that continuous application sets now."""
+        if not self.follows or self._live is None or not self.applies:
+            return {}
+        now_ns = self._live.servo.now_ns()
+        before_ns, self._last_ns = self._last_ns, now_ns
+        if before_ns is None:
+            return {}
+        live, elapsed_s = self._live, min((now_ns - before_ns) * 1e-9, 0.1)
+        return stepped(bench.in_hand.scene, self.estimate, live.device.dynamics, live.device.force_limit_n, elapsed_s)
+
+
+def set_values(bench: Workbench, values: dict[str, float], *, held: bool = False) -> Workbench:
+    """Return a workbench whose felt setting has these values, by the names of the estimation.
+
+    Held, the changes since the last one that was not are one step for undo.
+
+    Raises
+    ------
+    StudyError
+        The setting cannot have them.
+    """
+    order = NAMES[::-1] if values.get(SCALING, 0.0) > values_of(bench.in_hand.scene).get(SCALING, 0.0) else NAMES
+    scene = bench.in_hand.scene
+    for name in order:  # the scaling first where it grows: it is never below the length
+        if name in values:
+            scene = changed(scene, PLACES[name], values[name])
+    return bench.put(scene, key="estimate" if held else None)
+
+
+def _without(scene: Scene, names: tuple[str, ...]) -> Scene:
+    """Return the scene with fixed values of what is estimated."""
+    body = scene.body.model_copy(update={"drag_coefficient": 1.0})
+    scene = scene.model_copy(update={"body": body})
+    wake = scene.liquids[0].wake
+    if wake is None or names == (DRAG,):
+        return scene
+    fixed = {"length": 1, "scaling": 1.0} if set(names) == set(NAMES) else {}
+    liquid = scene.liquids[0].model_copy(update={"wake": wake.model_copy(update=fixed)})
+    return scene.model_copy(update={"liquids": (liquid,)})
