@@ -1,14 +1,23 @@
-"""The command that finds a liquid's parameters in measurements."""
+"""The commands that find a liquid's parameters in measurements, whole ones or such as come."""
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from study_app.cli.model import assignment
-from study_app.cli.options import SCENE_FILE, Target
+from study_app.cli.options import EXIT_FOUND, SCENE_FILE, Target
 from study_app.cli.progress import progress
+from study_app.errors import StudyError
+
+if TYPE_CHECKING:
+    from study_app.lab.estimation.estimator import Estimate
+
+POLL_S: Final = 0.03
+SHOWN_S: Final = 1.0
 
 
 @click.command()
@@ -61,3 +70,96 @@ def identify(
     click.echo(identified.text(found))
     for written in identified.write(found, to, measured) if to is not None else ():
         click.echo(written)
+
+
+@click.command()
+@SCENE_FILE
+@click.option("--measured", type=click.Path(path_type=Path), metavar="CSV", help="Motion and force; the file may grow.")
+@click.option("--lsl", "stream", metavar="NAME", help="A stream of the Lab Streaming Layer instead.")
+@click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
+@click.option(
+    "--fit",
+    "names",
+    default="drag_coefficient",
+    show_default=True,
+    metavar="NAMES",
+    help="drag_coefficient, or with it length, scaling or both, separated by commas.",
+)
+@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter.")
+@click.option(
+    "--memory",
+    "memory_s",
+    type=click.FloatRange(1, 600),
+    default=10.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="A row of this age counts by 1/e.",
+)
+@click.option(
+    "--idle",
+    "idle_s",
+    type=click.FloatRange(0),
+    default=5.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="End when nothing came for so long.",
+)
+def estimate(
+    scene: str,
+    measured: Path | None,
+    stream: str | None,
+    liquid: str,
+    names: str,
+    changes: tuple[str, ...],
+    memory_s: float,
+    idle_s: float,
+) -> None:
+    """Estimate drag and wake of a liquid from measured force while it comes, once per second.
+
+    CSV has columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the ball), and vx_mps,
+    vy_mps, vz_mps where they are known; the channels of a stream have these labels. Ends with 3 if the motion did not
+    identify the parameters.
+    """
+    from study_app.haptics.model.overrides import override_all
+    from study_app.lab.estimation.estimator import OnlineEstimator
+    from study_app.lab.estimation.growing_csv import GrowingCsv
+    from study_app.lab.estimation.lsl_stream import LslForce
+    from study_app.protocol.load import load_scene
+
+    if (measured is None) == (stream is None):
+        raise StudyError("name either a file (--measured CSV) or a stream (--lsl NAME)")
+    chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))
+    fitted = tuple(name.strip() for name in names.split(","))
+    estimator = OnlineEstimator(chosen, fitted, memory_s=memory_s)
+    source = LslForce(stream or "") if measured is None else GrowingCsv(measured)
+    rows, computing_s, shown_s, came_s = 0, 0.0, None, time.monotonic()
+    while time.monotonic() - came_s <= idle_s or rows == 0:
+        found = source.poll()
+        if len(found) == 0:
+            if time.monotonic() - came_s > max(idle_s, SHOWN_S):
+                break
+            time.sleep(POLL_S)
+            continue
+        began_s = time.process_time()
+        estimator.take(found)
+        computing_s += time.process_time() - began_s
+        rows, came_s = rows + len(found), time.monotonic()
+        if shown_s is None or found.t_s[-1] - shown_s >= SHOWN_S:
+            shown_s = float(found.t_s[-1])
+            click.echo(_line(estimator.estimate))
+    if rows == 0:
+        raise StudyError(f"nothing came for {max(idle_s, SHOWN_S):g} s from {measured or stream}")
+    last = estimator.estimate
+    click.echo(f"at the end:\n{_line(last)}\n{rows} rows, {1e6 * computing_s / rows:.1f} µs of computing per row")
+    if not last.identified:
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+def _line(found: Estimate) -> str:
+    """Return an estimate as one line."""
+    from study_app.lab.estimation.estimator import value_words
+
+    if not found.identified:
+        return f"{found.seconds:7.1f} s  {found.reason}"
+    values = ", ".join(f"{name} {' '.join(value_words(found, name))}" for name in found.values)
+    return f"{found.seconds:7.1f} s  {values}; residual {found.rms_n:.3f} N"

@@ -15,7 +15,7 @@ EXIT_FOUND = 3
 GROUPS: Final = {
     "Study": "new edit check design power preregister run resume rehearse studies sessions workspace",
     "Data": "export plot report unblind exclude include withdraw merge verify rebuild reproduce replay",
-    "Model": "scene simulate identify figures",
+    "Model": "scene simulate identify estimate figures",
     "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds screenshots",
     "Devices": "devices emulate-falcon",
 }

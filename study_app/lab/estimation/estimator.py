@@ -237,6 +237,12 @@ class OnlineEstimator:
         return ""
 
 
+def value_words(estimate: Estimate, name: str) -> tuple[str, str]:
+    """Return a value of an estimate and its interval as they are shown."""
+    lower, upper = estimate.intervals[name]
+    return f"{estimate.values[name]:.4g}", f"({lower:.4g} … {upper:.4g})"
+
+
 def rate_of(rows: Rows) -> float:
     """Return the rate of rows [Hz].
 

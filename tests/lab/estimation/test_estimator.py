@@ -1,0 +1,163 @@
+"""Planted values are found in measured force, and only where the motion shows them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from study_app.errors import StudyError
+from study_app.haptics.model.effects.drag import Drag
+from study_app.lab.estimation.estimator import OnlineEstimator, value_words
+from study_app.lab.estimation.information import NEEDED
+from study_app.lab.estimation.liquid_model import DRAG, NAMES, LiquidModel
+from study_app.lab.estimation.rows import CentredVelocity, Rows, joined
+from study_app.protocol.load import load_scene
+from tests.lab.estimation.measured import NOISE_N, WATER, fed, measured, planted, stirring
+
+WHOLE = 1700  # of water
+
+
+def still(seconds: float = 5.0) -> Rows:
+    t_s = np.arange(round(1000 * seconds)) / 1000
+    return measured(WATER, t_s, np.zeros((len(t_s), 3)))
+
+
+def steady_circle(seconds: float = 10.0) -> Rows:
+    """Return a hand on a circle at a constant speed, whose wake never fills."""
+    t_s = np.arange(round(1000 * seconds)) / 1000
+    places = np.column_stack([0.26 * np.cos(4 * t_s), 0 * t_s, 0.26 * np.sin(4 * t_s)])
+    return measured(planted(drag=0.42, length=7000, scaling=7000), t_s, places)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_drag_coefficient_is_found_within_its_interval(seed: int) -> None:
+    rows = measured(planted(drag=0.42, length=WHOLE, scaling=WHOLE), *stirring(), seed=seed)
+    found = fed(OnlineEstimator(WATER), rows)
+    lower, upper = found.intervals[DRAG]
+    assert WATER.body.drag_coefficient == pytest.approx(0.47)
+    assert found.identified
+    assert found.values[DRAG] == pytest.approx(0.42, rel=0.01)
+    assert lower < 0.42 < upper
+    assert found.rms_n == pytest.approx(NOISE_N * np.sqrt(3), rel=0.05)
+
+
+def test_drag_length_and_scaling_are_found_together() -> None:
+    found = fed(OnlineEstimator(WATER, NAMES), measured(planted(), *stirring()))
+    assert found.identified
+    assert found.values == {
+        DRAG: pytest.approx(0.42, rel=0.02),
+        "length": pytest.approx(1200, rel=0.05),
+        "scaling": pytest.approx(1500, rel=0.05),
+    }
+    assert found.smallest > NEEDED
+
+
+def test_a_stream_of_positions_at_another_rate_is_enough() -> None:
+    rows = measured(planted(drag=0.42, length=WHOLE, scaling=WHOLE), *stirring(rate_hz=500.0))
+    centred = CentredVelocity()
+    found = OnlineEstimator(WATER)
+    for first in range(0, len(rows), 17):
+        part = rows.part(first, first + 17)
+        found.take(centred.take(part.t_s, part.position_m, part.force_n))
+    assert found.estimate.identified
+    assert found.estimate.values[DRAG] == pytest.approx(0.42, rel=0.01)
+
+
+def test_a_hand_at_rest_identifies_nothing() -> None:
+    found = fed(OnlineEstimator(WATER), still())
+    assert not found.identified
+    assert found.reason
+
+
+def test_a_motion_too_weak_for_the_noise_is_named() -> None:
+    t_s, places = stirring(3.0)
+    found = fed(OnlineEstimator(WATER), measured(WATER, t_s, 0.12 * places))
+    assert not found.identified
+    assert "does not identify the drag coefficient" in found.reason
+    assert found.smallest < NEEDED
+
+
+def test_a_wake_that_never_ends_has_no_length() -> None:
+    found = fed(OnlineEstimator(planted(drag=0.47, length=5000, scaling=5000), NAMES), steady_circle())
+    assert not found.identified
+    assert "wake" in found.reason or "length" in found.reason
+
+
+def test_a_wrong_wake_is_not_taken_for_drag() -> None:
+    found = fed(OnlineEstimator(WATER), measured(planted(), *stirring()))
+    assert not found.identified
+    assert "the model misses" in found.reason
+
+
+def test_forgetting_follows_a_change() -> None:
+    t_s, places = stirring(30.0)
+    before, after = (measured(planted(drag=it, length=WHOLE, scaling=WHOLE), t_s, places) for it in (0.30, 0.60))
+    rows = joined(before.part(0, 10_000), after.part(10_000))
+    assert fed(OnlineEstimator(WATER, memory_s=2.0), rows).values[DRAG] == pytest.approx(0.60, rel=0.02)
+    assert fed(OnlineEstimator(WATER, memory_s=600.0), rows).values[DRAG] < 0.55
+
+
+def test_recursion_is_weighted_least_squares() -> None:
+    rows = measured(planted(drag=0.42, length=WHOLE, scaling=WHOLE), *stirring(4.0))
+    g_n, h_n = LiquidModel(WATER, 1000.0).follow(rows)
+    weights = np.exp((rows.t_s - rows.t_s[-1]) / 3.0)[:, np.newaxis]
+    by_hand = np.sum(weights * g_n * (rows.force_n - h_n)) / np.sum(weights * g_n * g_n)
+    for batch in (7, 4000):
+        assert fed(OnlineEstimator(WATER, memory_s=3.0), rows, batch).values[DRAG] == pytest.approx(by_hand, rel=1e-9)
+
+
+def test_rows_without_a_usable_force_only_move_the_wake() -> None:
+    rows = measured(planted(drag=0.42, length=WHOLE, scaling=WHOLE), *stirring())
+    spoilt = rows.force_n.copy()
+    spoilt[3000:4000] = 50.0
+    usable = rows.usable.copy()
+    usable[3000:4000] = False
+    found = fed(OnlineEstimator(WATER), Rows(rows.t_s, rows.position_m, rows.velocity_mps, spoilt, usable))
+    assert found.values[DRAG] == pytest.approx(0.42, rel=0.01)
+
+
+def test_a_gap_begins_again() -> None:
+    rows = measured(planted(drag=0.42, length=WHOLE, scaling=WHOLE), *stirring(4.0))
+    estimator = OnlineEstimator(WATER)
+    fed(estimator, rows)
+    estimator.take(Rows(rows.t_s[:33] + 9.0, *(getattr(rows.part(0, 33), it) for it in Rows.__slots__[1:])))
+    assert not estimator.estimate.identified
+    assert estimator.estimate.values == {}
+
+
+def test_other_forces_are_not_taken_for_drag() -> None:
+    liquid = WATER.liquids[0].model_copy(update={"effects": ("drag", "wake", "added_mass")})
+    scene = WATER.model_copy(update={"liquids": (liquid,)})
+    rows = measured(planted(scene, drag=0.42, length=WHOLE, scaling=WHOLE), *stirring())
+    assert fed(OnlineEstimator(scene), rows).values[DRAG] == pytest.approx(0.42, rel=0.01)
+
+
+def test_a_force_of_the_wrong_sign_is_refused() -> None:
+    rows = measured(WATER, *stirring(4.0))
+    found = fed(OnlineEstimator(WATER), Rows(rows.t_s, rows.position_m, rows.velocity_mps, -rows.force_n, rows.usable))
+    assert not found.identified
+    assert "check its signs" in found.reason
+
+
+def test_laws_without_the_coefficient_are_refused() -> None:
+    liquid = WATER.liquids[0].model_copy(update={"drag": Drag(law="linear", damping_nspm=5.0)})
+    with pytest.raises(StudyError, match='"linear" does not use the drag coefficient'):
+        OnlineEstimator(WATER.model_copy(update={"liquids": (liquid,)}))
+    with pytest.raises(StudyError, match="no effect wake"):
+        OnlineEstimator(load_scene("rek2024", "honey"), NAMES)
+    with pytest.raises(StudyError, match="cannot be estimated online"):
+        OnlineEstimator(WATER, (DRAG, "decay"))
+
+
+def test_slow_streams_are_refused() -> None:
+    rows = measured(WATER, *stirring(4.0))
+    slow = Rows(*(getattr(rows, it)[::40] for it in Rows.__slots__))
+    with pytest.raises(StudyError, match="rows per second"):
+        fed(OnlineEstimator(WATER), slow)
+
+
+def test_values_are_shown_with_their_interval() -> None:
+    found = fed(OnlineEstimator(WATER), measured(planted(drag=0.42, length=WHOLE, scaling=WHOLE), *stirring(4.0)))
+    value, interval = value_words(found, DRAG)
+    assert value.startswith("0.4")
+    assert interval.startswith("(0.4")

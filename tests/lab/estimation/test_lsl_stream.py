@@ -1,0 +1,58 @@
+"""An inlet finds a stream by the labels of its channels, on this computer."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.lab.estimation.lsl_stream import LABELS, LslForce
+from tests.lab.estimation.measured import WATER, measured, stirring
+
+pylsl = pytest.importorskip("pylsl", reason="pylsl is not installed", exc_type=(ImportError, RuntimeError))
+
+NAME = "liquid-study-test-force"
+WAITS_S = 20.0
+
+
+@pytest.fixture
+def outlet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    settings = tmp_path / "lsl_api.cfg"
+    settings.write_text("[multicast]\nResolveScope = machine\n[lab]\nKnownPeers = {127.0.0.1}\n", encoding="utf-8")
+    monkeypatch.setenv("LSLAPICFG", str(settings))
+    labels = (*LABELS, "vx_mps", "vy_mps", "vz_mps")
+    info = pylsl.StreamInfo(NAME, "Force", len(labels), 1000.0, "double64", "liquid-study-test")
+    channels = info.desc().append_child("channels")
+    for it in labels:
+        channels.append_child("channel").append_child_value("label", it)
+    made = pylsl.StreamOutlet(info)
+    yield made
+    del made
+
+
+def test_rows_come_with_the_times_of_their_stream(outlet: Any) -> None:
+    rows = measured(WATER, *stirring(0.2))
+    source = LslForce(NAME)
+    until = time.monotonic() + WAITS_S
+    while not source.connected and time.monotonic() < until:
+        source.poll()
+        time.sleep(0.05)
+    if not source.connected:
+        pytest.skip("no stream is resolved on this computer: multicast is not permitted here")
+    assert outlet.wait_for_consumers(WAITS_S)
+    began_s = pylsl.local_clock()
+    for k in range(len(rows)):
+        sample = np.concatenate([rows.position_m[k], rows.force_n[k], rows.velocity_mps[k]])
+        outlet.push_sample(sample.tolist(), began_s + rows.t_s[k])
+    found = []
+    while sum(map(len, found)) < len(rows) and time.monotonic() < until:
+        found.append(source.poll())
+        time.sleep(0.01)
+    source.close()
+    assert np.concatenate([it.t_s for it in found]) == pytest.approx(began_s + rows.t_s, abs=1e-9)
+    assert np.array_equal(np.concatenate([it.force_n for it in found]), rows.force_n)
+    assert np.array_equal(np.concatenate([it.velocity_mps for it in found]), rows.velocity_mps)
