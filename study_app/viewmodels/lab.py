@@ -18,6 +18,7 @@ from study_app.lab.limiters import Limiter
 from study_app.lab.parameters import sections
 from study_app.lab.presets import Choice
 from study_app.lab.wake_tail import Tail
+from study_app.viewmodels.estimation import NO_ESTIMATE, EstimateShown
 
 if TYPE_CHECKING:
     from study_app.lab.shadow import Trace
@@ -81,7 +82,8 @@ class LabView:
     not be changed and one line why, a new pair for every refusal; ``said`` tells what was saved or opened last.
     ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet, a tail also where the setting
     has no wake. ``cost`` and ``errors`` are of the felt setting, empty until they are measured; ``measuring`` while
-    they are measured anew. ``study`` is the study that is edited and takes changes back, "" without one.
+    they are measured anew; ``estimate`` what a measured force says. ``study`` is the study that is edited and takes
+    changes back, "" without one.
     """
 
     workbench: Workbench
@@ -107,6 +109,7 @@ class LabView:
     workspace_m: Point = (0.1, 0.06, 0.06)
     body_radius_m: float = 0.0034
     study: str = ""
+    estimate: EstimateShown = NO_ESTIMATE
 
     @property
     def felt(self) -> Side:

@@ -20,6 +20,7 @@ from study_app.app.exception_hooks import UncaughtExceptions
 from study_app.app.guarded_slots import guarded
 from study_app.app.lab.costs import Prices
 from study_app.app.lab.device_opening import LabOpening
+from study_app.app.lab.estimation import LabEstimation
 from study_app.app.lab.initial_settings import InitialSettings, prepare_initial_settings
 from study_app.app.lab.preset_saving import LabSaving
 from study_app.app.lab.view_values import lab_view
@@ -91,6 +92,7 @@ class LabController(QObject):
         self._prices = Prices(make_appraiser)
         self._opening = LabOpening(open_live, options)
         self._saving = LabSaving(first.liquids)
+        self.estimation = LabEstimation(place, self)
         self.chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
@@ -155,6 +157,7 @@ class LabController(QObject):
             log.warning("the servo did not stop properly: %s", error)
             self.place.message.emit("The device was not released properly", f"{error}.")
         finally:
+            self.estimation.close()
             self._prices.close()
             self.uncaught.remove()
 
@@ -176,10 +179,8 @@ class LabController(QObject):
             log.warning("the servo did not stop properly: %s", second)
         traceback.clear_frames(error.__traceback__)
         known = isinstance(error, StudyError)
-        before, self.trouble = (
-            self.trouble,
-            f"{error}" if known else f"{type(error).__name__}: {error}; the force is off",
-        )
+        said = f"{error}" if known else f"{type(error).__name__}: {error}; the force is off"
+        before, self.trouble = self.trouble, said
         if not known and self.trouble != before:  # once, though it may come with every frame
             log.error("the lab failed: %s", error, exc_info=error)
 
@@ -198,6 +199,7 @@ class LabController(QObject):
             refused=self._refused,
             said=self._saving.said,
             study=self.study,
+            estimate=self.estimation.shown(),
         )
 
     def feel_of_study(self, a: Setting, b: Setting, study: str) -> None:
@@ -219,6 +221,7 @@ class LabController(QObject):
         """Look at the servo, load what waited, and show it all."""
         if self.live is not None:
             self.live.poll()
+        self.estimation.poll()
         self._prices.take()
         self._show()
 

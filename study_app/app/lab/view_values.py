@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from study_app.app.lab_rows import cost_rows, device_choices, error_rows
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.lab.programmed_paths import TITLES
+from study_app.viewmodels.estimation import EstimateShown
 from study_app.viewmodels.lab import DeviceShown, LabView, Now
 
 if TYPE_CHECKING:
@@ -29,7 +30,8 @@ def lab_view(
     trouble: str,
     refused: tuple[str, str] | None,
     said: str,
-    study: str = "",
+    study: str,
+    estimate: EstimateShown,
 ) -> LabView:
     """Return the view of the lab at this moment.
 
@@ -44,6 +46,7 @@ def lab_view(
     refused : name of a parameter and why its value was refused
     said : the last message about presets
     study : the study that takes changes back, "" without one
+    estimate : what a measured force says
     """
     reading = None if live is None else live.reading()
     fault = "" if reading is None else reading.fault
@@ -81,5 +84,6 @@ def lab_view(
         refused=refused,
         said=said,
         study=study,
+        estimate=estimate,
         **shown,
     )

@@ -30,6 +30,13 @@ if TYPE_CHECKING:
 @click.option(
     "--delayed", type=click.Path(path_type=Path), metavar="FILE", help="Only measure what is left of a delayed force."
 )
+@click.option(
+    "--estimation",
+    "estimated",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Only N loops in which estimates are applied.",
+)
 @click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
 @click.option("--cases", type=click.IntRange(1), metavar="N", help="Only N cases of each group.")
 @click.option("--group", metavar="TEXT", help='Only groups with this text in their name, such as "non-Newtonian".')
@@ -41,6 +48,7 @@ def stability(
     withheld: bool,
     velocity: bool,
     delayed: Path | None,
+    estimated: int | None,
     seed: str,
     cases: int | None,
     group: str | None,
@@ -59,7 +67,14 @@ def stability(
     from study_app.validation.stability.stability_cases import parse
 
     exclude_each_other(
-        to=to, case=line, table=table, withheld=withheld, velocity=velocity, delayed=delayed, group=group
+        to=to,
+        case=line,
+        table=table,
+        withheld=withheld,
+        velocity=velocity,
+        delayed=delayed,
+        estimation=estimated,
+        group=group,
     )
     if to is not None:
         make_folder(to)
@@ -83,6 +98,9 @@ def stability(
         return
     if delayed is not None:
         _write_delayed(delayed)
+        return
+    if estimated is not None:
+        _print_estimated(estimated, workers)
         return
     with progress() as show, executor_for(workers) as executor:
         swept = found.run_sweep(
@@ -120,6 +138,18 @@ def _print_withheld(workers: Workers) -> None:
         shares = measure(executor=executor)
     click.echo(report(shares))
     if not all(share.met for share in shares):
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+def _print_estimated(count: int, workers: Workers) -> None:
+    """Print what became of loops in which estimates are applied; end with 3 if one became unstable."""
+    from study_app.validation.online_estimation.applied_estimates import applied_cases, judge_all, report
+
+    with progress() as show, executor_for(workers) as executor:
+        show("applying estimates in closed loops")
+        verdicts = judge_all(applied_cases(count), executor)
+    click.echo(report(verdicts))
+    if any(it.harmed for it in verdicts):
         click.get_current_context().exit(EXIT_FOUND)
 
 

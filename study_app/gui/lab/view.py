@@ -11,6 +11,7 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QScrollArea, QVBoxLayout, QWidget
 
+from study_app.gui.lab.estimate_card import EstimateCard
 from study_app.gui.lab.flow_curve_cards import FlowCurveRow
 from study_app.gui.lab.form import FormPanel
 from study_app.gui.lab.header import LabHeader
@@ -24,6 +25,7 @@ from study_app.gui.widgets.cards import SHADOW
 from study_app.gui.widgets.escape_key import EscapeAnywhere
 from study_app.gui.widgets.main_view import Place
 from study_app.lab.ab_comparison import Setting
+from study_app.viewmodels.estimation import FILE
 from study_app.viewmodels.lab import LabView
 from study_app.workspace import workspace
 
@@ -42,7 +44,8 @@ class LabPlace(Place):
     ``hand_moved`` [m, hand frame] and ``hand_pressed`` are the mouse's while it moves the ball; ``entered`` and
     ``left`` come as the place is shown and hidden; ``save_asked`` is a file and the `Setting` that was felt when it was
     asked for; ``use_asked`` a study's file and that `Setting`, ``preset_opened`` the file of a preset.
-    ``put_back_asked`` is the felt side and its `Setting`, for the study that is edited.
+    ``put_back_asked`` is the felt side and its `Setting`, for the study that is edited. ``estimate_source_chosen`` is
+    where a measured force comes from, and the path of a file; the others with this name are requests of its card.
     """
 
     changed = Signal(str, object, bool)
@@ -63,6 +66,10 @@ class LabPlace(Place):
     copied = Signal()
     hand_moved = Signal(float, float, float)
     hand_pressed = Signal(int)
+    estimate_source_chosen = Signal(str, object)
+    estimate_parameters_chosen = Signal(str)
+    estimate_apply_asked = Signal()
+    estimate_follow_asked = Signal(bool)
     entered = Signal()
     left = Signal()
 
@@ -81,6 +88,7 @@ class LabPlace(Place):
         self.note = TankNote(self.tank)
         self.force, self.speed = ForceCard(), SpeedCard()
         self.curves = FlowCurveRow(GAP)
+        self.estimate = EstimateCard()
         self.cost, self.error, self.limiters = CostCard(), ErrorCard(), LimiterCard()
         self._escape = EscapeAnywhere(self)
         self._lay_out()
@@ -127,7 +135,7 @@ class LabPlace(Place):
         if wide == self._wide:
             return
         self._wide = wide
-        cards = (self.cost, self.error, self.limiters)
+        cards = (self.estimate, self.cost, self.error, self.limiters)
         column = self._side_area.widget().layout()
         assert isinstance(column, QGridLayout)  # noqa: S101  # made so above
         column.setSpacing(GAP)
@@ -137,8 +145,8 @@ class LabPlace(Place):
                 column.addWidget(card, number, 0)
                 column.setRowStretch(number, int(card is self.limiters))
             else:
-                row, at = ((0, 0), (0, 1), (1, 0))[number]
-                self._side.addWidget(card, row, at, 1, 2 if card is self.limiters else 1)
+                row, at = ((0, 0), (1, 0), (1, 1), (2, 0))[number]
+                self._side.addWidget(card, row, at, 1, 2 if card in {self.estimate, self.limiters} else 1)
         self._side_area.setVisible(wide)
         self._side_area.setFixedWidth(SIDE_WIDTH)
 
@@ -161,6 +169,13 @@ class LabPlace(Place):
             (self.hand_pressed, self.tank.pressed),
         ):
             part.connect(mine)
+        for mine, part in (
+            (self.estimate_parameters_chosen, self.estimate.parameters_chosen),
+            (self.estimate_apply_asked, self.estimate.apply_asked),
+            (self.estimate_follow_asked, self.estimate.follow_asked),
+        ):
+            part.connect(mine)
+        self.estimate.source_chosen.connect(self._choose_source)
         header.save_asked.connect(self.ask_where_to_save)
         form.open_asked.connect(self.ask_which_to_open)
         form.use_asked.connect(self.ask_which_study)
@@ -188,8 +203,8 @@ class LabPlace(Place):
         """Show the lab as of now."""
         self._view = view
         for part in (
-            self.header, self.form, self.tank, self.note, self.force, self.speed, self.curves, self.cost, self.error,
-            self.limiters,
+            self.header, self.form, self.tank, self.note, self.force, self.speed, self.curves, self.estimate, self.cost,
+            self.error, self.limiters,
         ):  # fmt: skip
             part.show_view(view)
         stretch = 0 if self.curves.isVisibleTo(self) else PLOTS_STRETCH  # the tank makes room for a third row
@@ -228,15 +243,25 @@ class LabPlace(Place):
         if (setting := self._free_to_ask()) is not None and self._view is not None:
             self.put_back_asked.emit(self._view.felt, setting)
 
+    def _choose_source(self, source: str) -> None:
+        """Ask for a file where the force comes from one."""
+        if source != FILE:
+            self.estimate_source_chosen.emit(source, None)
+        elif self._free_to_ask() is not None:
+            dialog = self._file_dialog("Measured motion and force", "Tables", ".csv")
+            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+            dialog.fileSelected.connect(lambda name: self.estimate_source_chosen.emit(FILE, Path(name)))
+            dialog.show()
+
     def _free_to_ask(self) -> Setting | None:
         """Return the felt setting; None while another question is open, or the comparison is blind."""
         if self.dialog is not None or self._view is None or self._view.workbench.blind:
             return None
         return self._view.workbench.in_hand
 
-    def _file_dialog(self, title: str, files: str) -> QFileDialog:
+    def _file_dialog(self, title: str, files: str, suffix: str = SUFFIX) -> QFileDialog:
         """Return a question for a file, which begins in the workspace's protocols."""
-        self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{SUFFIX})")
+        self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{suffix})")
         self.dialog.finished.connect(self._forget_dialog)
         return self.dialog
 

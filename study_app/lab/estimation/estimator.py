@@ -22,7 +22,6 @@ from study_app.lab.estimation.liquid_model import DRAG, NAMES, LiquidModel, refu
 from study_app.lab.estimation.recursive_drag import RecursiveDrag
 from study_app.lab.estimation.rows import GAP_S, Rows, joined, no_rows
 from study_app.lab.estimation.wake_fit import WakeFit, WakeSearch
-from study_app.lab.parameters import the_liquid
 
 MEMORY_S: Final = 10.0
 LEAST_S: Final = 1.0
@@ -93,7 +92,6 @@ class OnlineEstimator:
             raise StudyError(f"{unknown[0]!r} cannot be estimated online: choose among {', '.join(NAMES)}")
         if DRAG not in names:
             raise StudyError(f"the drag coefficient is estimated with the wake: add {DRAG}")
-        the_liquid(scene)
         if why := refusal(scene, names):
             raise StudyError(why)
         self.names = names

@@ -16,7 +16,6 @@ from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import Given, Scene
 from study_app.haptics.runtime.offline import ModelAlong
 from study_app.lab.estimation.rows import Floats, Rows
-from study_app.lab.parameters import the_liquid
 
 DRAG: Final = "drag_coefficient"
 LENGTH: Final = "length"
@@ -30,7 +29,9 @@ _DRAG_ALONE: Final = {"drag", "wake", "local_wake", "current", "surface"}
 
 
 def refusal(scene: Scene, names: tuple[str, ...]) -> str:
-    """Return why parameters of a scene with one liquid cannot be estimated, "" where they can."""
+    """Return why parameters of a scene cannot be estimated, "" where they can."""
+    if len(scene.liquids) != 1:
+        return f"a force is estimated of one liquid at a time, not of {len(scene.liquids)}: choose one of them"
     liquid = resolve(scene).liquids[0]
     if "drag" not in liquid.effects:
         return "the liquid has no effect drag: the drag coefficient does not change its force"
@@ -58,7 +59,6 @@ class LiquidModel:
     """
 
     def __init__(self, scene: Scene, rate_hz: float) -> None:
-        the_liquid(scene.model_copy(update={"velocity": Scene().velocity}))
         scene = resolve(scene)
         if why := refusal(scene, (DRAG,)):
             raise StudyError(why)

@@ -11,7 +11,7 @@ import numpy as np
 
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.layout import LIMITER_ESTIMATOR, LIMITER_FADE, LIMITER_GLITCH, STATUS_OK
-from study_app.haptics.model.scene import Given, Knee, Scene
+from study_app.haptics.model.scene import Knee, Scene
 from study_app.haptics.runtime.offline import ModelAlong
 from study_app.lab.estimation.rows import Floats, Rows, no_rows
 
@@ -22,7 +22,7 @@ _SEED: Final = 1
 
 def as_measured(scene: Scene) -> Scene:
     """Return the scene for velocities of telemetry."""
-    return resolve(scene).model_copy(update={"velocity": Given(), "knee": Knee(law="none")})
+    return resolve(scene).model_copy(update={"knee": Knee(law="none")})
 
 
 class DeviceForce:

@@ -110,12 +110,12 @@ def new_bench(case: Case, *, safe: bool, limits: DampingLimits | None = None, sc
         quantum_m=case.quantum_um * 1e-6,
         **_device(case),
     )
-    model = pack(scene or scene_of(case), limits=limits, dynamics=_dynamics(case))
+    model = pack(scene or scene_of(case), limits=limits, dynamics=dynamics_of(case))
     pace = new_schedule(1.0 / case.rate_hz, jitter_s=case.jitter / case.rate_hz, missed=case.missed)
     return Bench(model, safety, records(SAMPLE, 1), handle, pace, loop)
 
 
-def _dynamics(case: Case) -> Dynamics:
+def dynamics_of(case: Case) -> Dynamics:
     """Return what the device states: its least mass and its delay, as they are believed, and its velocity's lag."""
     least_kg = case.believed_kg or (min(case.mass_kg, case.other_kg) if case.other_kg else case.mass_kg)
     lag_s = case.velocity_lag / case.rate_hz if case.estimator == DEVICE else None

@@ -1,0 +1,1 @@
+"""The evidence of estimation while it runs: closed loops in which estimates are applied."""
