@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -31,6 +31,8 @@ SEARCH_S: Final = 2.0
 KEPT_S: Final = 15.0
 MISFIT: Final = 0.2
 """Of the measured force: where more than that is left and is not noise, the model is another liquid's. [choice]"""
+_SURE: Final = 0.02
+"""Likewise: where more is left, the next search looks farther for a better minimum."""
 _RATE_ROWS: Final = 20
 _SLOWEST_HZ: Final = 50.0
 _MOST_DRAG: Final = 10.0
@@ -108,7 +110,7 @@ class OnlineEstimator:
         self._drag = RecursiveDrag(self._memory_s)
         self._dropped = False
         self._searched_s = -math.inf
-        self._pending: Future[WakeFit] | None = None
+        self._pending: Future[WakeFit | None] | None = None
         self._known: dict[str, float] | None = None
         self._estimate = NOTHING
 
@@ -190,11 +192,15 @@ class OnlineEstimator:
         else:
             self._pending = self._executor.submit(search.run, *start, anew=self._known is None)
 
-    def _finish(self, fit: WakeFit) -> None:
+    def _finish(self, fit: WakeFit | None) -> None:
         """Take over what a search found."""
         self._pending = None
+        if fit is None:
+            self._estimate, self._known = _waits(self._seconds), None
+            return
         self._estimate = self._judged(fit)
-        self._known = dict(fit.values) if self._estimate.identified else None
+        sure = self._estimate.identified and _misfit_n(fit) <= _SURE * fit.force_rms_n
+        self._known = dict(fit.values) if sure else None
 
     def _judged(self, fit: WakeFit) -> Estimate:
         """Return what is to be said of values that were found."""
@@ -261,7 +267,10 @@ def _misfit_n(fit: WakeFit) -> float:
 
 
 def _waits(seconds: float) -> Estimate:
-    return Estimate({}, {}, identified=False, reason=f"{seconds:.1f} s measured, {LEAST_S:g} s needed", seconds=seconds)
+    """Return what is said where too little was measured, or nothing moved."""
+    short = f"{seconds:.1f} s measured, {LEAST_S:g} s needed"
+    reason = short if seconds < LEAST_S else "the body does not move in the liquid"
+    return replace(NOTHING, reason=reason, seconds=seconds)
 
 
 def _listed(words: list[str]) -> str:

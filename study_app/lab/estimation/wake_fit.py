@@ -1,13 +1,14 @@
 """Drag coefficient, length and scaling of a wake: Gauss–Newton over the newest rows, older ones counting less.
 
 The drag coefficient enters linearly and is solved for at every step (variable projection; Golub & Pereyra 1973); length
-N and scaling S are searched by their logarithms, from the best of a grid of lengths where nothing is known yet. The
+N and scaling S are searched by their logarithms, from the best of a grid where nothing is known yet. The
 liquid is at rest before the first row of a stream; where older rows were dropped, the first N ticks of those left only
 fill the wake and do not count.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,8 +24,8 @@ from study_app.lab.estimation.rows import Floats, Rows
 
 LONGEST: Final = 7_500
 """Ticks of a wake that the rows kept can show."""
-GRID: Final = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
-"""Lengths and scalings that a search begins at, in multiples of the scene's."""
+GRID: Final = (0.5, 0.71, 1.0, 1.41, 2.0)
+"""Lengths that a search begins at, and scalings for each of them, in multiples of the scene's."""
 _STEPS: Final = 8
 _HALVINGS: Final = 4
 _MOST_STEP: Final = 0.4
@@ -90,11 +91,13 @@ class WakeSearch:
         self._weights: Floats = np.exp((rows.t_s - rows.t_s[-1]) / memory_s) * rows.usable
         self._axes = np.flatnonzero(rows.force_n.any(axis=0))
 
-    def run(self, length: int, scaling: float, *, anew: bool) -> WakeFit:
-        """Return the best values, from these on; ``anew`` looks at the grid around them before."""
+    def run(self, length: int, scaling: float, *, anew: bool) -> WakeFit | None:
+        """Return the best values, from these on, None where nothing moved; ``anew`` looks at the grid around before."""
         grid = GRID if anew else (1.0,)
-        starts = [self._bounded(length * it, scaling * it) for it in grid]
+        starts = {self._bounded(length * n, scaling * s) for n, s in itertools.product(grid, grid)}
         at = min((self._at(*start) for start in starts), key=lambda it: it.cost)
+        if not math.isfinite(at.drag):
+            return None
         slopes = self._slopes(at)
         for _ in range(_STEPS):
             found, ended = self._stepped(at, slopes)

@@ -32,6 +32,17 @@ def stirring(seconds: float = 10.0, rate_hz: float = 1000.0) -> tuple[Any, Any]:
     return t_s, np.column_stack([x, 0 * t_s, 0.1 * np.sin(0.53 * turn)])
 
 
+def wandering(draw: Any) -> tuple[Any, Any]:
+    """Return times (n,) and places (n, 3) of a hand of three sines of random periods, sizes and phases."""
+    t_s = np.arange(round(1000 * draw.uniform(3, 15))) / 1000
+    size = np.exp(draw.uniform(np.log(0.01), np.log(0.3)))
+    places = np.zeros((len(t_s), 3))
+    for _ in range(3):
+        turn = 2 * np.pi * (draw.uniform(0.05, 1.0) * t_s + draw.random())
+        places += size * draw.standard_normal(3) * [0.6, 0.1, 0.4] * np.sin(turn)[:, np.newaxis]
+    return t_s, places
+
+
 def measured(scene: Scene, t_s: Any, position_m: Any, *, noise_n: float = NOISE_N, seed: int = 1) -> Rows:
     """Return what a sensor measures along a motion in a liquid, its velocities known."""
     velocity_mps = np.gradient(position_m, t_s, axis=0)
