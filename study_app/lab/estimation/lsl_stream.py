@@ -20,7 +20,7 @@ from study_app.lab.estimation.rows import FORCES, CentredVelocity, Rows, no_rows
 LABELS: Final = (*PLACES[1:], *FORCES)
 _INSTALL: Final = "the Lab Streaming Layer needs pylsl: pip install 'liquid-study[lsl]'"
 _BUFFER_S: Final = 30
-_OPENS_S: Final = 2.0
+_OPENS_S: Final = 0.5
 
 
 def available() -> bool:
@@ -64,7 +64,10 @@ class LslForce:
         """Return the rows that came since; none before a stream was found."""
         if self._inlet is None and not self._connect():
             return no_rows()
-        samples, stamps = self._inlet.pull_chunk(timeout=0.0, max_samples=4096)
+        try:
+            samples, stamps = self._inlet.pull_chunk(timeout=0.0, max_samples=4096)
+        except RuntimeError as error:  # the base of what pylsl raises
+            raise StudyError("the LSL stream of measured force ended: start it again, then choose it again") from error
         if not stamps:
             return no_rows()
         t_s = np.asarray(stamps, float)
@@ -93,14 +96,14 @@ class LslForce:
             inlet = self._lsl.StreamInlet(found, max_buflen=_BUFFER_S, recover=False)
             try:
                 labels = _labels(inlet.info(timeout=_OPENS_S))
-            except (self._lsl.TimeoutError, self._lsl.LostError):
-                continue
-            if not set(LABELS) <= set(labels):
-                self._refused.add(found.uid())
+                if not set(LABELS) <= set(labels):
+                    self._refused.add(found.uid())
+                    continue
+                inlet.open_stream(timeout=_OPENS_S)
+            except (RuntimeError, TimeoutError):  # it ended, or does not answer now
                 continue
             self._has_velocities = set(VELOCITIES) <= set(labels)
             self._places = [labels.index(it) for it in (*LABELS, *(VELOCITIES if self._has_velocities else ()))]
-            inlet.open_stream(timeout=_OPENS_S)
             self._inlet = inlet
             return True
         return False

@@ -14,6 +14,8 @@ from study_app.lab.estimation.rows import CentredVelocity, Rows, joined
 from study_app.protocol.load import load_scene
 from tests.lab.estimation.measured import NOISE_N, WATER, fed, measured, planted, stirring, wandering
 
+pytestmark = pytest.mark.slow
+
 WHOLE = 1700  # of water
 
 

@@ -18,7 +18,7 @@ from tests.lab.benches import bench, live_with, scripted
 from tests.lab.estimation.measured import WATER, planted
 from tests.lab.estimation.test_growing_csv import begun
 
-pytestmark = needs_servo
+pytestmark = [pytest.mark.slow, needs_servo]
 
 FRAME = 33
 

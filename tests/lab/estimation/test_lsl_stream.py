@@ -10,13 +10,25 @@ from typing import Any
 import numpy as np
 import pytest
 
+from study_app.errors import StudyError
 from study_app.lab.estimation.lsl_stream import LABELS, LslForce
 from tests.lab.estimation.measured import WATER, measured, stirring
 
 pylsl = pytest.importorskip("pylsl", reason="pylsl is not installed", exc_type=(ImportError, RuntimeError))
 
+pytestmark = pytest.mark.slow
+
 NAME = "liquid-study-test-force"
 WAITS_S = 20.0
+
+
+def made(labels: tuple[str, ...], name: str) -> Any:
+    """Return an outlet with labels of its channels."""
+    info = pylsl.StreamInfo(name, "Force", len(labels), 1000.0, "double64", name)
+    channels = info.desc().append_child("channels")
+    for it in labels:
+        channels.append_child("channel").append_child_value("label", it)
+    return pylsl.StreamOutlet(info)
 
 
 @pytest.fixture
@@ -24,25 +36,25 @@ def outlet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     settings = tmp_path / "lsl_api.cfg"
     settings.write_text("[multicast]\nResolveScope = machine\n[lab]\nKnownPeers = {127.0.0.1}\n", encoding="utf-8")
     monkeypatch.setenv("LSLAPICFG", str(settings))
-    labels = (*LABELS, "vx_mps", "vy_mps", "vz_mps")
-    info = pylsl.StreamInfo(NAME, "Force", len(labels), 1000.0, "double64", "liquid-study-test")
-    channels = info.desc().append_child("channels")
-    for it in labels:
-        channels.append_child("channel").append_child_value("label", it)
-    made = pylsl.StreamOutlet(info)
-    yield made
-    del made
+    found = made((*LABELS, "vx_mps", "vy_mps", "vz_mps"), NAME)
+    yield found
+    del found
 
 
-def test_rows_come_with_the_times_of_their_stream(outlet: Any) -> None:
-    rows = measured(WATER, *stirring(0.2))
-    source = LslForce(NAME)
+def connect(source: LslForce) -> None:
+    """Wait until a stream is found; skip the test where none can be."""
     until = time.monotonic() + WAITS_S
     while not source.connected and time.monotonic() < until:
         source.poll()
         time.sleep(0.05)
     if not source.connected:
         pytest.skip("no stream is resolved on this computer: multicast is not permitted here")
+
+
+def test_rows_come_with_the_times_of_their_stream(outlet: Any) -> None:
+    rows = measured(WATER, *stirring(0.2))
+    source, until = LslForce(NAME), time.monotonic() + WAITS_S
+    connect(source)
     assert outlet.wait_for_consumers(WAITS_S)
     began_s = pylsl.local_clock()
     for k in range(len(rows)):
@@ -56,3 +68,24 @@ def test_rows_come_with_the_times_of_their_stream(outlet: Any) -> None:
     assert np.concatenate([it.t_s for it in found]) == pytest.approx(began_s + rows.t_s, abs=1e-9)
     assert np.array_equal(np.concatenate([it.force_n for it in found]), rows.force_n)
     assert np.array_equal(np.concatenate([it.velocity_mps for it in found]), rows.velocity_mps)
+
+
+@pytest.mark.usefixtures("outlet")
+def test_streams_of_other_channels_are_passed_over() -> None:
+    other = made(("x_m", "y_m"), f"{NAME}-other")
+    source = LslForce()
+    connect(source)
+    assert len(source.poll()) == 0
+    source.close()
+    del other
+
+
+def test_a_stream_that_ends_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Ended:
+        def pull_chunk(self, **_words: object) -> None:
+            raise pylsl.util.LostError("the stream has been lost.")
+
+    source = LslForce(NAME)
+    monkeypatch.setattr(source, "_inlet", Ended())
+    with pytest.raises(StudyError, match="ended: start it again"):
+        source.poll()
