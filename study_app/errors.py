@@ -9,6 +9,7 @@
     │   └── DeviceLost         was there, and stopped responding
     ├── ServoFault             the servo stopped itself; the force is zero
     ├── SessionError           an event that the session cannot take in its present state
+    ├── OutletError            a stream or port to another program that cannot be used
     ├── StoreError             results that cannot be written or read
     ├── AnalysisError          results that cannot be evaluated
     ├── WorkerError            a process that computes for this program ended unexpectedly
@@ -83,6 +84,10 @@ class DeviceLost(DeviceError):
 
 class ServoFault(StudyError):
     """The servo stopped itself and sends zero force."""
+
+
+class OutletError(StudyError):
+    """A stream or a port to another program cannot be used; the session goes on without it."""
 
 
 class SessionError(StudyError):

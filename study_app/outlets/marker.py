@@ -1,0 +1,98 @@
+"""Markers: what other programs are given of an event of the journal, as text and as a trigger code.
+
+A marker holds codes and counts alone, by a list of what may be said: no condition, no answer, no measure, no text that
+somebody wrote, and nothing that the journal seals.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+CODES: Final[Mapping[str, int]] = {
+    "session_started": 1,
+    "session_resumed": 2,
+    "session_ended": 3,
+    "trial_started": 10,
+    "trial_ended": 11,
+    "interval_started": 20,
+    "interval_ended": 21,
+    "choice": 30,
+    "responses": 31,
+    "form_answered": 32,
+    "force_stopped": 40,
+    "force_restored": 41,
+    "paused": 42,
+    "resumed": 43,
+    "broke": 44,
+}
+"""The trigger code of each event that has one: a byte; 0 is the idle state of a port."""
+
+_UNCODED: Final = frozenset(
+    (
+        "page_shown",
+        "page_left",
+        "feedback_shown",
+        "stepped",
+        "target_reached",
+        "form_shown",
+        "item_shown",
+        "answer_removed",
+        "note",
+        "repeat",
+        "device_reconnected",
+    )
+)
+"""Events that are markers without a trigger code."""
+
+_SAID: Final = ("trial", "attempt", "interval", "block", "phase", "code", "item", "form", "page", "target", "by")
+"""The fields of an event that a marker repeats; ``code`` is the blinded one, such as L2."""
+
+
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """An event as other programs get it.
+
+    ``time_ns`` is when it happened on the servo's clock, ``t_s`` the same on the session's, which the journal has.
+    ``byte`` is its trigger code, None of an event without one.
+    """
+
+    event: str
+    time_ns: int
+    t_s: float
+    said: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def byte(self) -> int | None:
+        """The trigger code; None of an event without one."""
+        return CODES.get(self.event)
+
+    @property
+    def text(self) -> str:
+        """Return the marker as one line of JSON."""
+        line = {"event": self.event, **dict(self.said), "t_s": round(self.t_s, 6)}
+        if self.byte is not None:
+            line["trigger"] = self.byte
+        return json.dumps(line, ensure_ascii=False, separators=(",", ":"))
+
+
+def marker_of(event: str, t_s: float, origin_ns: int, fields: Mapping[str, Any]) -> Marker | None:
+    """Return the marker of an event of the journal, None of one that other programs need not know.
+
+    Parameters
+    ----------
+    event : str
+        The journal's name of it.
+    t_s : float
+        When it happened on the session's clock [s].
+    origin_ns : int
+        The servo's clock at the origin of the session's [ns].
+    fields : mapping
+        What the journal's line says besides.
+    """
+    if event not in CODES and event not in _UNCODED:
+        return None
+    said = tuple((name, fields[name]) for name in _SAID if fields.get(name) is not None)
+    return Marker(event, origin_ns + round(t_s * 1e9), t_s, said)

@@ -1,0 +1,151 @@
+"""The outlets of a session: opened before it, given its events, and closed after it.
+
+One that cannot be opened, or fails later, is named in `Outlets.lost` with the reason; the session goes on without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal, Protocol, TypeAlias
+
+from study_app.discovery import modules_of
+from study_app.errors import OutletError
+from study_app.outlets import sinks
+from study_app.outlets.marker import Marker
+from study_app.outlets.sample_stream import SampleStream
+from study_app.outlets.sink import Sink, SinkKind, SinkThread
+
+SampleChoice: TypeAlias = Literal["off", "single-blind", "always"]
+"""In which studies samples are streamed: in none, in those that are not double-blind, in all."""
+
+
+class SampledServo(Protocol):
+    """What is asked of the servo (``haptics.runtime.servo.Servo``)."""
+
+    rate_hz: float
+    telemetry: Any
+
+    def now_ns(self) -> int: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class OutletStatus:
+    """How an outlet is, for the pre-flight.
+
+    ``listens`` says whether a program receives it, None where that cannot be known; ``lost`` why it does not work,
+    empty where it does. ``withheld`` says that it is off because the study is double-blind, ``shows_force`` that it
+    lets a viewer see the force in a double-blind study.
+    """
+
+    title: str
+    listens: bool | None = None
+    lost: str = ""
+    withheld: bool = False
+    shows_force: bool = False
+
+
+@cache
+def sink_kinds() -> Mapping[str, SinkKind]:
+    """Return the kinds of sinks by name."""
+    kinds = [module.SINK for module in modules_of(sinks)]
+    return {kind.name: kind for kind in kinds}
+
+
+def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
+    """Open the sink of an address, such as ``lsl`` or ``serial:/dev/ttyUSB0``.
+
+    Raises
+    ------
+    OutletError
+        The address is not one, or the sink cannot be opened.
+    """
+    name, _, place = address.partition(":")
+    kind = sink_kinds().get(name)
+    if kind is None:
+        examples = ", ".join(one.example for one in sink_kinds().values())
+        raise OutletError(f"'{address}' is not an address of markers: use one like {examples}")
+    return kind.open(place, now_ns)
+
+
+class Outlets:
+    """What a session sends to other programs; `mark` never waits.
+
+    Parameters
+    ----------
+    addresses : sequence of str
+        Where markers go.
+    samples : SampleChoice
+        Whether samples are streamed.
+    servo : SampledServo
+        The servo, its clock and its samples.
+    blinding : str
+        That of the study: "double" or "single".
+    """
+
+    def __init__(self, addresses: Sequence[str], samples: SampleChoice, servo: SampledServo, blinding: str) -> None:
+        self._failed: dict[str, str] = {}
+        self._threads: list[SinkThread] = []
+        self._samples: SampleStream | None = None
+        self._double = blinding == "double"
+        self._withheld = self._double and samples == "single-blind"
+        for address in addresses:
+            try:
+                self._threads.append(SinkThread(open_sink(address, servo.now_ns)))
+            except OutletError as error:
+                kind = sink_kinds().get(address.partition(":")[0])
+                self._failed["Triggers" if kind is None else kind.title] = str(error)
+        if samples != "off" and not self._withheld:
+            try:
+                self._samples = SampleStream(servo.telemetry, servo.rate_hz, servo.now_ns)
+            except OutletError as error:
+                self._failed[SampleStream.title] = str(error)
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """What the receipt says of the outlets, by title."""
+        there = {one.title: dict(one.described) for one in self._open()}
+        return there | {title: {"failed": reason} for title, reason in self._failed.items()}
+
+    @property
+    def lost(self) -> dict[str, str]:
+        """Why an outlet does not work, by its title; nothing of those that do."""
+        failed = {one.sink.title: one.lost for one in self._threads if one.lost}
+        if self._samples is not None and self._samples.lost:
+            failed[self._samples.title] = self._samples.lost
+        return self._failed | failed
+
+    def statuses(self) -> tuple[OutletStatus, ...]:
+        """Return how each outlet is at present."""
+        lost = self.lost
+        found = [
+            OutletStatus(
+                one.title,
+                listens=one.listens,
+                lost=lost.get(one.title, ""),
+                shows_force=self._double and one is self._samples,
+            )
+            for one in self._open()
+        ]
+        found += [OutletStatus(title, lost=reason) for title, reason in self._failed.items()]
+        if self._withheld:
+            found.append(OutletStatus(SampleStream.title, withheld=True))
+        return tuple(found)
+
+    def mark(self, marker: Marker) -> None:
+        """Hand an event over to every sink."""
+        for thread in self._threads:
+            thread.mark(marker)
+
+    def close(self) -> None:
+        """Send what waits, but not for ever, and let go of everything."""
+        for thread in self._threads:
+            thread.close()
+        if self._samples is not None:
+            self._samples.close()
+
+    def _open(self) -> Iterator[Sink | SampleStream]:
+        yield from (one.sink for one in self._threads)
+        if self._samples is not None:
+            yield self._samples

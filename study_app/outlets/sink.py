@@ -1,0 +1,130 @@
+"""Where markers go: a kind's descriptor, an open sink, and the thread that serves it.
+
+A session hands a marker over and goes on at once. A sink that fails, or that hangs, holds up neither the session nor
+the servo: it gets no more markers, and `SinkThread.lost` says why.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+from study_app.errors import OutletError
+from study_app.outlets.marker import Marker
+
+ROOM: Final = 1000
+"""Markers that may wait: more than a hanging sink is given before it counts as lost."""
+
+PATIENCE_S: Final = 1.0
+
+
+class Sink(Protocol):
+    """A place that markers go to. All calls may wait, and come from one thread."""
+
+    @property
+    def title(self) -> str:
+        """What the operator calls it."""
+        ...
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """What the receipt says of it."""
+        ...
+
+    @property
+    def listens(self) -> bool | None:
+        """Whether a program receives the markers; None where that cannot be known."""
+        ...
+
+    def send(self, marker: Marker) -> None:
+        """Send a marker.
+
+        Raises
+        ------
+        OutletError
+            It was not sent, and those after it will not be either.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let go of it."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class SinkKind:
+    """What a kind of sink says of itself.
+
+    ``name`` stands before the colon of an address, ``example`` is an address; ``open`` is given what follows the
+    colon and the servo's clock [ns].
+    """
+
+    name: str
+    title: str
+    example: str
+    open: Callable[[str, Callable[[], int]], Sink]
+
+
+class SinkThread:
+    """Sends markers to a sink in a thread of its own.
+
+    Attributes
+    ----------
+    lost : str
+        Why the sink gets no more markers; empty while it does.
+    """
+
+    def __init__(self, sink: Sink) -> None:
+        self.sink = sink
+        self.lost = ""
+        self._waiting: deque[Marker] = deque()
+        self._changed = threading.Condition()
+        self._closing = False
+        self._thread = threading.Thread(target=self._work, name=f"outlet {sink.title}", daemon=True)
+        self._thread.start()
+
+    def mark(self, marker: Marker) -> None:
+        """Hand a marker over; returns at once."""
+        with self._changed:
+            if self.lost or self._closing:
+                return
+            if len(self._waiting) >= ROOM:
+                self._give_up("it accepts no more markers")
+                return
+            self._waiting.append(marker)
+            self._changed.notify_all()
+
+    def close(self, patience_s: float = PATIENCE_S) -> None:
+        """Send what waits, for so long, and let go of the sink; one that hangs is left to its thread."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        self._thread.join(patience_s)
+
+    def _work(self) -> None:
+        try:
+            while (marker := self._next()) is not None:
+                self.sink.send(marker)
+        except OutletError as error:
+            with self._changed:
+                self._give_up(str(error))
+        except Exception as error:  # noqa: BLE001 - whatever a driver raises, the session goes on without it
+            with self._changed:
+                self._give_up(f"{type(error).__name__}: {error}")
+        try:
+            self.sink.close()
+        except Exception as error:  # noqa: BLE001
+            self.lost = self.lost or f"it was not closed: {error}"
+
+    def _give_up(self, reason: str) -> None:
+        self.lost = self.lost or reason
+        self._waiting.clear()
+        self._changed.notify_all()
+
+    def _next(self) -> Marker | None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._closing or self.lost)
+            return self._waiting.popleft() if self._waiting else None

@@ -1,0 +1,1 @@
+"""Where markers may go: a module for each kind, with its descriptor `SINK`."""

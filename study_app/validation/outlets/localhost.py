@@ -1,0 +1,31 @@
+"""The Lab Streaming Layer on this computer alone, apart from all other streams: for measurements and tests."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+VARIABLE: Final = "LSLAPICFG"
+_FILE: Final = """[multicast]
+ResolveScope = machine
+[lab]
+KnownPeers = {{127.0.0.1}}
+SessionID = liquid-study-{process}
+[log]
+level = -2
+"""
+
+
+@cache
+def localhost_only() -> Path:
+    """Let this process and those it starts use a configuration of their own, once; return its file.
+
+    It must be called before the library is loaded.
+    """
+    path = Path(tempfile.gettempdir(), f"liquid-study-lsl-{os.getpid()}.cfg")
+    path.write_text(_FILE.format(process=os.getpid()), encoding="utf-8")
+    os.environ[VARIABLE] = str(path)
+    return path

@@ -1,0 +1,43 @@
+"""Outlets of a session that keep its markers, in place of streams and ports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from study_app.outlets.marker import Marker
+from study_app.session.simulated import rehearsal
+
+
+class Collector:
+    """Takes the place of ``Outlets``; ``lost`` is what a test says."""
+
+    def __init__(self) -> None:
+        self.markers: list[Marker] = []
+        self.lost: dict[str, str] = {}
+
+    def mark(self, marker: Marker) -> None:
+        self.markers.append(marker)
+
+    @property
+    def events(self) -> list[str]:
+        return [marker.event for marker in self.markers]
+
+
+@contextmanager
+def collecting() -> Iterator[Collector]:
+    """Collect the markers of sessions that are rehearsed meanwhile."""
+    collector = Collector()
+    begin = rehearsal.begin
+
+    def begun(*given: Any, **named: Any) -> Any:
+        store = begin(*given, **named)
+        store.attach(collector)
+        return store
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rehearsal, "begin", begun)
+        yield collector

@@ -1,0 +1,193 @@
+"""Both streams as a recorder in another process gets them, on this computer alone."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLEW, SAMPLE
+from study_app.outlets.sample_stream import CHANNELS, SampleStream, channels_of
+from study_app.outlets.session_outlets import Outlets, open_sink
+from study_app.outlets.sink import SinkThread
+from study_app.validation.outlets.localhost import localhost_only
+from tests.outlets.sinks import marker
+
+localhost_only()
+pylsl = pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
+slow = pytest.mark.slow
+
+RECORDER = """
+import json, sys, pylsl
+name, count = sys.argv[1], int(sys.argv[2])
+found = pylsl.resolve_byprop("name", name, 1, 30)
+inlet = pylsl.StreamInlet(found[0])
+info = inlet.info(10)
+inlet.open_stream(10)
+print("ready", flush=True)
+samples = [inlet.pull_sample(20) for _ in range(count)]
+print(json.dumps({"xml": info.as_xml(), "rate": info.nominal_srate(), "samples": samples}))
+"""
+START_NS = 7_000_000_000
+
+
+class Recorder:
+    """A recording program that knows nothing of this one: it takes so many samples of a stream by its name."""
+
+    def __init__(self, name: str, count: int) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", RECORDER, name, str(count)], stdout=subprocess.PIPE, text=True
+        )
+        assert self._process.stdout is not None
+        assert self._process.stdout.readline() == "ready\n"
+
+    def found(self) -> dict[str, Any]:
+        return json.loads(self._process.communicate(timeout=60)[0])
+
+
+class Telemetry:
+    """Gives samples in batches, as a servo's telemetry does."""
+
+    def __init__(self) -> None:
+        self.batches: deque[Any] = deque()
+        self.dropped = 0
+
+    def reader(self) -> Telemetry:
+        return self
+
+    def read(self) -> Any:
+        return self.batches.popleft() if self.batches else samples_of(0)
+
+
+class Servo:
+    rate_hz = 1000.0
+
+    def __init__(self) -> None:
+        self.telemetry = Telemetry()
+
+    def now_ns(self) -> int:
+        return time.monotonic_ns()
+
+
+def samples_of(count: int, first: int = 0) -> Any:
+    made = np.zeros(count, SAMPLE)
+    ticks = first + np.arange(count)
+    made["tick"], made["time_ns"] = ticks, START_NS + 1_000_000 * ticks
+    for axis in range(3):
+        made["position_m"][:, axis] = 0.001 * ticks + axis
+        made["velocity_mps"][:, axis] = 0.01 * ticks + 10 * axis
+        made["device_force_n"][:, axis] = 0.1 * ticks + 100 * axis
+    made["limiters"] = np.where(ticks % 2, LIMITER_ENERGY | LIMITER_SLEW, 0)
+    return made
+
+
+def test_channels_are_position_velocity_force_sent_and_limiters() -> None:
+    made = samples_of(2, first=1)
+    made["command_n"], made["force_n"] = -5, -6
+    expected = [
+        [0.001, 1.001, 2.001, 0.01, 10.01, 20.01, 0.1, 100.1, 200.1, LIMITER_ENERGY | LIMITER_SLEW],
+        [0.002, 1.002, 2.002, 0.02, 10.02, 20.02, 0.2, 100.2, 200.2, 0],
+    ]
+    np.testing.assert_allclose(channels_of(made), expected, rtol=1e-6)
+    assert len(CHANNELS) == 10
+
+
+@slow
+def test_a_recorder_gets_every_sample_with_the_time_of_its_reading() -> None:
+    servo = Servo()
+    stream = SampleStream(servo.telemetry, servo.rate_hz, servo.now_ns)
+    assert not stream.listens
+    recorder = Recorder("liquid-study samples", 250)
+    assert stream.listens
+    servo.telemetry.batches.extend((samples_of(17), samples_of(232, first=17), samples_of(1, first=249)))
+    found = recorder.found()
+    stream.close()
+    assert not stream.listens
+    values, stamps_s = zip(*found["samples"], strict=True)
+    np.testing.assert_array_equal(np.array(values, np.float32), channels_of(samples_of(250)))
+    offset_s = pylsl.local_clock() - 1e-9 * time.monotonic_ns()
+    np.testing.assert_allclose(np.array(stamps_s), 1e-9 * samples_of(250)["time_ns"] + offset_s, atol=1e-3)
+    assert np.diff(stamps_s) == pytest.approx(1e-3, abs=1e-6)
+    assert found["rate"] == 1000.0
+    assert (stream.sent, stream.lost) == (250, "")
+    for label, unit in (("position_x", "m"), ("velocity_z", "m/s"), ("force_y", "N")):
+        assert f"<label>{label}</label>\n\t\t\t\t<unit>{unit}</unit>" in found["xml"]
+    assert "<label>limiters</label>" in found["xml"]
+
+
+@slow
+def test_a_recorder_gets_markers_with_the_times_of_their_events() -> None:
+    thread = SinkThread(open_sink("lsl", time.monotonic_ns))
+    assert thread.sink.listens is False
+    recorder = Recorder("liquid-study markers", 3)
+    assert thread.sink.listens is True
+    given = [marker(trial, time_s=START_NS * 1e-9 + trial) for trial in (1, 2, 3)]
+    for one in given:
+        thread.mark(one)
+    found = recorder.found()
+    thread.close(5)
+    assert thread.lost == ""
+    offset_s = pylsl.local_clock() - 1e-9 * time.monotonic_ns()
+    for (texts, stamp_s), one in zip(found["samples"], given, strict=True):
+        assert texts == [one.text]
+        assert stamp_s == pytest.approx(1e-9 * one.time_ns + offset_s, abs=1e-3)
+    assert found["rate"] == 0.0
+    assert "<trial_started>10</trial_started>" in found["xml"]
+
+
+@slow
+def test_samples_that_were_overwritten_are_said() -> None:
+    servo = Servo()
+    stream = SampleStream(servo.telemetry, servo.rate_hz, servo.now_ns)
+    servo.telemetry.dropped = 12
+    servo.telemetry.batches.append(samples_of(5))
+    stream.close()
+    assert stream.lost == "12 samples were not sent in time: this computer is too busy"
+    assert stream.sent == 5
+
+
+@slow
+@pytest.mark.parametrize(
+    ("choice", "blinding", "streams", "withheld"),
+    [
+        ("off", "single", False, False),
+        ("single-blind", "single", True, False),
+        ("single-blind", "double", False, True),
+        ("always", "double", True, False),
+    ],
+)
+def test_samples_are_off_in_double_blind_studies_unless_they_are_asked_for(
+    choice: Any, blinding: str, streams: bool, withheld: bool
+) -> None:
+    outlets = Outlets((), choice, Servo(), blinding)
+    shown = [(one.title, one.listens, one.withheld, one.shows_force) for one in outlets.statuses()]
+    described = outlets.described
+    outlets.close()
+    assert (list(described) == ["LSL samples"]) == streams
+    if streams or withheld:
+        assert shown == [("LSL samples", None if withheld else False, withheld, streams and blinding == "double")]
+    else:
+        assert shown == []
+
+
+@slow
+def test_outlets_that_fail_are_named_and_the_others_go_on() -> None:
+    pytest.importorskip("serial", reason="pyserial is not installed")
+    outlets = Outlets(("lsl", "serial:/nowhere/ttyUSB7", "usb:1"), "off", Servo(), "double")
+    lost = outlets.lost
+    assert set(lost) == {"Serial port", "Triggers"}
+    assert lost["Serial port"].startswith("serial:/nowhere/ttyUSB7 cannot be opened")
+    assert [one.title for one in outlets.statuses() if not one.lost] == ["LSL markers"]
+    assert outlets.described["Serial port"] == {"failed": lost["Serial port"]}
+    recorder = Recorder("liquid-study markers", 1)
+    outlets.mark(marker())
+    assert recorder.found()["samples"][0][0] == [marker().text]
+    outlets.close()
+    assert not [one for one in threading.enumerate() if one.name.startswith("outlet")]
