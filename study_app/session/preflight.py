@@ -5,7 +5,7 @@ A failure refuses the session; a warning is something that would make trials inv
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, UNKNOWN, Dynamics
 from study_app.haptics.model.limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
+from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.checks.pace import beyond_slope_limit, highest_damping
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import expected_duration_s
@@ -55,7 +56,7 @@ class Facts:
     ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
     delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
     the force that passivity controller and slew limit are expected to withhold in the fastest stroke of a task, by
-    liquid; None where it was not computed.
+    liquid; None where it was not computed. ``outlets`` are the streams and ports to other programs.
     """
 
     device: str
@@ -74,6 +75,7 @@ class Facts:
     dynamics: Dynamics = UNKNOWN
     delay_ticks: int = BELIEVED_TICKS
     withheld: Mapping[str, float] | None = None
+    outlets: tuple[OutletStatus, ...] = ()
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
 
@@ -117,6 +119,7 @@ def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
         _space(facts, protocol),
         _blinding(facts, protocol),
     ]
+    found += _outlets(facts)
     return (*found, *_cost(facts, protocol), *_withheld(facts, protocol), *_balance(facts, protocol))
 
 
@@ -247,6 +250,24 @@ def _blinding(facts: Facts, protocol: Protocol) -> Check:
     if facts.key_hash is None:
         return Check("Blinding", "ok", blind, "the key is drawn and sealed when the first session begins")
     return Check("Blinding", "ok", blind, f"the key is sealed; its hash begins with {facts.key_hash[:8]}")
+
+
+def _outlets(facts: Facts) -> Iterator[Check]:
+    """Say of each outlet who listens, why it does not work, or why a double-blind study has none."""
+    for one in facts.outlets:
+        if one.withheld:
+            yield Check(one.title, "ok", "off", "in a double-blind study: whoever sees the force can tell the liquid")
+        elif one.lost:
+            yield Check(one.title, "warning", "not available", one.lost, "The session can run without it.")
+        elif one.listens is False:
+            advice = "Start the program that records it, such as LabRecorder, and select this stream."
+            yield Check(one.title, "warning", "no listener", "no program receives the stream", advice)
+        elif one.shows_force:
+            advice = "A viewer of the force can tell the liquid: show the stream to no one."
+            yield Check(one.title, "warning", "listener", "the study is double-blind", advice)
+        else:
+            about = "open" if one.listens is None else "a program receives the stream"
+            yield Check(one.title, "ok", "ready" if one.listens is None else "listener", about)
 
 
 def _cost(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:

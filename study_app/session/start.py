@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from study_app.devices.registry import check_options, descriptor_of
 from study_app.devices.rig import Rig
 from study_app.errors import SessionError
+from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.model import Protocol
 from study_app.session.masking import Masking
 from study_app.session.preflight import Facts, Screen
@@ -24,6 +25,10 @@ from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.participant_ids import check_participant, check_unused
 from study_app.store.sessions.reopen import reopen
 from study_app.store.tables.study_description import check_study
+from study_app.store.workstation import MachineSettings
+
+if TYPE_CHECKING:
+    from study_app.haptics.runtime.servo import Servo
 
 MEASURED_S = 2.0  # so long the servo is looked at before a session
 PLAYED_MEASURED_S = 0.5  # and before one that is played from the designer
@@ -31,15 +36,20 @@ PLAYED_MEASURED_S = 0.5  # and before one that is played from the designer
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """Device and servo at rest, and what was measured of them; ``masking`` of its motors, where that was asked."""
+    """Device and servo at rest, and what was measured of them; ``masking`` of its motors, where that was asked.
+
+    ``outlets`` are open already, so that programs that record them can be connected before the session.
+    """
 
     rig: Rig
     facts: Facts
     masking: Masking | None = None
+    outlets: Outlets | None = None
 
     def facts_with(self, refresh_hz: float, scaling: float) -> Facts:
-        """Return the facts with those of the participant's screen: its refresh rate and the scaling of its pixels."""
-        return replace(self.facts, screen=Screen(refresh_hz=refresh_hz, scaling=scaling))
+        """Return the facts with those of the outlets and of the screen: its refresh rate and scaling of its pixels."""
+        statuses = () if self.outlets is None else self.outlets.statuses()
+        return replace(self.facts, screen=Screen(refresh_hz=refresh_hz, scaling=scaling), outlets=statuses)
 
 
 def check(chosen: NewSession, study: Protocol) -> None:
@@ -77,6 +87,13 @@ def measured(rig: Rig, chosen: NewSession, *, sleep: Callable[[float], object] =
     )
 
 
+def open_outlets(machine: MachineSettings, servo: Servo, blinding: str) -> Outlets | None:
+    """Open what this machine sends to other programs; None where it sends nothing."""
+    if not machine.marker_addresses and machine.lsl_samples == "off":
+        return None
+    return Outlets(machine.marker_addresses, machine.lsl_samples, servo, blinding)
+
+
 def open_store(
     chosen: NewSession,
     protocol: Protocol,
@@ -84,10 +101,12 @@ def open_store(
     rig: Rig,
     screens: dict[str, Any],
     masking: Masking | None = None,
+    outlets: Outlets | None = None,
 ) -> SessionStore:
-    """Claim a new session on the disk, or open the one that goes on."""
+    """Claim a new session on the disk, or open the one that goes on; ``outlets`` get the markers of its events."""
+    sent = None if outlets is None else outlets.described
     if chosen.resumes is not None:
-        return reopen(
+        store = reopen(
             chosen.resumes,
             protocol,
             source,
@@ -95,23 +114,29 @@ def open_store(
             device=with_bench(rig.described),
             screens=screens,
             motors_masked=None if masking is None else masking.entry,
+            outlets=sent,
             now_ns=rig.servo.now_ns,
         )
-    start = SessionStart(
-        chosen.participant,
-        session=chosen.session,
-        seed=chosen.seed,
-        operator=chosen.operator,
-        language=chosen.language,
-        device=with_bench(rig.described),
-        screens=screens,
-        simulated=descriptor_of(chosen.device).simulated,
-        pilot=chosen.pilot,
-        recordings=chosen.recordings,
-        motors_masked=None if masking is None else masking.entry,
-        row_of=chosen.row_of,
-    )
-    return begin(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))
+    else:
+        start = SessionStart(
+            chosen.participant,
+            session=chosen.session,
+            seed=chosen.seed,
+            operator=chosen.operator,
+            language=chosen.language,
+            device=with_bench(rig.described),
+            screens=screens,
+            simulated=descriptor_of(chosen.device).simulated,
+            pilot=chosen.pilot,
+            recordings=chosen.recordings,
+            motors_masked=None if masking is None else masking.entry,
+            outlets=sent,
+            row_of=chosen.row_of,
+        )
+        store = begin(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))
+    if outlets is not None:
+        store.attach(outlets)
+    return store
 
 
 def with_bench(described: Mapping[str, Any]) -> dict[str, Any]:

@@ -65,7 +65,8 @@ class Progress:
     those reached in the latest trial; it began at ``trial_since_s``, None while a page is shown or after a gap, and its
     task took ``trial_lasted_s``, None until it ended. ``answered`` counts the responses to each trial and form, of a
     trial's last attempt; ``broken`` has for each trial done the limits that it broke: column, value and limit. ``lost``
-    says why a trial's recording could not be kept, ``lacking`` how many samples it lacks.
+    says why a trial's recording could not be kept, ``lacking`` how many samples it lacks; ``outlets_lost`` why an
+    outlet to other programs failed.
 
     ``of_intervals`` is the latest trial if it is one of intervals; ``trial_answers`` are the answers to all of them,
     ``repeated`` says of each why it was presented again, ``undelivered`` names the limits that its intervals broke, in
@@ -98,6 +99,7 @@ class Progress:
     broken: dict[int, tuple[Broken, ...]] = field(default_factory=dict)
     lost: dict[int, str] = field(default_factory=dict)
     lacking: dict[int, int] = field(default_factory=dict)
+    outlets_lost: dict[str, str] = field(default_factory=dict)
     notes: list[NoteLine] = field(default_factory=list)
     repeats: int = 0
     paused: bool = False
@@ -156,6 +158,8 @@ class Progress:
                 self.lacking[line["trial"]] = line["samples_unrecorded"]
             case "recording_lost":
                 self.lost[line["trial"]] = line["reason"]
+            case "outlet_lost":
+                self.outlets_lost[line["outlet"]] = line["reason"]
             case "note":
                 self.notes.append(NoteLine(at_s - self.away_s, line["kind"], line["text"]))
             case "repeat":

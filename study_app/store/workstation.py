@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from study_app.devices.names import DEFAULT_DEVICE, NAME_PATTERN
 from study_app.errors import StoreError
+from study_app.outlets.session_outlets import SampleChoice
 from study_app.protocol.source.problems import faults_of
 from study_app.store.atomic import cannot_read, cannot_write, write_file
 from study_app.user_folder import FOLDER_VARIABLE, settings_file
@@ -34,6 +35,7 @@ REMEMBERED_OPTIONS: Final = ("firmware",)
 """Options of devices that are settings of this computer, by name; others are asked for before each session."""
 OFFSET_MS: Final = (0.0, 500.0)
 SPREAD_MS: Final = (0.0, 200.0)
+TRIGGERS_PATTERN: Final = r"^([a-z]+:[^\x00-\x1f]+)?$"
 Place = Annotated[str, Field(pattern=r"^[^\x00]+$")]
 OfAxes = Annotated[tuple[float, float, float], Field(strict=False)]
 How = Literal["photodiode", "high-speed camera", "data sheet"]
@@ -89,7 +91,8 @@ class MachineSettings(_Strict):
     of a device's program, ``workspace`` the folder of protocols and results (None: not chosen: `study_app.workspace`);
     ``recent`` are the protocol files outside it that were opened last, newest first; ``operator`` are the initials that
     were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at; ``benches`` are the
-    latest measurements of devices. Whether ``device`` is known is for those to say who open it.
+    latest measurements of devices. ``lsl_markers``, ``lsl_samples`` and ``triggers`` (the address of a port, "": none)
+    are what sessions send to other programs. Whether ``device`` is known is for those to say who open it.
     """
 
     screen: str = ""
@@ -106,6 +109,14 @@ class MachineSettings(_Strict):
     photodiode: bool = True
     operator: Annotated[str, Field(max_length=40)] = ""
     benches: Annotated[tuple[DeviceBench, ...], Field(strict=False)] = ()
+    lsl_markers: bool = False
+    lsl_samples: SampleChoice = "off"
+    triggers: Annotated[str, Field(pattern=TRIGGERS_PATTERN)] = ""
+
+    @property
+    def marker_addresses(self) -> tuple[str, ...]:
+        """Where the markers of sessions go."""
+        return (*(("lsl",) if self.lsl_markers else ()), *((self.triggers,) if self.triggers else ()))
 
     @property
     def device_options(self) -> dict[str, Path]:

@@ -80,9 +80,9 @@ class OperatorView:
 
     ``elapsed_s`` is the time that was worked: not the gap before a session was resumed. ``main_trials`` has a pair for
     each part, of its main trials left behind and of all. ``trial`` is the number of the trial under way or answered.
-    ``waits`` says that the trouble is a disk that takes
-    nothing: the session goes on when it does again. ``beyond`` says which recordings were lost, then of each trial out
-    of limits which it broke, the newest first. ``may_reconnect`` says that the trouble is a device that can be
+    ``waits`` says that the trouble is a disk that takes nothing: the session goes on when it does again. ``beyond``
+    says which outlets and recordings were lost, then of each trial out of limits which it broke, the newest first.
+    ``may_reconnect`` says that the trouble is a device that can be
     connected again, ``reconnects`` that it is being so, ``reconnection`` how far that is, or why it failed. ``track``
     says how the track of the latest trial with a design is doing, without a level.
     """
@@ -181,13 +181,15 @@ def operator_view(
     forces: ForceFigures | None = None,
     lost: Mapping[int, str] | None = None,
     dropped: int = 0,
+    outlets_lost: Mapping[str, str] | None = None,
 ) -> OperatorView:
     """Return what the operator sees at ``now_s`` on the session's clock.
 
     ``trouble`` is what no journal could say; ``device_ready`` and ``faults`` (how many there were since the program
     was started) are the servo's own, whatever other trouble there is; ``forces`` are shown where a study is
     single-blind; ``lost`` says of trials why their recordings were lost, also where no journal tells it yet;
-    ``dropped`` counts the samples that the recording of the trial under way lacks by now.
+    ``dropped`` counts the samples that the recording of the trial under way lacks by now; ``outlets_lost`` says why
+    outlets to other programs failed.
     """
     trouble = progress.broke or trouble
     state = _state(progress, force_on=force_on, trouble=trouble)
@@ -226,6 +228,7 @@ def operator_view(
         trial=None if trial is None else trial.number,
         waits=waits,
         beyond=(
+            *(f"{title}: {reason}" for title, reason in {**progress.outlets_lost, **(outlets_lost or {})}.items()),
             *_lost(session, progress, {**progress.lost, **(lost or {})}),
             *_lacking(session, progress, {trial.number: dropped} if trial is not None and dropped else {}),
             *_beyond(session, progress),

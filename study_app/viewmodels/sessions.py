@@ -30,8 +30,8 @@ class SessionFacts:
 
     ``status`` is the table's, or "running" where a program has the session open. ``excluded`` is why the analysis
     excludes all of it, None where it does not; ``lost`` counts recordings that could not be stored, ``reconnected`` how
-    often the device failed and was connected again. ``version`` is the study's version that it was run with, "" where
-    its receipt does not say.
+    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed. ``version`` is the
+    study's version that it was run with, "" where its receipt does not say.
     """
 
     participant: str
@@ -48,6 +48,7 @@ class SessionFacts:
     excluded: str | None = None
     lost: int = 0
     reconnected: int = 0
+    outlets_lost: int = 0
     version: str = ""
 
     @property
@@ -95,7 +96,10 @@ def session_facts(
     """Return the rows of a study's participants as facts; ``listed`` is what is excluded from the analysis."""
     reasons = {(one.participant, one.session): one.reason for one in listed if one.trial is None}
     placed = [(row, session_in(study, row["participant"], int(row["session"]))) for row in rows]
-    counts = [journal.count_events(session.journal, "recording_lost", "device_reconnected") for _, session in placed]
+    counts = [
+        journal.count_events(session.journal, "recording_lost", "device_reconnected", "outlet_lost")
+        for _, session in placed
+    ]
     return [
         SessionFacts(
             participant=row["participant"],
@@ -112,9 +116,10 @@ def session_facts(
             excluded=reasons.get((row["participant"], int(row["session"]))),
             lost=lost,
             reconnected=reconnected,
+            outlets_lost=outlets_lost,
             version="" if (run := run_of(session.receipt)) is None else run.version,
         )
-        for (row, session), (lost, reconnected) in zip(placed, counts, strict=True)
+        for (row, session), (lost, reconnected, outlets_lost) in zip(placed, counts, strict=True)
     ]
 
 

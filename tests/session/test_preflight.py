@@ -15,6 +15,7 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import Timing
+from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.session import preflight_measurements
@@ -45,6 +46,25 @@ def verdicts(study: Protocol | None = None, **changed: Any) -> dict[str, str]:
 def test_where_all_is_well_nothing_is_said_but_so() -> None:
     assert set(verdicts().values()) == {"ok"}
     assert refused(checks(WELL, small.protocol())) == ""
+
+
+@pytest.mark.parametrize(
+    ("status", "verdict", "said"),
+    [
+        (OutletStatus("LSL markers", listens=True), "ok", "listener; a program receives the stream"),
+        (OutletStatus("LSL markers", listens=False), "warning", "no listener; no program receives the stream; Start"),
+        (OutletStatus("LSL samples", withheld=True), "ok", "off; in a double-blind study: whoever sees the force can"),
+        (OutletStatus("LSL samples", listens=True, shows_force=True), "warning", "listener; the study is double-blind"),
+        (OutletStatus("Serial port"), "ok", "ready; open"),
+        (OutletStatus("Serial port", lost="it is gone"), "warning", "not available; it is gone; The session can run"),
+    ],
+)
+def test_who_listens_is_said_and_nothing_of_it_refuses_a_session(status: OutletStatus, verdict: str, said: str) -> None:
+    found = checks(replace(WELL, outlets=(status,)), small.protocol())
+    (check,) = [one for one in found if one.name == status.title]
+    assert check.verdict == verdict
+    assert check.said.startswith(said)
+    assert refused(found) == ""
 
 
 @pytest.mark.parametrize(

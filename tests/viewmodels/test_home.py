@@ -197,10 +197,13 @@ def test_lost_recordings_and_a_reconnected_device_show_in_the_row(tmp_path):
     lost = {"trial": 1, "attempt": 1, "reason": "the disk is full"}
     device = {"device": "mouse", "described": {}}
     stop_at(tmp_path, "P001", 3, then=[("recording_lost", lost), ("device_reconnected", device)])
+    outlet = {"outlet": "Serial port", "reason": "it was unplugged"}
+    stop_at(tmp_path, "P003", 3, then=[("outlet_lost", outlet)])
     stop_at(tmp_path, "P002", 3, then=[("note", {"kind": "note", "text": '"event":"recording_lost",'})])
     rows = {row.participant: row for row in sessions(tmp_path, {})}
     assert validity_chip(rows["P001"])[2] == "Recording lost"
     assert incidents(rows["P001"]) == "1 recording lost, device reconnected"
+    assert incidents(rows["P003"]) == "1 outlet failed"
     assert ("lost", "Recording lost") in states_of(rows.values())
     assert [row for row in rows.values() if matching("", "lost")(row)] == [rows["P001"]]
     assert incidents(rows["P002"]) == ""

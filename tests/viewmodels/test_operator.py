@@ -126,6 +126,16 @@ def test_a_lost_recording_is_told_first_by_the_recorder_or_the_journal(told):
     assert len(told.view(lost={1: "No space left on device"}).beyond) == 2
 
 
+def test_a_failed_outlet_is_told_by_the_outlets_or_the_journal(told):
+    told.welcome()
+    told.start(1)
+    line = "Serial port: it was unplugged"
+    assert told.view(outlets_lost={"Serial port": "it was unplugged"}).beyond == (line,)
+    told.tell("outlet_lost", outlet="Serial port", reason="it was unplugged")
+    assert told.view().beyond == (line,)
+    assert told.view(outlets_lost={"Serial port": "it was unplugged"}).beyond == (line,)
+
+
 def test_a_paused_session_can_resume_but_not_repeat(told):
     told.welcome()
     told.start(1)

@@ -36,13 +36,14 @@ from study_app.protocol.wording.without_force import without_force
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.request import NewSession
 from study_app.session.resume import FIRST, resume_at
-from study_app.session.start import Ready, check, measured, open_store
+from study_app.session.start import Ready, check, measured, open_outlets, open_store
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.folders import StudyFolder
 
 if TYPE_CHECKING:
     from study_app.app.session.bridge import SessionBridge
     from study_app.app.session.preflight_controller import Preflight
+    from study_app.outlets.session_outlets import Outlets
     from study_app.store.sessions.open_session import SessionStore
 
 CANCELLED = 130
@@ -102,6 +103,7 @@ class LiveSession(QObject):
         self.bridge: SessionBridge | None = None
         self.note: OpeningWindow | None = None
         self.rig: Rig | None = None
+        self._outlets: Outlets | None = None
         self._store: SessionStore | None = None
         self._crash_trace: CrashTrace | None = None
         self._closed = False
@@ -156,15 +158,19 @@ class LiveSession(QObject):
     def _make_ready(self) -> None:
         """Compile, open, start and measure, in a thread of its own; whatever comes of it goes to ``_begin``."""
         rig: Rig | None = None
+        outlets: Outlets | None = None
         try:
             load_windows()
             study = self.chosen.read_protocol()
             check(self.chosen, study)
             settings = study_settings(study, self.chosen.tremor(), self.chosen.device_options)
             rig = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
-            made: object = Ready(rig, measured(rig, self.chosen, sleep=self._ending.wait))
+            outlets = None if self.chosen.played else open_outlets(self.settings, rig.servo, study.study.blinding)
+            made: object = Ready(rig, measured(rig, self.chosen, sleep=self._ending.wait), outlets=outlets)
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
+            if outlets is not None:
+                outlets.close()
             if rig is not None:
                 with suppress(StudyError):  # what came first says why
                     rig.stop()
@@ -174,7 +180,7 @@ class LiveSession(QObject):
         """Ask the operator, or claim the session on the disk and open the two windows at once."""
         self._working = False
         if isinstance(made, Ready):
-            self.rig = made.rig
+            self.rig, self._outlets = made.rig, made.outlets
         if self._closed:
             self._let_go()
             self.deleteLater()
@@ -223,7 +229,7 @@ class LiveSession(QObject):
         found = checks(made.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()), protocol)
         self._pass_checks(found)
         screens = described(self.settings, shown_on, operated_on)
-        self._store = open_store(chosen, protocol, source, rig, screens, made.masking)
+        self._store = open_store(chosen, protocol, source, rig, screens, made.masking, made.outlets)
         self._crash_trace = CrashTrace(self._store.folder.crash)
         self._store.append("preflight", checks=[one.entry for one in found])
         protocol = self._store.as_recorded(protocol)
@@ -345,6 +351,7 @@ class LiveSession(QObject):
         if reconnection is not None and not reconnection.wait(self.patience_s):  # it gives up now that this is closed
             rig = None  # its thread has it, at zero force, until the program ends
         store, self._store = self._store, None
+        outlets, self._outlets = self._outlets, None
         crash_trace, self._crash_trace = self._crash_trace, None
         try:
             if rig is not None:
@@ -352,5 +359,9 @@ class LiveSession(QObject):
         finally:
             if crash_trace is not None:
                 crash_trace.close()
-            if store is not None:
-                store.close()
+            try:
+                if store is not None:
+                    store.close()
+            finally:
+                if outlets is not None:
+                    outlets.close()

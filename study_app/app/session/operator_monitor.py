@@ -89,6 +89,7 @@ class OperatorMonitor:
             forces=None if self.forces is None else self.forces.figures(),
             lost={one.trial: one.reason for one in parts.recorder.lost} if parts.recorder is not None else {},
             dropped=parts.recorder.dropped if parts.recorder is not None else 0,
+            outlets_lost=None if parts.outlets is None else parts.outlets.lost,
         )
 
     def _count_faults(self) -> None:

@@ -13,6 +13,7 @@ from study_app.viewmodels.operator import Session
 
 if TYPE_CHECKING:
     from study_app.haptics.runtime.servo import Servo
+    from study_app.outlets.session_outlets import Outlets
     from study_app.session.simulated.observers import Hand
     from study_app.store.recorder import Recorder
 
@@ -26,7 +27,8 @@ class Parts:
     is where a resumed session goes on. ``exclude`` leaves a trial, or with None the session, out of the analysis for a
     reason. ``aim_m`` gives where hand or pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse
     on, None where the device is not the mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
-    ``reconnect`` opens a device that failed again and starts the servo at zero force; it may take minutes.
+    ``outlets`` send its events to other programs. ``reconnect`` opens a device that failed again and starts the servo
+    at zero force; it may take minutes.
     """
 
     session: Session
@@ -37,6 +39,7 @@ class Parts:
     clock: Callable[[], float]
     aim_m: Callable[[], tuple[float, float, float]]
     recorder: Recorder | None = None
+    outlets: Outlets | None = None
     start: Start = FIRST
     secret: bytes = field(default=b"", repr=False)
     exclude: Callable[[int | None, str], None] | None = None

@@ -91,6 +91,7 @@ def open_windows(
         journal=journal,
         clock=clock,
         recorder=store.recorder,
+        outlets=store.outlets,
         start=start,
         exclude=_excluder(chosen),
         reconnect=rig.reconnect,

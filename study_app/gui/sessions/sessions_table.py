@@ -87,9 +87,11 @@ class SessionsModel(QAbstractTableModel):
         return None
 
     def _below(self, facts: SessionFacts, name: str) -> str:
-        """Return the small words below a cell's: what kind of session it is, and what happened to its device."""
+        """Return the small words below a cell's: its kind of session, and what happened to its device or outlets."""
         if name == "status" and facts.reconnected:
             return "device reconnected"
+        if name == "status" and facts.outlets_lost:
+            return "outlet failed"
         return facts.kind if name == "study" else ""
 
     def _words(self, facts: SessionFacts, name: str) -> str:

@@ -95,6 +95,7 @@ EVENTS: tuple[Event, ...] = (
         ),
     ),
     Event("recording_lost", "The trial's recording could not be stored.", (*_WHICH, "reason")),
+    Event("outlet_lost", "Markers or samples no longer reach other programs by this outlet.", ("outlet", "reason")),
     Event("form_shown", "A questionnaire was shown on its own.", ("form",)),
     Event("item_shown", "A question was shown, of a trial or a form.", ("item",), _PAGE),
     Event("choice", "An answer was chosen; the last one counts.", ("item", "value"), _PAGE),
@@ -215,7 +216,7 @@ _KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for co
     name: (kind, name in _MAY_BE_NULL)
     for kind, names in {
         "text": "language operator key_hash protocol_hash version device page block phase code item "
-        "outcome form group sealed arrangement sha256 frames_sha256 reason by kind text what status previous",
+        "outcome form group sealed arrangement sha256 frames_sha256 reason by kind text what status previous outlet",
         "study's name": "study",
         "participant's id": "participant row_of",
         "recording's name": "recording recording_frames",

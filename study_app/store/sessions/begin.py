@@ -63,6 +63,8 @@ class SessionStart:
         Whether the trials' samples and frames are kept, through the ``recorder`` of the store.
     motors_masked : mapping, optional
         How the motors of the device are masked, for the receipt; None where that was not asked.
+    outlets : mapping, optional
+        What the session sends to other programs, for the receipt; None where it sends nothing.
     row_of : str, optional
         The id whose rows of squares the session takes; None: the participant's own.
     """
@@ -79,6 +81,7 @@ class SessionStart:
     pilot: bool = False
     recordings: bool = False
     motors_masked: Mapping[str, Any] | None = None
+    outlets: Mapping[str, Any] | None = None
     row_of: str | None = None
 
 
@@ -179,7 +182,7 @@ def first_words(
         "resumed": [],
         **facts,
         "generator": receipt.GENERATOR,
-        **surroundings(start.device, start.screens, clock, start.motors_masked),
+        **surroundings(start.device, start.screens, clock, start.motors_masked, start.outlets),
         "protocol": receipt.without_conditions(protocol),
     }
     return started, first_receipt
@@ -212,15 +215,16 @@ def surroundings(
     screens: Mapping[str, Any],
     clock: SessionClock,
     motors_masked: Mapping[str, Any] | None = None,
+    outlets: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the receipt's part about what the session runs with, from its beginning or since it was resumed."""
-    asked = {} if motors_masked is None else {"motors_masked": dict(motors_masked)}
+    asked = {"motors_masked": motors_masked, "outlets": outlets}
     return {
         "versions": receipt.versions(),
         "device": dict(device),
         "screens": dict(screens),
         "clock": {"origin_ns": clock.origin_ns, "origin_at": clock.at(0)},
-        **asked,
+        **{name: dict(value) for name, value in asked.items() if value is not None},
     }
 
 

@@ -13,6 +13,8 @@ from types import TracebackType
 from typing import Any
 
 from study_app.errors import StoreError
+from study_app.outlets.marker import Marker, marker_of
+from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.blinded.blinding import Key
@@ -28,6 +30,8 @@ from study_app.store.tables import csv_files, session_tables
 from study_app.store.tables.growing_tables import GrowingTables
 from study_app.store.tables.participants import write_participants
 from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
+
+BEGINNINGS = ("session_started", "session_resumed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +77,9 @@ class SessionStore:
         self._tables = GrowingTables(lambda name: place.folder.table(place.study, name))
         self._kept: list[Kept] = []
         self._over = False
+        self.outlets: Outlets | None = None
+        self._marked: Marker | None = None  # of the line that the disk did not accept
+        self._outlets_lost: set[str] = set()  # that are journalled
 
     @property
     def folder(self) -> SessionFolder:
@@ -94,6 +101,12 @@ class SessionStore:
         """
         return as_recorded(protocol, self._receipt, self.key)
 
+    def attach(self, outlets: Outlets) -> None:
+        """Send markers of the session's events from now on, first of its beginning or resumption."""
+        self.outlets = outlets
+        began = next(line for line in reversed(self._lines) if line["event"] in BEGINNINGS)
+        self._mark(began["event"], began["t_s"], began)
+
     def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
         """Put an event into the journal; with ``waits`` it is on the disk when this returns, else soon after.
 
@@ -106,7 +119,19 @@ class SessionStore:
         """
         if self._lines:
             fields = sealed(self._lines[0], event, fields, self.key)
-        self._lines.append(self.journal.append(event, t_s=t_s, waits=waits, **fields))
+        moment_s = self.clock.seconds() if t_s is None else t_s
+        self._mark(event, moment_s, fields)
+        self._lines.append(self.journal.append(event, t_s=moment_s, waits=waits, **fields))
+        self._marked = None
+
+    def _mark(self, event: str, t_s: float, fields: Mapping[str, Any]) -> None:
+        """Send the marker of an event, before the disk is waited for; once, however often its line is tried again."""
+        if self.outlets is None:
+            return
+        marker = marker_of(event, t_s, self.clock.origin_ns, fields)
+        if marker is not None and marker != self._marked:
+            self.outlets.mark(marker)
+            self._marked = marker
 
     def check_flushed(self) -> None:
         """Raise if lines that were not waited for could not be flushed, and still are not on the disk.
@@ -205,13 +230,17 @@ class SessionStore:
         self.fingerprint = found
 
     def _keep_recordings(self) -> None:
-        """Journal what became of recordings: which files they are, or why there are none."""
+        """Journal what became of recordings: which files they are, or why there are none; and which outlets failed."""
         if self.recorder is not None:
             self._kept += self.recorder.kept()
         while self._kept:
             event, fields = event_of(self._kept[0])
             self.append(event, waits=False, **fields)
             del self._kept[0]
+        for outlet, reason in ({} if self.outlets is None else self.outlets.lost).items():
+            if outlet not in self._outlets_lost:
+                self.append("outlet_lost", waits=False, outlet=outlet, reason=reason)
+                self._outlets_lost.add(outlet)
 
     def __enter__(self) -> SessionStore:
         return self

@@ -52,6 +52,7 @@ def reopen(
     device: Mapping[str, Any],
     screens: Mapping[str, Any],
     motors_masked: Mapping[str, Any] | None = None,
+    outlets: Mapping[str, Any] | None = None,
     now_ns: Callable[[], int] = time.monotonic_ns,
     now: datetime | None = None,
 ) -> SessionStore:
@@ -77,6 +78,8 @@ def reopen(
         Description for the receipt.
     motors_masked : mapping, optional
         How the motors of the device are masked, for the receipt; None where that was not asked.
+    outlets : mapping, optional
+        What the session sends to other programs, for the receipt; None where it sends nothing.
     now_ns : callable
         The monotonic clock [ns] to go on with: the servo's.
     now : datetime, optional
@@ -117,7 +120,9 @@ def reopen(
         _sweep(folder)
         for event, fields in _recordings_found(folder, contents.lines) if left.start.get("recordings") else ():
             store.append(event, **fields)
-        store.note_resumed({"at": clock.at(at_s), **gap, **surroundings(device, screens, clock, motors_masked)})
+        store.note_resumed(
+            {"at": clock.at(at_s), **gap, **surroundings(device, screens, clock, motors_masked, outlets)}
+        )
         store.write_tables()
         write_description(study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions))
         write_participants(study_folder, left.place.study)

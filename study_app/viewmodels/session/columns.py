@@ -53,10 +53,11 @@ def validity_chip(facts: SessionFacts) -> Chipped:
 
 
 def incidents(facts: SessionFacts) -> str:
-    """Return what happened to the device and the recordings: "2 recordings lost, device reconnected", or nothing."""
+    """Return what happened to device, recordings and outlets: "2 recordings lost, device reconnected", or nothing."""
     lost = f"{counted(facts.lost, 'recording')} lost" if facts.lost else ""
     times = "" if facts.reconnected == 1 else f" {facts.reconnected} times"
-    return ", ".join(filter(None, (lost, f"device reconnected{times}" if facts.reconnected else "")))
+    outlets = f"{counted(facts.outlets_lost, 'outlet')} failed" if facts.outlets_lost else ""
+    return ", ".join(filter(None, (lost, f"device reconnected{times}" if facts.reconnected else "", outlets)))
 
 
 def answers_words(facts: SessionFacts) -> str:

@@ -29,6 +29,7 @@ from study_app.viewmodels.operator import Session, operator_view
 from study_app.viewmodels.servo_health import Vitals
 from study_app.viewmodels.session.stages import stages
 from tests.compiled import needs_servo
+from tests.outlets.collector import collecting
 from tests.protocol.trials.studies import FIVE_POINTS, SHORT, text_of
 from tests.session.sealed.numbers_written import Trials, every_number, told
 
@@ -169,10 +170,13 @@ class BlindSetting:
 
 
 def run(protocol: Path, folder: Path, secret: int) -> Path:
-    """Rehearse a session under a key drawn from ``secret``."""
+    """Rehearse a session under a key drawn from ``secret``; put its markers where its files are."""
     folder.mkdir(parents=True)
     open_or_draw_key(folder, load(str(protocol)), stream(secret, "blinding").random)
-    return rehearse(protocol, participants=1, seed=4, results=folder, recordings=False)
+    with collecting() as markers:
+        rehearse(protocol, participants=1, seed=4, results=folder, recordings=False)
+    (folder / "markers.jsonl").write_text("".join(f"{one.text}\n" for one in markers.markers), encoding="utf-8")
+    return folder
 
 
 @pytest.fixture(scope="module")

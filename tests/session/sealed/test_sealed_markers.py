@@ -1,0 +1,82 @@
+"""The marker stream of a session tells no condition, liquid, parameter or delay."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from study_app.protocol.load import load, source_bytes
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.blinded.blinding import read_key
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.verification.leaks import telltales
+from tests.compiled import needs_servo
+from tests.outlets.collector import Collector, collecting
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+COUNTS = ("t_s", "trial", "attempt", "target", "trigger")
+NAMED = (
+    (r'\["thin", "thick"\]', '["feel_quagmire", "feel_mildew"]'),
+    (r"conditions\.thin\b", "conditions.feel_quagmire"),
+    (r"conditions\.thick\b", "conditions.feel_mildew"),
+    (r"^delay_ms = 200\b", "delay_ms = 137.31"),
+    (r"^min_s = [\d.]+", "min_s = 2"),
+    (r"^count = [\d.]+", "count = 2"),
+)
+
+
+@pytest.fixture(scope="module")
+def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    text = source_bytes("demo").decode()
+    for pattern, word in NAMED:
+        text, found = re.subn(pattern, word, text, flags=re.MULTILINE)
+        assert found, pattern
+    path = tmp_path_factory.mktemp("named") / "named.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def rehearsed(protocol: Path) -> tuple[Path, Collector]:
+    with collecting() as collector:
+        return rehearse(protocol, participants=1, seed=5, results=protocol.parent / "results"), collector
+
+
+def words_found(collector: Collector, protocol: Path) -> list[str]:
+    """Return the words of the protocol's conditions in the markers, but for moments and counts."""
+    found = telltales(load(str(protocol)))
+    said = [json.loads(marker.text) for marker in collector.markers]
+    return [word for one in said for word in found.in_text(json.dumps(one | dict.fromkeys(COUNTS)))]
+
+
+def test_markers_are_the_journals_events_with_their_codes(rehearsed: tuple[Path, Collector]) -> None:
+    folder, collector = rehearsed
+    (session,) = StudyFolder(folder).sessions()
+    lines = journal.read(session.journal)
+    marked = [line for line in lines if line["event"] not in {"recorded", "preflight"}]
+    assert collector.events == [line["event"] for line in marked]
+    assert {"trial_started", "trial_ended", "choice", "responses", "target_reached"} < set(collector.events)
+    for marker, line in zip(collector.markers, marked, strict=True):
+        said = json.loads(marker.text)
+        assert said["t_s"] == line["t_s"]
+        assert said.get("code") == line.get("code")
+    assert not any("sealed" in marker.text or "value" in marker.text for marker in collector.markers)
+
+
+def test_no_marker_tells_a_condition(rehearsed: tuple[Path, Collector], protocol: Path) -> None:
+    assert words_found(rehearsed[1], protocol) == []
+
+
+def test_a_planted_condition_is_found(rehearsed: tuple[Path, Collector], protocol: Path) -> None:
+    folder, collector = rehearsed
+    codes = read_key(folder).codes["liquids"]
+    planted = Collector()
+    for marker in collector.markers:
+        said = tuple((name, codes.get(value, value) if name == "code" else value) for name, value in marker.said)
+        planted.mark(type(marker)(marker.event, marker.time_ns, marker.t_s, said))
+    assert set(words_found(planted, protocol)) >= {"feel_quagmire", "feel_mildew"}
