@@ -31,6 +31,10 @@ CALLED: Final = {
     "workspace": "workspace",
     "theme": "theme",
     "sound": "sound",
+    "photodiode": "photodiode square",
+    "lsl_markers": "LSL markers",
+    "lsl_samples": "LSL samples",
+    "triggers": "trigger port",
 }
 
 

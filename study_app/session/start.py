@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from study_app.devices.registry import check_options, descriptor_of
 from study_app.devices.rig import Rig
 from study_app.errors import SessionError
-from study_app.outlets.session_outlets import Outlets
+from study_app.outlets.session_outlets import Outlets, OutletStatus
 from study_app.protocol.model import Protocol
 from study_app.session.masking import Masking
 from study_app.session.preflight import Facts, Screen
@@ -48,8 +48,13 @@ class Ready:
 
     def facts_with(self, refresh_hz: float, scaling: float) -> Facts:
         """Return the facts with those of the outlets and of the screen: its refresh rate and scaling of its pixels."""
-        statuses = () if self.outlets is None else self.outlets.statuses()
-        return replace(self.facts, screen=Screen(refresh_hz=refresh_hz, scaling=scaling), outlets=statuses)
+        screen = Screen(refresh_hz=refresh_hz, scaling=scaling)
+        return replace(self.facts, screen=screen, outlets=self.outlet_statuses)
+
+    @property
+    def outlet_statuses(self) -> tuple[OutletStatus, ...]:
+        """How the outlets are at present."""
+        return () if self.outlets is None else self.outlets.statuses()
 
 
 def check(chosen: NewSession, study: Protocol) -> None:

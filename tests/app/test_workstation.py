@@ -52,6 +52,23 @@ def test_what_is_set_is_kept_at_once_and_taken_back(desk, qtbot):
     assert desk.undo_called == ""
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "called"),
+    [
+        ("photodiode", False, "photodiode square"),
+        ("lsl_markers", True, "LSL markers"),
+        ("lsl_samples", "always", "LSL samples"),
+        ("triggers", "serial:COM3", "trigger port"),
+    ],
+)
+def test_every_setting_of_the_page_can_be_undone(desk, name, value, called):
+    desk.change({name: value})
+    assert desk.undo_called == called
+    assert getattr(load(), name) == value
+    desk.undo()
+    assert load() == DEFAULTS
+
+
 def test_what_is_set_already_is_no_change(desk, qtbot):
     with qtbot.assertNotEmitted(desk.changed):
         desk.change({"sound": False})

@@ -124,6 +124,7 @@ class Preflight(QObject):
         self.window.cancelled.connect(self.cancelled)
         self._measured.connect(self._take)
         self._appraised = False
+        self._outlets_shown = ready.outlet_statuses
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._look)
         self._timer.start(LOOK_MS)
@@ -156,6 +157,7 @@ class Preflight(QObject):
 
     def _show(self) -> None:
         facts = self._facts
+        self._outlets_shown = facts.outlets
         self.window.show_view(
             preflight_view(
                 self._protocol,
@@ -178,6 +180,8 @@ class Preflight(QObject):
             self._timer.stop()
             self.failed.emit(error)
             return
+        if self._ready.outlet_statuses != self._outlets_shown:  # a recording program was connected
+            self._show()
         if self._appraised:
             return
         self._appraised = self.appraisal.over

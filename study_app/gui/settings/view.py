@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QScrollArea, QVBoxLayout,
 
 from study_app.gui.display.screens import ScreenShown, screens_shown
 from study_app.gui.settings.display_test import DisplayTest
+from study_app.gui.settings.outlets_card import OutletsCard
 from study_app.gui.settings.screen_numbers import ScreenNumber, identify
 from study_app.gui.settings.setting_cards import OffsetCard, ScreensCard, SeenCard, SessionsCard, WindowsCard
 from study_app.gui.theme.theme import font
@@ -42,7 +43,7 @@ class MachinePlace(Place):
         self.numbers: list[ScreenNumber] = []
         self.test: DisplayTest | None = None
         self.screens, self.seen, self.offset = ScreensCard(), SeenCard(), OffsetCard()
-        self.sessions, self.windows = SessionsCard(), WindowsCard()
+        self.sessions, self.windows, self.outlets = SessionsCard(), WindowsCard(), OutletsCard()
         self.undo = ActionButton("undo", "Undo")
         self.kept_in = Elided("label", "text2")
         self.kept_in.setFont(font("label", weight=400))
@@ -62,7 +63,7 @@ class MachinePlace(Place):
         head.addWidget(self.undo)
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(18)
-        for cards in ((self.screens, self.seen), (self.offset, self.sessions, self.windows)):
+        for cards in ((self.screens, self.seen, self.outlets), (self.offset, self.sessions, self.windows)):
             column = QVBoxLayout()
             column.setSpacing(18)
             for card in cards:
@@ -89,7 +90,7 @@ class MachinePlace(Place):
         row.addWidget(self._area)
 
     def _connect(self) -> None:
-        for card in (self.seen, self.sessions, self.windows, self.offset):
+        for card in (self.seen, self.sessions, self.windows, self.offset, self.outlets):
             card.changed.connect(lambda name, value: self.changed.emit({name: value}))
         self.screens.chosen.connect(
             lambda screen: self.changed.emit({"screen": screen.name, "screen_number": screen.number})
@@ -127,6 +128,7 @@ class MachinePlace(Place):
         self.undo.show_action("undo", f"Undo {undo}" if undo else "Undo")
         self.sessions.show_settings(settings, folder)
         self.windows.show_settings(settings)
+        self.outlets.show_settings(settings)
         self.offset.patch.setChecked(settings.photodiode)
         self.kept_in.show_text(f"Saved in {kept_in}")
         self._show()

@@ -194,3 +194,34 @@ def test_every_field_has_a_name_for_those_who_cannot_see_it(place):
         place.offset.form.how, place.sessions.device, place.windows.theme_choice, *place.screens.radios,
     )  # fmt: skip
     assert all(field.accessibleName() for field in fields)
+
+
+def test_markers_and_samples_are_switched(place, qtbot):
+    with qtbot.waitSignal(place.changed) as changed:
+        qtbot.keyClick(place.outlets.markers, Qt.Key.Key_Space)
+    assert changed.args == [{"lsl_markers": True}]
+    samples = place.outlets.samples
+    assert samples.currentText() == "Off"
+    samples.setCurrentIndex(1)
+    with qtbot.waitSignal(place.changed) as changed:
+        samples.activated.emit(1)
+    assert changed.args == [{"lsl_samples": "single-blind"}]
+    show(place, MachineSettings(lsl_markers=True, lsl_samples="always", triggers="serial:COM3"))
+    assert place.outlets.markers.isChecked()
+    assert samples.currentText() == "On, also in double-blind studies"
+    assert place.outlets.triggers.text() == "serial:COM3"
+
+
+def test_a_trigger_port_is_typed_and_what_is_none_is_refused(place, qtbot):
+    outlets = place.outlets
+    with qtbot.waitSignal(place.changed) as changed:
+        type_into(qtbot, outlets.triggers, "serial:/dev/ttyUSB0")
+    assert changed.args == [{"triggers": "serial:/dev/ttyUSB0"}]
+    with qtbot.assertNotEmitted(place.changed):
+        type_into(qtbot, outlets.triggers, "COM3")
+    assert outlets.below.text().startswith("This is not the address of a port")
+    assert outlets.triggers.property("state") == "refused"
+    with qtbot.waitSignal(place.changed) as changed:
+        type_into(qtbot, outlets.triggers, " ")
+    assert changed.args == [{"triggers": ""}]
+    assert outlets.below.text().startswith("One byte per event")

@@ -1,0 +1,112 @@
+"""A session in its windows sends its events to a port and to the Lab Streaming Layer, and goes on without them."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+
+import pytest
+
+from study_app import app
+from study_app.gui.operator import OperatorWindow
+from study_app.outlets.marker import CODES
+from study_app.store import workstation
+from study_app.store.workstation import MachineSettings
+from study_app.validation.outlets.localhost import localhost_only
+from tests.app.people import Person, events, receipt_of, window
+from tests.compiled import needs_servo
+
+localhost_only()
+pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
+pytest.importorskip("serial", reason="pyserial is not installed: pip install 'liquid-study[triggers]'")
+
+pytestmark = [
+    pytest.mark.slow,
+    needs_servo,
+    pytest.mark.usefixtures("qapp", "nobody_stays", "quick_preflight"),
+    pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no virtual ports"),
+]
+
+
+@pytest.fixture
+def port():
+    """Return both ends of a pair of virtual ports: a file to read from, and the name of the other."""
+    import tty
+
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    os.set_blocking(ours, False)
+    yield ours, os.ttyname(theirs)
+    os.close(theirs)
+
+
+def run(study, results, lines):
+    return app.run(
+        study, participant="P001", seed=5, device="scripted", windowed=True, results=results, tell=lines.append
+    )
+
+
+def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, port):
+    ours, name = port
+    workstation.save(MachineSettings(lsl_markers=True, lsl_samples="single-blind", triggers=f"serial:{name}"))
+    lines: list[str] = []
+    person = Person()
+    assert run(short_demo, results, lines) == 0
+    person.deleteLater()
+    came = [byte for byte in os.read(ours, 65536) if byte]
+    os.close(ours)
+    told = events(results)
+    assert came == [CODES[one["event"]] for one in told if one["event"] in CODES]
+    assert {CODES[event] for event in ("trial_started", "trial_ended", "responses", "session_ended")} < set(came)
+    assert "outlet_lost" not in {one["event"] for one in told}
+    outlets = receipt_of(results)["outlets"]
+    assert set(outlets) == {"LSL markers", "Serial port"}
+    assert outlets["Serial port"]["codes"] == dict(CODES)
+    said = "\n".join(lines)
+    assert "warning  LSL markers     no listener" in said
+    assert "ok       LSL samples     off; in a double-blind study" in said
+    assert "ok       Serial port     ready" in said
+    assert not [one for one in threading.enumerate() if one.name.startswith("outlet")]
+
+
+def test_a_port_that_is_unplugged_stops_no_session_and_is_said_once(short_demo, results, port):
+    ours, name = port
+    workstation.save(MachineSettings(triggers=f"serial:{name}"))
+    shown: list[tuple[str, ...]] = []
+
+    class Unplugger(Person):
+        def look(self):
+            operator = window(OperatorWindow)
+            if not shown and self.once is None and self.answered is not None:
+                os.close(ours)
+                shown.append(())
+            elif shown and operator is not None and operator.rail.tally.beyond.text():
+                shown.append((operator.rail.tally.beyond.text(),))
+            super().look()
+
+    person = Unplugger()
+    lines: list[str] = []
+    assert run(short_demo, results, lines) == 0
+    person.deleteLater()
+    told = events(results)
+    assert told[-1]["status"] == "completed"
+    lost = [(one["outlet"], one["reason"]) for one in told if one["event"] == "outlet_lost"]
+    assert len(lost) == 1
+    assert lost[0][0] == "Serial port"
+    assert lost[0][1].startswith(f"serial:{name} failed")
+    assert any(text.startswith(f"Serial port: serial:{name} failed") for (text,) in shown[1:])
+    assert sum(one["event"] == "responses" for one in told) == 4
+
+
+def test_a_port_that_is_not_there_is_said_before_and_the_session_runs(short_demo, results):
+    workstation.save(MachineSettings(triggers="serial:/nowhere/ttyUSB7"))
+    lines: list[str] = []
+    person = Person()
+    assert run(short_demo, results, lines) == 0
+    person.deleteLater()
+    assert any(line.startswith("warning  Serial port     not available; serial:/nowhere/ttyUSB7") for line in lines)
+    receipt = receipt_of(results)
+    assert receipt["status"] == "completed"
+    assert json.dumps(receipt["outlets"]).startswith('{"Serial port": {"failed": "serial:/nowhere/ttyUSB7 cannot be')
+    assert [one["outlet"] for one in events(results) if one["event"] == "outlet_lost"] == ["Serial port"]
