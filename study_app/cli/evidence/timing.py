@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from study_app.app.windows_load import WindowsThread
     from study_app.validation.timing.machine_load import LoadName
 
+MOST_COMPARED_S = 60.0
 LOAD = click.Choice(("none", "gui", "gui+cpu"))
 
 
@@ -45,9 +46,22 @@ LOAD = click.Choice(("none", "gui", "gui+cpu"))
 @click.option(
     "--devices", "of_devices", is_flag=True, help="Compare each emulated device with the scripted hand instead."
 )
+@click.option("--lsl", is_flag=True, help="Measure the streams of the Lab Streaming Layer instead.")
+@click.option(
+    "--triggers",
+    metavar="PORT",
+    help="Measure triggers on a port instead, such as serial:/dev/ttyUSB0; virtual: on a pair of virtual ports.",
+)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure.")
 def timing(
-    seconds: float, load: LoadName, spin_us: float | None, of_delays: bool, of_devices: bool, to: Path | None
+    seconds: float,
+    load: LoadName,
+    spin_us: float | None,
+    of_delays: bool,
+    of_devices: bool,
+    lsl: bool,
+    triggers: str | None,
+    to: Path | None,
 ) -> None:
     """Measure the lateness of the servo, a bare compiled loop, a Python thread and a Qt timer.
 
@@ -58,8 +72,22 @@ def timing(
 
     With --devices the servo ticks on each emulated device and on the scripted hand, alternately. Ends with 3 if the
     99th percentile of the lateness on one of them exceeds 1.5 times that on the scripted hand.
+
+    With --lsl another process receives samples at 1 kHz and markers for so many seconds; then the servo ticks with
+    and without both streams, alternately, for up to 60 s each. Ends with 3 if something is lost, a marker's time
+    differs from the servo's clock by more than 1 ms, or the median lateness grows by more than 10 %.
+
+    With --triggers events become bytes on a port, and the delay of each is measured.
     """
-    exclude_each_other(delays=of_delays, devices=of_devices)
+    exclude_each_other(delays=of_delays, devices=of_devices, lsl=lsl, triggers=triggers)
+    if (lsl or triggers is not None) and spin_us is not None:
+        raise StudyError("--spin applies to the servo's loops: omit it with --lsl and --triggers")
+    if lsl:
+        measure_streams(seconds, load, to)
+        return
+    if triggers is not None:
+        measure_triggers(triggers, seconds, to)
+        return
     if of_devices:
         if spin_us is not None:
             raise StudyError("--spin applies to the servo's loops: omit it with --devices")
@@ -103,7 +131,6 @@ def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
 
 def compare_devices(seconds: float, load: LoadName, to: Path | None) -> None:
     """Print how late ticks begin with each emulated device; end with 3 where the limit is missed."""
-    from study_app.store.atomic import write_file
     from study_app.store.output_files import make_folder
     from study_app.validation.timing.device_lateness import emulated_devices, text, time_devices
     from study_app.validation.timing.machine_load import under_load
@@ -116,12 +143,71 @@ def compare_devices(seconds: float, load: LoadName, to: Path | None) -> None:
             windows_thread(load) if load != "none" else None,
             lambda: time_devices(seconds, emulated_devices(), ending=ending, tell=show),
         )
-    click.echo(text(found), nl=False)
-    if to is not None:
-        write_file(to / "devices.txt", text(found).encode())
-        click.echo(to / "devices.txt")
+    print_and_keep(text(found), to, "devices.txt")
     if any(one.missed for one in found):
         click.get_current_context().exit(EXIT_FOUND)
+
+
+def measure_streams(seconds: float, load: LoadName, to: Path | None) -> None:
+    """Print what another process receives, and what that costs the servo; end with 3 where a limit is missed."""
+    from study_app.store.output_files import make_folder
+    from study_app.validation.outlets.lateness import compare
+    from study_app.validation.outlets.localhost import localhost_only
+    from study_app.validation.outlets.outlet_report import stream_text
+    from study_app.validation.outlets.streams import stream
+    from study_app.validation.timing.machine_load import under_load
+
+    check_seconds(seconds)
+    localhost_only()
+    if to is not None:
+        make_folder(to)
+    windows = windows_thread(load) if load != "none" else None
+    with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
+        found, ratios = under_load(
+            load,
+            windows,
+            lambda: (
+                stream(seconds, ending=ending, tell=show),
+                compare(min(seconds, MOST_COMPARED_S), ending=ending, tell=show),
+            ),
+        )
+    print_and_keep(stream_text(found, ratios), to, "streams.txt")
+    if not found.met or any(one.percentile == 50 and one.verdict == "missed" for one in ratios):
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+def measure_triggers(port: str, seconds: float, to: Path | None) -> None:
+    """Print how long events take to their bytes on a port."""
+    from study_app.store.output_files import make_folder
+    from study_app.validation.outlets.outlet_report import trigger_text
+    from study_app.validation.outlets.trigger_delays import measure
+
+    check_seconds(seconds)
+    if to is not None:
+        make_folder(to)
+    with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
+        found = measure(port, seconds, ending=ending, tell=show)
+    print_and_keep(trigger_text(found), to, "triggers.txt")
+    if found.wrong:
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+def check_seconds(seconds: float) -> None:
+    """Refuse seconds out of range."""
+    from study_app.validation.timing.measurement import LEAST_S, MOST_S
+
+    if not LEAST_S <= seconds <= MOST_S:
+        raise StudyError(f"outlets are measured for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
+
+
+def print_and_keep(text: str, to: Path | None, name: str) -> None:
+    """Print a text, and write it into a folder where one was given."""
+    from study_app.store.atomic import write_file
+
+    click.echo(text, nl=False)
+    if to is not None:
+        write_file(to / name, text.encode())
+        click.echo(to / name)
 
 
 def windows_thread(load: LoadName) -> WindowsThread | None:
