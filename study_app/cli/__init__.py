@@ -13,7 +13,7 @@ import sys
 import click
 
 from study_app import __version__
-from study_app.cli import data, identify, listing, model, power, screenshots, study, validate
+from study_app.cli import data, identify, listing, model, outlets, power, screenshots, study, validate
 from study_app.cli.devices import devices, emulate_falcon
 from study_app.cli.evidence import accuracy, cfd, soak, stability, thresholds, timing
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands
@@ -52,6 +52,7 @@ MODULES = (
     timing,
     thresholds,
     screenshots,
+    outlets,
 )
 
 for module in MODULES:

@@ -17,7 +17,7 @@ GROUPS: Final = {
     "Data": "export plot report unblind exclude include withdraw merge verify rebuild reproduce replay",
     "Model": "scene simulate identify estimate figures",
     "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds screenshots",
-    "Devices": "devices emulate-falcon",
+    "Devices": "devices outlets emulate-falcon",
 }
 
 Command = TypeVar("Command", bound=Callable[..., Any])

@@ -103,7 +103,7 @@ class SampleStream:
                 self.send_new()
             self.send_new()
             close_outlet(self._outlet)
-        except Exception as error:  # noqa: BLE001 - whatever the library raises, the session goes on without it
+        except Exception as error:  # noqa: BLE001 - any error of the library: the session goes on without it
             self.lost = f"{type(error).__name__}: {error}"
         self._outlet = None
 

@@ -1,4 +1,4 @@
-"""Sinks that are told what to do."""
+"""Sinks that fail or hang when a test wants it."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ def test_a_lost_recording_is_told_first_by_the_recorder_or_the_journal(told):
     assert len(told.view(lost={1: "No space left on device"}).beyond) == 2
 
 
-def test_a_failed_outlet_is_told_by_the_outlets_or_the_journal(told):
+def test_a_failed_outlet_is_shown_by_the_outlets_or_the_journal(told):
     told.welcome()
     told.start(1)
     line = "Serial port: it was unplugged"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -42,7 +43,7 @@ class SerialPort:
         try:
             self._port: Any = serial.Serial(name, int(baud or BAUD), write_timeout=TIMEOUT_S)
         except (*self._failures, ValueError) as error:
-            raise OutletError(f"{self.address} cannot be opened: {error}") from error
+            raise OutletError(f"{self.address} cannot be opened: {_cause(error)}") from error
 
     def write(self, byte: int) -> None:
         """Send a byte; returns when the driver has sent it.
@@ -56,11 +57,17 @@ class SerialPort:
             self._port.write(bytes((byte,)))
             self._port.flush()
         except self._failures as error:
-            raise OutletError(f"{self.address} failed: {error}") from error
+            raise OutletError(f"{self.address} failed: {_cause(error)}") from error
 
     def close(self) -> None:
         """Close the port."""
         self._port.close()
+
+
+def _cause(error: Exception) -> str:
+    """Return the system's words for an error where it has a number, else its own."""
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if isinstance(number, int) else str(error)
 
 
 def _open(place: str, now_ns: Callable[[], int]) -> TriggerSink:

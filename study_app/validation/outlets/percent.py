@@ -8,20 +8,20 @@ from collections.abc import Callable, Iterator
 
 
 def paced(seconds: float, every_s: float, *, ending: threading.Event, tell: Callable[[str], object]) -> Iterator[int]:
-    """Yield 0, 1, 2 … for so many seconds, with a pause after each, and tell each per cent once.
+    """Yield 0, 1, 2 … for so many seconds, with a pause after each, and report each per cent once.
 
     Raises
     ------
     KeyboardInterrupt
         ``ending`` was set.
     """
-    began_s, told, number = time.monotonic(), -1, 0
+    began_s, shown, number = time.monotonic(), -1, 0
     while (share := (time.monotonic() - began_s) / seconds) < 1:
         if ending.is_set():
             raise KeyboardInterrupt
-        if int(100 * share) > told:
-            told = int(100 * share)
-            tell(f"{told:3} %")
+        if int(100 * share) > shown:
+            shown = int(100 * share)
+            tell(f"{shown:3} %")
         yield number
         number += 1
         time.sleep(every_s)

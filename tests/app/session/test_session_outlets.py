@@ -56,10 +56,10 @@ def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, p
     person.deleteLater()
     came = [byte for byte in os.read(ours, 65536) if byte]
     os.close(ours)
-    told = events(results)
-    assert came == [CODES[one["event"]] for one in told if one["event"] in CODES]
+    lines_written = events(results)
+    assert came == [CODES[one["event"]] for one in lines_written if one["event"] in CODES]
     assert {CODES[event] for event in ("trial_started", "trial_ended", "responses", "session_ended")} < set(came)
-    assert "outlet_lost" not in {one["event"] for one in told}
+    assert "outlet_lost" not in {one["event"] for one in lines_written}
     outlets = receipt_of(results)["outlets"]
     assert set(outlets) == {"LSL markers", "Serial port"}
     assert outlets["Serial port"]["codes"] == dict(CODES)
@@ -89,14 +89,14 @@ def test_a_port_that_is_unplugged_stops_no_session_and_is_said_once(short_demo, 
     lines: list[str] = []
     assert run(short_demo, results, lines) == 0
     person.deleteLater()
-    told = events(results)
-    assert told[-1]["status"] == "completed"
-    lost = [(one["outlet"], one["reason"]) for one in told if one["event"] == "outlet_lost"]
+    lines_written = events(results)
+    assert lines_written[-1]["status"] == "completed"
+    lost = [(one["outlet"], one["reason"]) for one in lines_written if one["event"] == "outlet_lost"]
     assert len(lost) == 1
     assert lost[0][0] == "Serial port"
     assert lost[0][1].startswith(f"serial:{name} failed")
     assert any(text.startswith(f"Serial port: serial:{name} failed") for (text,) in shown[1:])
-    assert sum(one["event"] == "responses" for one in told) == 4
+    assert sum(one["event"] == "responses" for one in lines_written) == 4
 
 
 def test_a_port_that_is_not_there_is_said_before_and_the_session_runs(short_demo, results):

@@ -72,9 +72,9 @@ def test_an_outlet_that_fails_is_journalled_once(store: SessionStore, outlets: C
         store.write_tables()
     store.finish("completed")
     lines = journal.read(store.folder.journal)
-    told = [(line["outlet"], line["reason"]) for line in lines if line["event"] == "outlet_lost"]
-    assert told == [("Serial port", "serial:/dev/ttyUSB0 failed: it was unplugged")]
-    assert progress_of(lines).outlets_lost == dict(told)
+    lost = [(line["outlet"], line["reason"]) for line in lines if line["event"] == "outlet_lost"]
+    assert lost == [("Serial port", "serial:/dev/ttyUSB0 failed: it was unplugged")]
+    assert progress_of(lines).outlets_lost == dict(lost)
 
 
 def test_the_receipt_says_what_was_sent_where(start: Start) -> None:

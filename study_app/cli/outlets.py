@@ -1,0 +1,44 @@
+"""The command that sets what sessions on this machine send to other programs."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import click
+
+OFF = "off"
+
+
+@click.command()
+@click.option("--markers", type=click.Choice((OFF, "on")), help="Markers of events over the Lab Streaming Layer (LSL).")
+@click.option(
+    "--samples",
+    type=click.Choice((OFF, "single-blind", "always")),
+    help="Samples over LSL; single-blind: not in double-blind studies.",
+)
+@click.option("--triggers", metavar="PORT", help="Trigger codes on a port, such as serial:/dev/ttyUSB0; off: none.")
+def outlets(markers: str | None, samples: str | None, triggers: str | None) -> None:
+    """Print what sessions on this machine send to other programs; with options, change it."""
+    from study_app.errors import OutletError
+    from study_app.outlets.session_outlets import sink_kinds
+    from study_app.store import workstation
+
+    settings = workstation.load()
+    changes: dict[str, Any] = {} if markers is None else {"lsl_markers": markers == "on"}
+    if samples is not None:
+        changes["lsl_samples"] = samples
+    if triggers is not None:
+        changes["triggers"] = "" if triggers == OFF else triggers
+        kind, _, place = triggers.partition(":")
+        ports = {name: one.example for name, one in sink_kinds().items() if ":" in one.example}
+        understood = kind in ports and place and re.fullmatch(workstation.TRIGGERS_PATTERN, triggers)
+        if triggers != OFF and not understood:
+            examples = " or ".join(ports.values())
+            raise OutletError(f"--triggers '{triggers}' is not the address of a port: use one like {examples}, or off")
+    if changes:
+        settings = type(settings).model_validate(settings.model_dump() | changes)
+        workstation.save(settings)
+    click.echo(f"markers over LSL: {'on' if settings.lsl_markers else OFF}")
+    click.echo(f"samples over LSL: {settings.lsl_samples}")
+    click.echo(f"triggers: {settings.triggers or OFF}")
