@@ -6,6 +6,7 @@ One that cannot be opened, or fails later, is named in `Outlets.lost` with the r
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal, Protocol, TypeAlias
@@ -91,16 +92,22 @@ class Outlets:
         self._double = blinding == "double"
         self._withheld = self._double and samples == "single-blind"
         for address in addresses:
-            try:
+            kind = sink_kinds().get(address.partition(":")[0])
+            with self._failing("Triggers" if kind is None else kind.title):
                 self._threads.append(SinkThread(open_sink(address, servo.now_ns)))
-            except OutletError as error:
-                kind = sink_kinds().get(address.partition(":")[0])
-                self._failed["Triggers" if kind is None else kind.title] = str(error)
         if samples != "off" and not self._withheld:
-            try:
+            with self._failing(SampleStream.title):
                 self._samples = SampleStream(servo.telemetry, servo.rate_hz, servo.now_ns)
-            except OutletError as error:
-                self._failed[SampleStream.title] = str(error)
+
+    @contextmanager
+    def _failing(self, title: str) -> Iterator[None]:
+        """Keep why an outlet cannot be opened, for any reason: no session depends on it."""
+        try:
+            yield
+        except OutletError as error:
+            self._failed[title] = str(error)
+        except Exception as error:  # noqa: BLE001 - any error of a driver
+            self._failed[title] = f"{type(error).__name__}: {error}"
 
     @property
     def described(self) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import pytest
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLEW, SAMPLE
 from study_app.outlets.sample_stream import CHANNELS, SampleStream, channels_of
 from study_app.outlets.session_outlets import Outlets, open_sink
-from study_app.outlets.sink import SinkThread
+from study_app.outlets.sink import SinkKind, SinkThread
 from study_app.validation.outlets.localhost import localhost_only
 from tests.outlets.sinks import marker
 
@@ -175,6 +175,17 @@ def test_samples_are_off_in_double_blind_studies_unless_they_are_asked_for(
         assert shown == [("LSL samples", None if withheld else False, withheld, streams and blinding == "double")]
     else:
         assert shown == []
+
+
+def test_an_unexpected_error_of_a_driver_stops_no_session(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_place: str, _now_ns: Any) -> Any:
+        raise RuntimeError("could not create the stream outlet")
+
+    kinds = {"lsl": SinkKind("lsl", "LSL markers", "lsl", fail)}
+    monkeypatch.setattr("study_app.outlets.session_outlets.sink_kinds", lambda: kinds)
+    outlets = Outlets(("lsl",), "off", Servo(), "double")
+    assert outlets.lost == {"LSL markers": "RuntimeError: could not create the stream outlet"}
+    outlets.close()
 
 
 @slow

@@ -61,4 +61,4 @@ def _open(_place: str, now_ns: Callable[[], int]) -> MarkerStream:
     return MarkerStream(now_ns)
 
 
-SINK = SinkKind("lsl", "Lab Streaming Layer", "lsl", _open)
+SINK = SinkKind("lsl", MarkerStream.title, "lsl", _open)
