@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from study_app.app.windows_load import WindowsThread
     from study_app.validation.timing.machine_load import LoadName
 
-MOST_COMPARED_S = 60.0
+MOST_COMPARED_S = 300.0
 LOAD = click.Choice(("none", "gui", "gui+cpu"))
 
 
@@ -74,7 +74,7 @@ def timing(
     99th percentile of the lateness on one of them exceeds 1.5 times that on the scripted hand.
 
     With --lsl another process receives samples at 1 kHz and markers for so many seconds; then the servo ticks with
-    and without both streams, alternately, for up to 60 s each. Ends with 3 if something is lost, a marker's time
+    and without both streams, alternately, for up to 300 s each. Ends with 3 if something is lost, a marker's time
     differs from the servo's clock by more than 1 ms, or the median lateness grows by more than 10 %.
 
     With --triggers events become bytes on a port, and the delay of each is measured.
