@@ -234,6 +234,9 @@ def _drawn(condition: Condition) -> Iterator[str]:
     """Yield what is unusual of how a condition is drawn, and its force sent."""
     if condition.delay_ms:
         yield f"seen {condition.delay_ms:g} ms late"
+    if condition.shows_video:
+        alone = ", without ball and targets" if condition.overlay == "hidden" else ""
+        yield f"video: {condition.view}{alone}"
     if condition.ball == "hidden":
         yield "ball hidden"
     yield from link_words(condition.force_delay_ms, condition.force_jitter_ms, condition.force_loss)

@@ -32,6 +32,8 @@ NEW_KEYS: Final = (
     "liquids.*.non_newtonian",
     "scene.fade_s",
     "conditions.*.ball",
+    "conditions.*.view",
+    "conditions.*.overlay",
     *(f"conditions.*.{key}" for key in OF_LINK),
     *TABLES,
     *(f"limits.{key}" for key in LEVEL_LIMITS),

@@ -25,7 +25,7 @@ from study_app.protocol.source.document import Path, entries, frozen
 from study_app.protocol.source.files import at_hand, protocol_hash, shipped, source_bytes
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.line_numbers import Places
-from study_app.protocol.source.liquid_files import TABLE
+from study_app.protocol.source.liquid_files import FOOTAGE_TABLE, TABLE, is_footage
 from study_app.protocol.source.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
 
@@ -113,6 +113,8 @@ def examined(document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS) -> 
     None.
     """
     document, faults = _with_liquids_of_files(document)
+    document, missing = _with_footage(document)
+    faults += missing
     if formats.is_second(document):
         document, missing = with_instruments(formats.completed(document))
         faults += missing
@@ -220,6 +222,27 @@ def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], li
             faults.append(Fault(("liquids", name, "file"), *fault.args))
             resolved[name] = {"density_kg_m3": 1000.0}  # stands in, so that nothing but the file is reported
     return {key: value for key, value in document.items() if key != TABLE} | {"liquids": resolved}, faults
+
+
+def _with_footage(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
+    """Return a study's document with the SHA-256 of each condition's footage, and which files are missing."""
+    stated = [
+        Fault(path, "unknown key", "the program computes it")
+        for path, _ in entries(document, "conditions.*.footage_sha256")
+    ]
+    shown = [(path, view) for path, view in entries(document, "conditions.*.view") if is_footage(view) and "." in view]
+    if stated or not shown:
+        return document, stated
+    hashes = document.get(FOOTAGE_TABLE, {})
+    conditions = dict(document["conditions"])
+    faults: list[Fault] = []
+    for path, view in shown:
+        if view in hashes:
+            conditions[path[1]] = {**conditions[path[1]], "footage_sha256": hashes[view]}
+        else:
+            message = f'there is no file "{view}" in this folder'
+            faults.append(Fault(path, message, "give the path of a video file, relative to this file"))
+    return {key: value for key, value in document.items() if key != FOOTAGE_TABLE} | {"conditions": conditions}, faults
 
 
 def _is_file(liquid: Any) -> bool:

@@ -20,8 +20,6 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from study_app.haptics.model import force_link
-from study_app.haptics.model.force_link import ForceLink
 from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, within
 from study_app.haptics.model.scene import (
     FADE_S,
@@ -48,7 +46,7 @@ from study_app.protocol.texts import Description, Id, Language, Localised, text_
 from study_app.protocol.trials.asked import asked
 from study_app.protocol.trials.kinds import AnyDesign, AnyMethod, default_design
 from study_app.protocol.trials.limits import Limits
-from study_app.protocol.trials.stimuli import MOST_DELAY_MS, OF_LINK, Stimulus
+from study_app.protocol.trials.stimuli import Condition, Stimulus
 from study_app.protocol.trials.task import Task
 from study_app.protocol.trials.tasks.explore import Explore
 from study_app.protocol.trials.tasks.follow import Follow
@@ -158,51 +156,6 @@ class SceneDefaults(Table):
     def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Omit the usual fade: receipts of format 1 keep their bytes."""
         return {name: value for name, value in plain(self).items() if name != "fade_s" or value != FADE_S}
-
-
-class Condition(Table):
-    """A named combination of what is felt (one liquid, or several with regions) and how late it is seen."""
-
-    ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("liquid", "liquids"),)
-
-    liquid: Id | None = Field(default=None, description="The liquid; or give liquids.")
-    liquids: tuple[Id, ...] = Field(default=(), description="Several liquids; where they overlap the last one counts.")
-    delay_ms: Annotated[float, within(0, MOST_DELAY_MS, "what is seen more than a second late is no feedback")] = Field(
-        default=0, description="Delay of everything drawn in the tank [ms]."
-    )
-    label: Id | None = Field(
-        default=None, description="The item of analysis.names that is right for it; left out: none is."
-    )
-    ball: Literal["shown", "hidden"] = Field(
-        default="shown",
-        description="shown: the ball is always drawn; hidden: it is drawn during a task's lead, not while it is felt.",
-    )
-    force_delay_ms: Annotated[float, within(0, force_link.MOST_DELAY_MS, "a later force pushes the hand")] = Field(
-        default=0, description="Delay of the force [ms]; what is drawn is not delayed by it."
-    )
-    force_jitter_ms: Annotated[float, within(0, force_link.MOST_JITTER_MS, "networks deviate less")] = Field(
-        default=0, description="A force is later by up to this, drawn again at every tick [ms]."
-    )
-    force_loss: Annotated[float, within(0, force_link.MOST_LOSS, "beyond, most forces are held ones")] = Field(
-        default=0, description="Share of ticks whose force is lost; the last one is held."
-    )
-
-    @model_serializer(mode="wrap")
-    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit a ball that is shown and a prompt force: receipts of format 1 keep their bytes."""
-        usual = {"ball": "shown", **dict.fromkeys(OF_LINK, 0)}
-        return {name: value for name, value in plain(self).items() if name not in usual or value != usual[name]}
-
-    @property
-    def liquid_ids(self) -> tuple[str, ...]:
-        """The liquids of the scene, in order."""
-        return self.liquids if self.liquid is None else (self.liquid,)
-
-    def link(self, seed: int = 0) -> ForceLink:
-        """Return the link between force model and hand; ``seed`` is that of jitter and loss."""
-        return ForceLink(
-            delay_s=self.force_delay_ms / 1000, jitter_s=self.force_jitter_ms / 1000, loss=self.force_loss, seed=seed
-        )
 
 
 def compared(conditions: Sequence[Condition]) -> Compared:

@@ -184,7 +184,8 @@ def equal_conditions(parts: Draft) -> Iterator[Fault]:
         for index, condition in enumerate(() if delays and block.replicates else block.conditions):
             if (one := presented.get(condition)) is None:
                 continue
-            earlier = first.setdefault((one.liquid_ids, one.delay_ms, one.ball, one.link()), condition)
+            presents = (one.liquid_ids, one.delay_ms, one.ball, one.link(), one.view, one.overlay)
+            earlier = first.setdefault(presents, condition)
             if earlier != condition:
                 message = f'"{condition}" presents the same as "{earlier}"'
                 hint = "change it, or use repetitions" + (", or write replicates = true" if delays else "")

@@ -1,15 +1,19 @@
-"""Stimuli: the one number of a condition that is varied, and the comparisons that a level stands for."""
+"""Conditions, and stimuli: the one number of a condition that is varied, and the comparisons of its levels."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Final, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model import force_link
+from study_app.haptics.model.force_link import ForceLink
+from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id
 
@@ -28,6 +32,79 @@ OF_CONDITION: Final = {DELAY: MOST_DELAY_MS, **OF_LINK}
 """The varied numbers that belong to the condition, not to its liquid, and the most that each may be."""
 CONSTANT_LEVELS: Final = 7
 LEVELS_MOST: Final = 201
+
+
+USUAL: Final[Mapping[str, Any]] = {
+    "ball": "shown",
+    **dict.fromkeys(OF_LINK, 0),
+    "view": "tank",
+    "overlay": "shown",
+    "footage_sha256": None,
+}
+"""Keys of format 2 with their defaults."""
+
+
+class Condition(Table):
+    """A named combination of what is felt (one liquid, or several with regions), what is seen, and how late.
+
+    ``footage_sha256`` is that of the video file; ``load`` fills it in.
+    """
+
+    ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("liquid", "liquids"),)
+
+    liquid: Id | None = Field(default=None, description="The liquid; or give liquids.")
+    liquids: tuple[Id, ...] = Field(default=(), description="Several liquids; where they overlap the last one counts.")
+    delay_ms: Annotated[float, within(0, MOST_DELAY_MS, "what is seen more than a second late is no feedback")] = Field(
+        default=0, description="Delay of everything drawn in the tank [ms]."
+    )
+    label: Id | None = Field(
+        default=None, description="The item of analysis.names that is right for it; left out: none is."
+    )
+    ball: Literal["shown", "hidden"] = Field(
+        default="shown",
+        description="shown: the ball is always drawn; hidden: it is drawn during a task's lead, not while it is felt.",
+    )
+    force_delay_ms: Annotated[float, within(0, force_link.MOST_DELAY_MS, "a later force pushes the hand")] = Field(
+        default=0, description="Delay of the force [ms]; what is drawn is not delayed by it."
+    )
+    force_jitter_ms: Annotated[float, within(0, force_link.MOST_JITTER_MS, "networks deviate less")] = Field(
+        default=0, description="A force is later by up to this, drawn again at every tick [ms]."
+    )
+    force_loss: Annotated[float, within(0, force_link.MOST_LOSS, "beyond, most forces are held ones")] = Field(
+        default=0, description="Share of ticks whose force is lost; the last one is held."
+    )
+    view: str = Field(
+        default="tank",
+        pattern=r"^(tank|camera|[^\x00]+\.[0-9A-Za-z]+)$",
+        description="tank: the drawn tank; camera: the live picture of this machine's camera; or a video file, its "
+        "path relative to this file.",
+    )
+    overlay: Literal["shown", "hidden"] = Field(
+        default="shown",
+        description="shown: ball and targets are drawn over a video; hidden: the video is shown instead of them.",
+    )
+    footage_sha256: SkipJsonSchema[str | None] = None
+
+    @model_serializer(mode="wrap")
+    def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Omit a ball that is shown, a prompt force and a drawn tank: receipts of format 1 keep their bytes."""
+        return {name: value for name, value in plain(self).items() if name not in USUAL or value != USUAL[name]}
+
+    @property
+    def liquid_ids(self) -> tuple[str, ...]:
+        """The liquids of the scene, in order."""
+        return self.liquids if self.liquid is None else (self.liquid,)
+
+    @property
+    def shows_video(self) -> bool:
+        """Whether a video is seen, live or from a file, and not the drawn tank."""
+        return self.view != "tank"
+
+    def link(self, seed: int = 0) -> ForceLink:
+        """Return the link between force model and hand; ``seed`` is that of jitter and loss."""
+        return ForceLink(
+            delay_s=self.force_delay_ms / 1000, jitter_s=self.force_jitter_ms / 1000, loss=self.force_loss, seed=seed
+        )
 
 
 class Stimulus(Table):

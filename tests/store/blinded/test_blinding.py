@@ -186,7 +186,8 @@ def test_a_protocol_with_other_conditions_is_refused_without_naming_them(
     with pytest.raises(StoreError, match="undo that change") as early:
         check_conditions(tmp_path, Protocol.model_validate(tables))
     assert str(early.value) == str(refusal.value)
-    assert not any(word in str(refusal.value) for word in ("mildew", "tardy", "139", "1200"))
+    message = str(refusal.value).replace(str(tmp_path), "")  # whose name holds any number
+    assert not any(word in message for word in ("mildew", "tardy", "139", "1200"))
 
 
 def test_a_protocol_with_other_texts_keeps_its_key(
