@@ -1,0 +1,92 @@
+"""Opening and scaling videos with PyAV, which is an optional extra and imported here alone."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from contextlib import suppress
+from typing import Any, Final, NamedTuple
+
+from study_app.errors import DeviceError
+
+EXTRA: Final = "needs the optional extra video: pip install 'liquid-study[video]'"
+SIZE: Final = (1280, 720)
+"""What frames are scaled to until the tank says how large it is [px]."""
+NICE: Final = 5
+"""How much less urgent a decoding thread is than the others, where the system lets threads differ. [choice]"""
+SECOND_NS: Final = 1_000_000_000
+USUAL_RATE_HZ: Final = 30.0
+RATES_HZ: Final = (1.0, 240.0)
+
+
+class Pixels(NamedTuple):
+    """A frame's pixels as in `frames.VideoFrame`."""
+
+    width: int
+    height: int
+    stride: int
+    content: Any
+
+
+def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **options: str) -> Any:
+    """Return an open container of PyAV with a video in it; ``kind`` is a name of FFmpeg's for a device or format.
+
+    Raises
+    ------
+    DeviceError
+        It cannot be opened, or PyAV is not installed; the reason alone.
+    """
+    try:
+        import av  # noqa: PLC0415 - an optional extra
+        from av.error import FFmpegError  # noqa: PLC0415
+    except ImportError as error:
+        raise DeviceError(f"a video {EXTRA}") from error
+    try:
+        container = av.open(source, format=kind, options=options, timeout=timeout)
+    except (FFmpegError, OSError, ValueError) as error:
+        raise DeviceError(reason(error)) from error
+    if not container.streams.video:
+        container.close()
+        raise DeviceError("it holds no video")
+    container.streams.video[0].codec_context.thread_count = 1
+    return container
+
+
+def reason(error: Exception) -> str:
+    """Return why a video cannot be read, in the words of the system or of FFmpeg."""
+    return str(getattr(error, "strerror", None) or error or type(error).__name__)
+
+
+def period_ns(stream: Any) -> int:
+    """Return the time from one frame of a stream to the next, as the stream states it [ns]."""
+    for rate in (stream.average_rate, stream.guessed_rate):
+        if rate is not None and RATES_HZ[0] <= float(rate) <= RATES_HZ[1]:
+            return round(SECOND_NS / float(rate))
+    return round(SECOND_NS / USUAL_RATE_HZ)
+
+
+class Scaler:
+    """Turns decoded frames into pixels that fit into a size, which another thread may change."""
+
+    def __init__(self) -> None:
+        from av.video.reformatter import VideoReformatter  # noqa: PLC0415 - an optional extra
+
+        self._reformatter = VideoReformatter()
+        self.size = SIZE
+
+    def pixels(self, frame: Any) -> Pixels:
+        """Return a frame's pixels, as wide or as high as the size, with the frame's own ratio."""
+        wide, high = self.size
+        share = min(wide / frame.width, high / frame.height)
+        width, height = max(2, round(share * frame.width)), max(2, round(share * frame.height))
+        scaled = self._reformatter.reformat(frame, width, height, "bgra", interpolation="BILINEAR")
+        plane = scaled.planes[0]  # keeps its frame
+        return Pixels(width, height, plane.line_size, plane)
+
+
+def make_less_urgent() -> None:
+    """Let other threads run before this one."""
+    if sys.platform == "linux":
+        with suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)

@@ -1,0 +1,144 @@
+"""Footage: a file that is played from the beginning of each trial, again and again; decoded in a thread of its own."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from study_app.errors import DeviceError
+from study_app.video.decoding import SECOND_NS, Scaler, make_less_urgent, open_video, period_ns, reason
+from study_app.video.frames import VideoFrame
+
+AHEAD: Final = 8
+"""Frames that wait decoded: a quarter of a second at 30 Hz, 24 MB at 1152 x 648 pixels. [choice]"""
+PATIENCE_S: Final = 5.0
+
+
+class Footage:
+    """A video file as a source.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    DeviceError
+        It cannot be read as a video.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            with open_video(str(path)) as container:
+                stream = container.streams.video[0]
+                self._period_ns = period_ns(stream)
+                self._start_s = next(container.decode(stream)).time or 0.0
+                self.size = (stream.width, stream.height)
+        except (DeviceError, OSError, ValueError, StopIteration) as error:
+            raise DeviceError(f"{path} cannot be shown: {reason(error)}") from error
+        self._scaler = Scaler()
+        self._changed = threading.Condition()
+        self._frames: deque[VideoFrame] = deque()
+        self._shown: VideoFrame | None = None
+        self._play = 0
+        self._began_ns: int | None = None
+        self._media_ns = 0
+        self._closed = False
+        self._failure = ""
+        self.thread = threading.Thread(target=self._work, name="footage", daemon=True)
+        self.thread.start()
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames per second."""
+        return SECOND_NS / self._period_ns
+
+    def fit(self, width: int, height: int) -> None:
+        """Scale later frames so that they fit into this many pixels."""
+        self._scaler.size = (width, height)
+
+    def rewind(self) -> None:
+        """Begin the footage anew."""
+        with self._changed:
+            self._play += 1
+            self._frames.clear()
+            self._shown, self._began_ns, self._media_ns = None, None, 0
+            self._changed.notify_all()
+
+    def begin(self, at_ns: int) -> None:
+        """Run from this moment on [ns, servo's clock]; the first frame stands until then."""
+        self._began_ns = at_ns
+
+    def frame_at(self, moment_ns: int) -> VideoFrame | None:
+        """Return the frame of a moment [ns, servo's clock]; None where it is not decoded yet.
+
+        Raises
+        ------
+        DeviceError
+            The file cannot be read any further.
+        """
+        began_ns = moment_ns if self._began_ns is None else self._began_ns
+        with self._changed:
+            self._media_ns = max(0, moment_ns - began_ns)
+            while self._frames and self._frames[0].due_ns <= self._media_ns:
+                self._shown = self._frames.popleft()
+                self._changed.notify_all()
+            if self._failure and not self._frames:
+                raise DeviceError(f"{self.path} cannot be shown any further: {self._failure}")
+            shown = self._shown
+        return None if shown is None else replace(shown, due_ns=began_ns + shown.due_ns)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        self.thread.join(PATIENCE_S)
+
+    def _work(self) -> None:
+        make_less_urgent()
+        try:
+            with open_video(str(self.path)) as container:
+                while not self._closed:
+                    play = self._play
+                    for frame in self._decoded(container, play):
+                        if not self._put(frame, play):
+                            break
+        except (DeviceError, OSError, ValueError) as error:
+            with self._changed:
+                self._failure = reason(error)
+
+    def _decoded(self, container: Any, play: int) -> Iterator[VideoFrame]:
+        """Yield frame after frame from the beginning, again and again; those that are overdue are not scaled."""
+        number = offset_ns = 0
+        while True:
+            container.seek(0)
+            end_ns = 0
+            for frame in container.decode(video=0):
+                media_ns = round(max(0.0, (frame.time or 0.0) - self._start_s) * SECOND_NS)
+                end_ns = media_ns + self._period_ns
+                if play != self._play or self._closed:
+                    return
+                if offset_ns + end_ns >= self._media_ns:
+                    width, height, stride, pixels = self._scaler.pixels(frame)
+                    yield VideoFrame(number, width, height, stride, pixels, offset_ns + media_ns, 0, self._period_ns)
+                number += 1
+            if end_ns == 0:
+                raise DeviceError("it holds no frame")
+            offset_ns += end_ns
+
+    def _put(self, frame: VideoFrame, play: int) -> bool:
+        """Hand a frame over when there is room; return whether it is still wanted."""
+        with self._changed:
+            while len(self._frames) >= AHEAD and play == self._play and not self._closed:
+                self._changed.wait()
+            if play != self._play or self._closed:
+                return False
+            self._frames.append(frame)
+        return True

@@ -1,0 +1,119 @@
+"""The videos of a study: opened before its session, described in its receipt, closed after it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from study_app.errors import DeviceError
+from study_app.protocol.model import Protocol
+from study_app.protocol.trials.stimuli import DELAY, MOST_DELAY_MS
+from study_app.video.camera import USUAL, Camera
+from study_app.video.footage import Footage
+
+CAMERA = "camera"
+
+
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """What was found of a study's videos: in words, and why they cannot be used ("" where they can)."""
+
+    about: str
+    fault: str = ""
+
+
+class Videos:
+    """The videos that the conditions of a study show.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        The study.
+    folder : Path
+        Where its file is; footage is relative to it.
+    camera : str
+        The camera of this machine, as in `camera.Camera`; "" for the usual one of the system.
+    now_ns : callable
+        The servo's clock [ns].
+    """
+
+    def __init__(self, protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> None:
+        shown = [one for one in protocol.conditions.values() if one.shows_video]
+        self.views = tuple(sorted({one.view for one in shown}))
+        self._hashes = sorted({one.footage_sha256 for one in shown if one.footage_sha256})
+        self._folder, self._camera, self._now_ns = folder, camera or USUAL, now_ns
+        varied = any(stimulus.vary == DELAY for stimulus in protocol.stimuli.values())
+        self._holds_s = MOST_DELAY_MS / 1000 if varied else max((one.delay_ms for one in shown), default=0.0) / 1000
+        self._open: dict[str, Camera | Footage] = {}
+        self._opening = threading.Lock()
+
+    def look(self) -> Looked:
+        """Open what is not open yet, or failed; return what was found."""
+        with self._opening:
+            for view in self.views:
+                before = self._open.get(view)
+                if before is not None and before.thread.is_alive():
+                    continue
+                try:
+                    self._open[view] = self._opened(view)
+                except DeviceError as error:
+                    return Looked("every video of the study must open", str(error))
+        return Looked("; ".join(self._words()))
+
+    def source(self, view: str) -> Camera | Footage:
+        """Return the open source of a condition's view."""
+        return self._open[view]
+
+    def fit(self, width: int, height: int) -> None:
+        """Scale later frames of all videos so that they fit into this many pixels."""
+        for one in self._open.values():
+            one.fit(width, height)
+
+    def describe(self) -> dict[str, Any]:
+        """Return what the receipt records: nothing that tells which condition shows what."""
+        found: dict[str, Any] = {"footage_sha256": list(self._hashes)} if self._hashes else {}
+        if isinstance(camera := self._open.get(CAMERA), Camera):
+            age_ns = camera.newest.age_ns
+            found["camera"] = {
+                "source": camera.source,
+                "size": list(camera.size),
+                "rate_hz": round(1e9 / camera.newest.period_ns, 3),
+                "age": "unknown" if age_ns is None else "by the source's time stamps",
+            }
+        return found
+
+    def close(self) -> None:
+        """Let go of all."""
+        for one in self._open.values():
+            one.close()
+
+    def _opened(self, view: str) -> Camera | Footage:
+        return Camera(self._camera, self._now_ns, self._holds_s) if view == CAMERA else Footage(self._folder / view)
+
+    def _words(self) -> Iterable[str]:
+        for view, one in self._open.items():
+            if isinstance(one, Camera) and view == CAMERA:
+                age_ns = one.newest.age_ns
+                age = "age unknown" if age_ns is None else f"{age_ns / 1e6:.0f} ms old"
+                yield f"camera, {one.size[0]} × {one.size[1]}, {1e9 / one.newest.period_ns:.3g} Hz, {age}"
+        if count := sum(isinstance(one, Footage) for one in self._open.values()):
+            yield f"footage, {count} file{'' if count == 1 else 's'}"
+
+
+def refuse_unusable(protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> None:
+    """Refuse a study whose videos cannot be shown on this machine.
+
+    Raises
+    ------
+    DeviceError
+        Why, in one line.
+    """
+    videos = Videos(protocol, folder, camera, now_ns)
+    try:
+        if fault := videos.look().fault:
+            raise DeviceError(fault)
+    finally:
+        videos.close()

@@ -1,0 +1,93 @@
+"""A live camera: a process of its own that sends frames over TCP, with time stamps of known age or none."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from study_app.errors import DeviceError
+
+pytest.importorskip("av", reason="the optional extra video is not installed")
+
+from study_app.video.camera import Camera, _Numbers
+from tests.video.clips import number_in
+from tests.video.test_footage import pixels_of
+
+SENDER = Path(__file__).with_name("camera_process.py")
+SIZE = ("--size", "320x180")
+PERIOD_S = 1 / 30
+
+
+@contextmanager
+def camera(*options: str, holds_s: float = 0.5) -> Iterator[Camera]:
+    command = [sys.executable, str(SENDER), *SIZE, *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        one = Camera(f"tcp://127.0.0.1:{int(process.stdout.readline())}", time.monotonic_ns, holds_s)
+        try:
+            yield one
+        finally:
+            one.close()
+            process.kill()
+
+
+def test_a_camera_shows_the_frame_that_was_ready_at_a_moment_and_its_age() -> None:
+    with camera("--seconds", "4", "--age-ms", "80") as one:
+        time.sleep(1.0)
+        now_ns = time.monotonic_ns()
+        newest, earlier = one.frame_at(now_ns), one.frame_at(now_ns - 200_000_000)
+        assert newest is not None
+        assert earlier is not None
+        assert 0 <= now_ns - newest.due_ns < 3e9 * PERIOD_S
+        assert 0 <= now_ns - 200_000_000 - earlier.due_ns < 3e9 * PERIOD_S
+        assert number_in(pixels_of(newest)) - number_in(pixels_of(earlier)) == newest.number - earlier.number > 0
+        assert newest.age_ns is not None
+        assert 80e6 <= newest.age_ns < 80e6 + 2e9 * PERIOD_S  # what encoding and sending took is part of it
+
+
+def test_the_age_of_frames_is_unknown_where_time_stamps_are_on_no_clock() -> None:
+    with camera("--seconds", "3", "--relative") as one:
+        assert one.newest.age_ns is None
+
+
+def test_frames_that_were_lost_on_the_way_have_numbers() -> None:
+    with camera("--seconds", "4", "--lose", "5") as one:
+        time.sleep(1.5)
+        with one._changed:
+            held = list(one._frames)
+    steps = {later.number - earlier.number for earlier, later in pairwise(held)}
+    assert steps == {1, 2}
+    shown = [number_in(pixels_of(frame)) for frame in held]
+    assert [b - a for a, b in pairwise(shown)] == [later.number - earlier.number for earlier, later in pairwise(held)]
+
+
+def test_a_camera_that_stops_is_said_in_one_line() -> None:
+    with camera("--seconds", "2") as one:
+        one.thread.join(10)
+        with pytest.raises(DeviceError, match=r"stopped: it ended; connect it again"):
+            one.frame_at(time.monotonic_ns())
+
+
+@pytest.mark.parametrize(
+    ("source", "why"),
+    [
+        ("", "no camera is set"),
+        ("tcp://127.0.0.1:9", "the camera tcp://127.0.0.1:9 cannot be used: Connection refused"),
+        ("v4l2:/dev/video77", "the camera v4l2:/dev/video77 cannot be used: No such file or directory"),
+    ],
+)
+def test_no_camera_is_refused_in_one_line(source: str, why: str) -> None:
+    with pytest.raises(DeviceError, match=why):
+        Camera(source, time.monotonic_ns, 0.0)
+
+
+def test_numbers_follow_time_stamps() -> None:
+    numbers = _Numbers(33_333_333)
+    assert [numbers.of(stamp) for stamp in (0.0, 0.033, 0.1, 0.133, None, 0.3)] == [0, 1, 3, 4, 5, 6]

@@ -1,0 +1,99 @@
+"""Footage from a file: which frame is shown when, from the beginning of each trial, again and again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.errors import DeviceError
+
+pytest.importorskip("av", reason="the optional extra video is not installed")
+
+from study_app.video.footage import Footage
+from tests.video.clips import number_in, write_clip
+
+FRAMES, RATE_HZ = 12, 30
+PERIOD_NS = round(1e9 / RATE_HZ)
+SIZE = (320, 180)
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("clips") / "clip.mp4"
+    write_clip(path, frames=FRAMES, size=SIZE, rate_hz=RATE_HZ)
+    return path
+
+
+@pytest.fixture
+def footage(clip: Path) -> Iterator[Footage]:
+    one = Footage(clip)
+    yield one
+    one.close()
+    assert not one.thread.is_alive()
+
+
+def pixels_of(frame: Any) -> Any:
+    return np.frombuffer(frame.pixels, np.uint8).reshape(frame.height, frame.stride)[:, : 4 * frame.width]
+
+
+def shown(footage: Footage, moment_ns: int, number: int | None = None) -> Any:
+    """Return the frame of a moment, once it, or the one of a number, is decoded."""
+    until = time.monotonic() + 10
+    while time.monotonic() < until:
+        frame = footage.frame_at(moment_ns)
+        if frame is not None and number in (None, frame.number):
+            return frame
+        time.sleep(0.002)
+    raise AssertionError(f"frame {number} was not decoded: {footage.frame_at(moment_ns)}")
+
+
+def test_footage_runs_from_the_beginning_of_the_trial_and_again(footage: Footage) -> None:
+    footage.rewind()
+    first = shown(footage, 5_000)
+    assert (first.number, number_in(pixels_of(first)), first.age_ns) == (0, 0, 0)
+    assert shown(footage, 900_000_000_000).number == 0  # it stands until the trial begins
+    footage.begin(1_000)
+    for number in range(2 * FRAMES + 3):
+        frame = shown(footage, 1_000 + number * PERIOD_NS + PERIOD_NS // 2, number)
+        assert number_in(pixels_of(frame)) == number % FRAMES
+        assert abs(frame.due_ns - (1_000 + number * PERIOD_NS)) < 1_000_000
+
+
+def test_a_rewound_footage_begins_with_its_first_frame(footage: Footage) -> None:
+    footage.rewind()
+    footage.begin(0)
+    shown(footage, 5 * PERIOD_NS + 1_000_000, 5)
+    footage.rewind()
+    again = shown(footage, 7 * PERIOD_NS)
+    assert (again.number, number_in(pixels_of(again))) == (0, 0)
+
+
+def test_frames_that_are_overdue_are_skipped_and_keep_their_numbers(footage: Footage) -> None:
+    footage.rewind()
+    footage.begin(0)
+    later = shown(footage, 200 * PERIOD_NS + 1_000_000, 200)
+    assert number_in(pixels_of(later)) == 200 % FRAMES
+
+
+def test_frames_are_scaled_to_the_tank_with_their_own_ratio(footage: Footage) -> None:
+    footage.fit(640, 200)
+    footage.rewind()
+    footage.begin(0)
+    frame = shown(footage, 20 * PERIOD_NS + 1_000_000, 20)
+    assert frame.height == 200
+    assert abs(frame.width / frame.height - SIZE[0] / SIZE[1]) < 0.01
+    assert number_in(pixels_of(frame)) == 20 % FRAMES
+
+
+@pytest.mark.parametrize("content", [b"", b"no video at all" * 100])
+def test_a_file_that_is_no_video_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
+    broken = tmp_path / "broken.mp4"
+    broken.write_bytes(content)
+    with pytest.raises(DeviceError, match=r"broken\.mp4 cannot be shown: .+") as refused:
+        Footage(broken)
+    assert "\n" not in str(refused.value)
