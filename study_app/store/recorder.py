@@ -26,6 +26,7 @@ from study_app.store.journals.journal import Line
 if TYPE_CHECKING:
     from study_app.store.recording_files import Written
     from study_app.store.recording_writer import SamplesFile
+    from study_app.video.frames import VideoFrame
 
 ROOM = 120_000  # samples that may wait: two minutes at 1 kHz, 37 MB
 ENOUGH = 5_000  # samples that are worth waking the thread for
@@ -159,11 +160,11 @@ class Recorder:
             if self._waiting >= min(ENOUGH, self._room):
                 self.changed.notify_all()
 
-    def frame(self, painted_ns: int, sample_ns: int) -> None:
-        """Keep that a frame was painted at one moment and showed another [ns, the servo's clock]."""
+    def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
+        """Keep that a frame was painted at one moment and showed another [ns, the servo's clock], with a ``video``."""
         if self._underway is not None:
-            self._frames.append(painted_ns)
-            self._frames.append(sample_ns)
+            seen = (-1, 0, -1) if video is None else (video.number, video.due_ns, _known(video.age_ns))
+            self._frames.extend((painted_ns, sample_ns, *seen))
 
     def stop(self) -> None:
         """End the recording under way, if any; `kept` will tell when it is on the disk."""
@@ -277,7 +278,7 @@ class Recorder:
             for group in coming.groups(file.group_rows):
                 file.write(group)
             end = coming.end
-            frames = np.frombuffer(end.frames, np.int64).reshape(-1, 2)
+            frames = np.frombuffer(end.frames, np.int64).reshape(-1, 5)
             shown = self._files.write_frames(frames_path, frames, facts)
             return Recorded(begin.trial, begin.attempt, file.finish(end.dropped), shown, end.dropped, begin.interval)
         except Exception as error:  # noqa: BLE001 - whatever it is, the next trial's recording is still to be written
@@ -347,6 +348,10 @@ class _Coming:
         if isinstance(thing, _End):
             self.end = thing
         return None if self._ended else thing
+
+
+def _known(age_ns: int | None) -> int:
+    return -1 if age_ns is None else age_ns
 
 
 def event_of(kept: Kept) -> tuple[str, dict[str, Any]]:

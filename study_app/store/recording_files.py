@@ -37,7 +37,7 @@ from study_app.store.journals.parsing import parse_json
 from study_app.store.tables.column import Column
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
 
-FORMAT = 3
+FORMAT = 4
 SPEED_STEP_MPS = 2.0**-12
 ROUNDED_TO = {
     "velocity_mps": SPEED_STEP_MPS,
@@ -47,7 +47,9 @@ ROUNDED_TO = {
     "force_n": FORCE_STEP_N,
 }
 """Fields of ``layout.SAMPLE`` that are recorded rounded, and the step."""
-FRAME = np.dtype([("painted_ns", np.int64), ("sample_ns", np.int64), ("age_ns", np.int64)])
+FRAME = np.dtype([(column.name, np.int64) for column in FRAMES])
+NO_VIDEO = {"video_frame": -1, "video_ns": 0, "video_age_ns": -1}
+"""What a frame without a video says of it."""
 
 FACTS_KEY = b"liquid_study"
 AXES = ("x", "y", "z")
@@ -59,8 +61,8 @@ MEASURED = {
 """What a device may measure itself: field of ``layout.SAMPLE``, its component, and its bit."""
 _SINCE_2 = frozenset({"delay_ticks", *(f"undelivered_{axis}_n" for axis in AXES)})
 _SINCE_3 = frozenset({"measured", "device_time_ns", *MEASURED})
-_LACKING = {1: _SINCE_2 | _SINCE_3, 2: _SINCE_3, FORMAT: frozenset[str]()}
-"""Columns of samples that recordings of each format lack."""
+_LACKING = {1: _SINCE_2 | _SINCE_3 | NO_VIDEO.keys(), 2: _SINCE_3 | NO_VIDEO.keys(), 3: NO_VIDEO.keys(), FORMAT: ()}
+"""Columns that recordings of each format lack."""
 SHORT = frozenset({"buttons", "delay_ticks", "limiters", "measured", "scene", "status"})
 
 
@@ -120,7 +122,7 @@ def read_samples(path: Path) -> Any:
 
 
 def read_frames(path: Path) -> Any:
-    """Return the frames (n,) as a recarray: when painted, of which moment, and the difference [ns].
+    """Return the frames (n,) as a recarray of `FRAME`: when painted, of which moment, and what of a video [ns].
 
     Raises
     ------
@@ -130,7 +132,7 @@ def read_frames(path: Path) -> Any:
     columns, _ = _read(path, "frames")
     frames = records(FRAME, len(columns["painted_ns"]))
     for name in FRAME.names or ():
-        frames[name] = columns[name]
+        frames[name] = columns.get(name, NO_VIDEO.get(name, 0))
     return frames
 
 
@@ -193,7 +195,8 @@ def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any
     except (pa.ArrowException, UnicodeDecodeError) as error:
         raise _damaged(path, error) from error
     lacking = _LACKING[facts["format"]]
-    columns = FRAMES if kind == "frames" else [column for column in SAMPLES if column.name not in lacking]
+    every = FRAMES if kind == "frames" else SAMPLES
+    columns = [column for column in every if column.name not in lacking]
     if not _are_of(table, columns, facts["rows"]):
         raise StoreError(f"{path} is damaged (its columns differ from those of {kind}): restore it from a copy")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts

@@ -22,6 +22,7 @@ from study_app.store.recording_files import (
     FACTS_KEY,
     FORMAT,
     MEASURED,
+    NO_VIDEO,
     SHORT,
     SPEED_STEP_MPS,
     Written,
@@ -85,7 +86,7 @@ class SamplesFile:
 
 
 def write_frames(path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any]) -> Written:
-    """Write what was shown: when painted and of which moment (n, 2) [ns, the servo's clock].
+    """Write what was shown (n, 5): when painted, of which moment, and number, time and age of a video's frame [ns].
 
     Raises
     ------
@@ -94,8 +95,9 @@ def write_frames(path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any]
     """
     half = _Half(path, FRAMES)
     try:
-        painted, shown = frames[:, 0], frames[:, 1]
-        half.write({"painted_ns": painted, "sample_ns": shown, "age_ns": painted - shown})
+        painted, shown, *video = frames.T
+        columns = {"painted_ns": painted, "sample_ns": shown, "age_ns": painted - shown}
+        half.write({**columns, **dict(zip(NO_VIDEO, video, strict=True))})
         return half.finish({"format": FORMAT, "kind": "frames", **facts}, len(frames))
     except OSError:
         half.abandon()

@@ -169,12 +169,12 @@ def test_a_recording_says_what_it_is_without_being_read(tmp_path: Path, samples_
     facts = read_facts(write(tmp_path / "trial-003.parquet", samples_of(2_500), rate_hz=500).path)
     assert facts.pop("crc32")["rows"] == 500
     assert facts.pop("first_device_force_n") == facts.pop("first_command_n")
-    assert facts == {"format": 3, "kind": "samples", **FACTS, "rate_hz": 500, "dropped": 0, "rows": 2_500}
+    assert facts == {"format": 4, "kind": "samples", **FACTS, "rate_hz": 500, "dropped": 0, "rows": 2_500}
 
 
 def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Path, samples_of: Make) -> None:
     written = write(tmp_path / "trial-003.parquet", samples_of(100))
-    frames = write_frames(tmp_path / "frames.parquet", np.array([[5, 3]]), FACTS)
+    frames = write_frames(tmp_path / "frames.parquet", np.array([[5, 3, -1, 0, -1]]), FACTS)
     for path, columns in ((written.path, SAMPLES), (frames.path, FRAMES)):
         schema = parquet.read_schema(path)
         assert schema.names == [column.name for column in columns]
@@ -185,17 +185,20 @@ def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Pat
 
 
 def test_frames_come_back_with_their_age(tmp_path: Path) -> None:
-    shown = np.array([[10**15 + 16_666_667 * i, 10**15 + 16_666_667 * i - 4_000_000 - i] for i in range(1000)])
+    drawn = [(10**15 + 16_666_667 * i, 10**15 + 16_666_667 * i - 4_000_000 - i) for i in range(1000)]
+    video = [(i // 2, 10**15 + 33_333_333 * (i // 2), 80_000 + i) if i % 3 else (-1, 0, -1) for i in range(1000)]
+    shown = np.array([(*of_tank, *of_video) for of_tank, of_video in zip(drawn, video, strict=True)])
     written = write_frames(tmp_path / "trial-003_frames.parquet", shown, FACTS)
     read = read_frames(written.path)
     assert np.array_equal(read["painted_ns"], shown[:, 0])
     assert np.array_equal(read["sample_ns"], shown[:, 1])
     assert np.array_equal(read["age_ns"], shown[:, 0] - shown[:, 1])
+    assert [tuple(one) for one in read[["video_frame", "video_ns", "video_age_ns"]].tolist()] == video
 
 
 def test_nothing_recorded_is_a_file_of_no_rows(tmp_path: Path) -> None:
     samples = write(tmp_path / "trial-003.parquet", np.zeros(0, SAMPLE))
-    frames = write_frames(tmp_path / "frames.parquet", np.zeros((0, 2), np.int64), FACTS)
+    frames = write_frames(tmp_path / "frames.parquet", np.zeros((0, 5), np.int64), FACTS)
     assert (len(read_samples(samples.path)), len(read_frames(frames.path))) == (0, 0)
     assert read_checks(samples.path).device_force == ()
 
@@ -233,7 +236,7 @@ def test_a_full_disk_is_told_and_leaves_nothing(
 
 
 def test_frames_that_do_not_fit_leave_nothing(tmp_path: Path, files_up_to: FullDisk) -> None:
-    shown = np.random.default_rng(1).integers(0, 2**60, (50_000, 2))
+    shown = np.random.default_rng(1).integers(0, 2**60, (50_000, 5))
     with files_up_to(10_000), pytest.raises(OSError, match="File too large"):
         write_frames(tmp_path / "frames.parquet", shown, FACTS)
     assert names_in(tmp_path) == []
@@ -241,7 +244,7 @@ def test_frames_that_do_not_fit_leave_nothing(tmp_path: Path, files_up_to: FullD
 
 def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None:
     samples = write(tmp_path / "trial-003.parquet", samples_of(100)).path
-    frames = write_frames(tmp_path / "frames.parquet", np.array([[5, 3]]), FACTS).path
+    frames = write_frames(tmp_path / "frames.parquet", np.array([[5, 3, -1, 0, -1]]), FACTS).path
     other = tmp_path / "other.parquet"
     parquet.write_table(pa.table({"x": pa.array([1])}), other)
     torn = tmp_path / "torn.parquet"
@@ -264,9 +267,9 @@ def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None
 
 def test_a_newer_format_is_told(tmp_path: Path, samples_of: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as newer:
-        newer.setattr(recording_writer, "FORMAT", 4)
+        newer.setattr(recording_writer, "FORMAT", 5)
         path = write(tmp_path / "trial-003.parquet", samples_of(10)).path
-    with pytest.raises(StoreError, match="has format 4, this version reads 1 to 3: use a newer version"):
+    with pytest.raises(StoreError, match="has format 5, this version reads 1 to 4: use a newer version"):
         read_samples(path)
 
 
@@ -282,7 +285,7 @@ file.write(np.zeros(2000, SAMPLE))
 file.finish()
 recording_files.read_samples(path)
 frames = path.with_name("frames.parquet")
-recording_files.read_frames(recording_writer.write_frames(frames, np.zeros((3, 2), np.int64), {}).path)
+recording_files.read_frames(recording_writer.write_frames(frames, np.zeros((3, 5), np.int64), {}).path)
 print([name for name in ("pandas", "numba", "scipy", "PySide6") if name in sys.modules])
 """
 

@@ -9,7 +9,7 @@ from datetime import datetime
 from typing import Any
 
 from study_app.store.journals.parsing import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
-from study_app.store.tables.columns import DELIVERED, TRIALS
+from study_app.store.tables.columns import DELIVERED, TRIALS, VIDEO
 
 SHOWN = 200  # characters of a bad value that a message repeats
 
@@ -212,7 +212,9 @@ _MAY_BE_NULL = (
     "level", "standard", "part", "value", "answer", "onset_s", "first_s", "last_s", "gap_s", "device",
     "t_task_s", "scene",
 )  # fmt: skip
-_KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for column in (*TRIALS, *DELIVERED)} | {
+_KIND_OF: dict[str, tuple[str, bool]] = {
+    column.name: (column.kind, True) for column in (*TRIALS, *DELIVERED, *VIDEO)
+} | {
     name: (kind, name in _MAY_BE_NULL)
     for kind, names in {
         "text": "language operator key_hash protocol_hash version device page block phase code item "

@@ -65,6 +65,8 @@ class SessionStart:
         How the motors of the device are masked, for the receipt; None where that was not asked.
     outlets : mapping, optional
         What the session sends to other programs, for the receipt; None where it sends nothing.
+    video : mapping, optional
+        Description of camera and footage for the receipt; None in a study without a video.
     row_of : str, optional
         The id whose rows of squares the session takes; None: the participant's own.
     """
@@ -82,6 +84,7 @@ class SessionStart:
     recordings: bool = False
     motors_masked: Mapping[str, Any] | None = None
     outlets: Mapping[str, Any] | None = None
+    video: Mapping[str, Any] | None = None
     row_of: str | None = None
 
 
@@ -182,7 +185,7 @@ def first_words(
         "resumed": [],
         **facts,
         "generator": receipt.GENERATOR,
-        **surroundings(start.device, start.screens, clock, start.motors_masked, start.outlets),
+        **surroundings(start.device, start.screens, clock, start.motors_masked, start.outlets, start.video),
         "protocol": receipt.without_conditions(protocol),
     }
     return started, first_receipt
@@ -216,15 +219,16 @@ def surroundings(
     clock: SessionClock,
     motors_masked: Mapping[str, Any] | None = None,
     outlets: Mapping[str, Any] | None = None,
+    video: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the receipt's part about what the session runs with, from its beginning or since it was resumed."""
-    asked = {"motors_masked": motors_masked, "outlets": outlets}
+    optional = {"motors_masked": motors_masked, "outlets": outlets, "video": video}
     return {
         "versions": receipt.versions(),
         "device": dict(device),
         "screens": dict(screens),
         "clock": {"origin_ns": clock.origin_ns, "origin_at": clock.at(0)},
-        **{name: dict(value) for name, value in asked.items() if value is not None},
+        **{name: dict(value) for name, value in optional.items() if value is not None},
     }
 
 

@@ -17,7 +17,7 @@ from study_app.protocol.differences import CONDITIONS_DIFFER, differences
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.liquid_files import bundled, unbundled
+from study_app.protocol.source.liquid_files import bundled, hashes_in, unbundled
 from study_app.store import receipt
 from study_app.store.atomic import is_there, sweep
 from study_app.store.blinded.blinding import Key, open_or_draw_key, read_key, same_conditions
@@ -53,6 +53,7 @@ def reopen(
     screens: Mapping[str, Any],
     motors_masked: Mapping[str, Any] | None = None,
     outlets: Mapping[str, Any] | None = None,
+    video: Mapping[str, Any] | None = None,
     now_ns: Callable[[], int] = time.monotonic_ns,
     now: datetime | None = None,
 ) -> SessionStore:
@@ -80,6 +81,8 @@ def reopen(
         How the motors of the device are masked, for the receipt; None where that was not asked.
     outlets : mapping, optional
         What the session sends to other programs, for the receipt; None where it sends nothing.
+    video : mapping, optional
+        Description of camera and footage for the receipt; None in a study without a video.
     now_ns : callable
         The monotonic clock [ns] to go on with: the servo's.
     now : datetime, optional
@@ -120,9 +123,8 @@ def reopen(
         _sweep(folder)
         for event, fields in _recordings_found(folder, contents.lines) if left.start.get("recordings") else ():
             store.append(event, **fields)
-        store.note_resumed(
-            {"at": clock.at(at_s), **gap, **surroundings(device, screens, clock, motors_masked, outlets)}
-        )
+        around = surroundings(device, screens, clock, motors_masked, outlets, video)
+        store.note_resumed({"at": clock.at(at_s), **gap, **around})
         store.write_tables()
         write_description(study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions))
         write_participants(study_folder, left.place.study)
@@ -157,7 +159,7 @@ def sealed_source(session_folder: Path, source: bytes) -> bytes:
         files = read_key(study_folder.path).files
     except StoreError:  # `reopen` says so
         return source
-    return bundled(unbundled(source)[0], files.get) if files else source
+    return bundled(unbundled(source)[0], files.get, hashes_in(source)) if files else source
 
 
 @dataclass(frozen=True, slots=True)

@@ -201,6 +201,22 @@ DELIVERED: tuple[Column, ...] = (
 )
 """What an interval delivered."""
 
+VIDEO: tuple[Column, ...] = (
+    _count("video_frames", "Frames of the video that were shown; n/a without a video.", sealed=True),
+    _count(
+        "video_frames_late", "Frames of the video shown more than one of its frames later than requested.", sealed=True
+    ),
+    _count("video_frames_lost", "Frames of the video between the first and the last shown that were not.", sealed=True),
+    _signed("video_delay_error_max_ms", "Delay of the video, achieved minus requested: largest.", "ms"),
+    _signed(
+        "video_age_mean_ms",
+        "Mean age of the camera's pictures when they were ready, by the source's time stamps, in addition to the "
+        "delay; n/a if the source does not state it; 0 for a file.",
+        "ms",
+    ),
+)
+"""What was seen of a video."""
+
 INTERVALS: tuple[Column, ...] = (
     *(column for column in TRIALS[: TRIALS.index(CODE) + 1] if column.name not in _NOT_OF_INTERVALS),
     Column("interval", "integer", "Which interval of the trial, from 1.", minimum=1),
@@ -224,6 +240,7 @@ INTERVALS: tuple[Column, ...] = (
     ),
     *DELIVERED,
     *(column for column in TRIALS[_OUTCOME:] if column.name not in _NOT_OF_INTERVALS),
+    *VIDEO,
 )
 """Intervals of the trials of a study with designs."""
 
@@ -260,6 +277,7 @@ PARTICIPANTS: tuple[Column, ...] = (
 GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True)
 TRIALS_2: tuple[Column, ...] = (
     *_TRIALS_BY_NAME.values(),
+    *VIDEO,
     _count("intervals", "Number of intervals that this attempt presented; n/a if its block has no design."),
     GROUP,
 )
@@ -311,7 +329,7 @@ LATER = frozenset(
         "intervals",
         "catch",
         "invalid_reasons",
-        *(column.name for column in DELIVERED),
+        *(column.name for column in (*DELIVERED, *VIDEO)),
     }
 )
 """Columns that earlier versions did not write: a table without them is read as if they held n/a."""

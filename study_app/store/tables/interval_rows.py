@@ -20,10 +20,13 @@ _LONGEST: Final = frozenset(
         "delay_error_max_ms",
         "first_frame_gap_ms",
         "worst_frame_gap_ms",
+        "video_delay_error_max_ms",
     }
 )
 """Of these a trial has the largest of its intervals."""
-_MEANS: Final = frozenset({"tick_rate_hz", "mean_speed_mps", "force_mean_n", "withheld_share", "delay_error_mean_ms"})
+_MEANS: Final = frozenset(
+    {"tick_rate_hz", "mean_speed_mps", "force_mean_n", "withheld_share", "delay_error_mean_ms", "video_age_mean_ms"}
+)
 """Of these a trial has the mean of its intervals; of what is left the sum."""
 
 

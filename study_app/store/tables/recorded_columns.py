@@ -70,4 +70,20 @@ FRAMES: tuple[Column, ...] = (
     Column("painted_ns", "integer", "Time when the frame was shown, on the servo's clock.", "ns"),
     Column("sample_ns", "integer", "Time of the hand position that was shown.", "ns"),
     Column("age_ns", "integer", "Achieved visual delay: painted_ns - sample_ns.", "ns"),
+    Column("video_frame", "integer", "Number of the video's frame in it, from 0; -1 without one.", minimum=-1),
+    Column(
+        "video_ns",
+        "integer",
+        "Time when that was due without a delay, on the servo's clock: when the camera's picture was ready, or by the "
+        "time in the file; 0 without one.",
+        "ns",
+    ),
+    Column(
+        "video_age_ns",
+        "integer",
+        "Age of the camera's picture when it was ready, by the source's time stamps: it was taken at video_ns - "
+        "video_age_ns; -1 if unknown or without one.",
+        "ns",
+        minimum=-1,
+    ),
 )

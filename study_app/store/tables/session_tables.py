@@ -14,7 +14,7 @@ from study_app.store.journals.journal import Line
 from study_app.store.limits import within_limits
 from study_app.store.progress import is_of_intervals, progress_of
 from study_app.store.tables.column import Column, header, unsealed
-from study_app.store.tables.columns import DELIVERED, TRIALS, tables_of
+from study_app.store.tables.columns import DELIVERED, TRIALS, VIDEO, tables_of
 from study_app.store.tables.csv_files import Row
 from study_app.store.tables.interval_rows import combined, interval_row
 
@@ -49,6 +49,7 @@ class SessionRows:
         self.changed_intervals = 0
         self._session = _session(lines)
         self._group = _group(lines)
+        self._measured_names = (*_MEASURED, *header(VIDEO)) if self._group else _MEASURED
         self._limits = lines[0].get("limits", {})
         self._started: dict[tuple[int, int], Line] = {}
         self._places: dict[tuple[int, int], int] = {}  # in trials
@@ -69,8 +70,8 @@ class SessionRows:
                 which = line["trial"], line["attempt"]
                 repeats = bool(self.trials) and self.trials[-1]["trial"] == line["trial"]
                 self._started[which], self._places[which] = line, len(self.trials)
-                presented = {"intervals": 0 if is_of_intervals(line) else None} if self._group else {}
-                self.trials.append(_trial(self._session, line) | presented | self._group)
+                later = {**dict.fromkeys(header(VIDEO)), "intervals": 0 if is_of_intervals(line) else None}
+                self.trials.append(_trial(self._session, line) | (later if self._group else {}) | self._group)
                 if self._reconnected and repeats:
                     _note(self.trials[-1], f"presented again: {self._reconnected}")
                 self._reconnected = ""
@@ -92,7 +93,8 @@ class SessionRows:
                 self._begin_interval(line)
             case "interval_ended":
                 row = self._interval_of(line)
-                row |= {name: line.get(name) for name in (*_MEASURED, *_DELIVERED)} | {"ended_s": line["t_s"]}
+                row |= {name: line.get(name) for name in (*self._measured_names, *_DELIVERED)}
+                row["ended_s"] = line["t_s"]
                 reasons = line.get("invalid", ())
                 row |= {"outcome": line["outcome"], "invalid_reasons": " ".join(reasons) or None}
                 row |= {"valid": within_limits(row, self._limits) if not reasons else False}
@@ -139,8 +141,9 @@ class SessionRows:
         """Return what was measured of a trial that ended: of one with a design, in all its intervals."""
         which = line["trial"], line["attempt"]
         if not is_of_intervals(self._started[which]):
-            return {name: line.get(name) for name in _MEASURED}
-        return combined((self.intervals[at] for key, at in self._intervals.items() if key[:2] == which), _MEASURED)
+            return {name: line.get(name) for name in self._measured_names}
+        intervals = (self.intervals[at] for key, at in self._intervals.items() if key[:2] == which)
+        return combined(intervals, self._measured_names)
 
     def _last(self) -> Row:
         self.changed = min(self.changed, len(self.trials) - 1)

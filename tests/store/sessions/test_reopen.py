@@ -268,7 +268,7 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
     torn = store.folder.recordings / ".trial-003.parquet.0123abcd.tmp"
     torn.write_bytes(b"PAR1")
     frames = recording_files(store.folder.recordings, 3, 1)[1]
-    write_frames(frames, np.zeros((2, 2), np.int64), {"trial": 3, "attempt": 1})
+    write_frames(frames, np.zeros((2, 5), np.int64), {"trial": 3, "attempt": 1})
     table = store.folder.path / ".receipt.json.89abcdef.tmp"
     table.write_bytes(b"{")
 

@@ -6,7 +6,7 @@ import pytest
 
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
-from study_app.store.tables.columns import EXCLUSIONS, GROUP, INTERVALS, RESPONSES_2, TABLES, TRIALS_2
+from study_app.store.tables.columns import EXCLUSIONS, GROUP, INTERVALS, RESPONSES_2, TABLES, TRIALS_2, VIDEO
 from study_app.store.tables.level_columns import OF_TRACKS, SETTINGS, THRESHOLDS
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
 
@@ -18,7 +18,8 @@ def test_every_column_of_every_file_has_its_line() -> None:
     sections = {title: columns for title, _, _, columns in SECTIONS}
     responses, trials, participants = TABLES.values()
     tables = [responses, RESPONSES_2, trials, INTERVALS, participants]
-    outcome, intervals, group = OF_FORMAT_2
+    outcome, *video, intervals, group = OF_FORMAT_2
+    assert tuple(video) == VIDEO
     assert (outcome.levels[-1][0], intervals.name, group) == ("invalid", "intervals", GROUP)
     opened = (OF_TRACKS, THRESHOLDS, SETTINGS)
     assert list(sections.values()) == [*tables, OF_FORMAT_2, *opened, EXCLUSIONS, SAMPLES, FRAMES]
