@@ -28,6 +28,7 @@ CALLED: Final = {
     "display_offset": "display offset",
     "device": "device",
     "firmware": "firmware",
+    "camera": "camera",
     "workspace": "workspace",
     "theme": "theme",
     "sound": "sound",

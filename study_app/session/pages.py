@@ -51,7 +51,9 @@ class TaskPage:
 
     ``workspace_m`` holds the full sizes of the tank along x, y, z, centred on the device's middle; ``interval`` is None
     in a trial without a design. ``question`` is what the participant sets an interval to, "" where nothing is set;
-    ``adjusts`` says that this interval is the one, so that the question stands in place of the instruction.
+    ``adjusts`` says that this interval is the one, so that the question stands in place of the instruction. ``video``
+    is whether a video is seen and not the drawn tank, ``overlay`` whether ball and targets are drawn over it; never
+    printed.
     """
 
     trial: int
@@ -63,6 +65,8 @@ class TaskPage:
     interval: Interval | None = None
     question: str = ""
     adjusts: bool = False
+    video: bool = field(default=False, repr=False)
+    overlay: bool = field(default=True, repr=False)
 
     @property
     def said(self) -> str:

@@ -10,6 +10,7 @@ from study_app.haptics.model.scene import Scene
 from study_app.session.pages import Page
 from study_app.store.blinded.blinding import Key
 from study_app.store.clock import SessionClock
+from study_app.video.frames import VideoFrame, VideoSource
 
 
 class ServoPort(Protocol):
@@ -47,7 +48,7 @@ class RecorderPort(Protocol):
 
     def start(self, trial: int, attempt: int, rate_hz: float, interval: int | None = None) -> None: ...  # noqa: D102
     def append(self, samples: Any) -> None: ...  # noqa: D102
-    def frame(self, painted_ns: int, sample_ns: int) -> None: ...  # noqa: D102
+    def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None: ...  # noqa: D102
     def stop(self) -> None: ...  # noqa: D102
 
 
@@ -65,7 +66,8 @@ class Ports:
 
     ``recorder`` is None where no recordings are kept. Without ``paints`` there is no window: the first frame of a
     trial is reported, and a later one need not come. ``settled`` says whether all recordings are on the disk, so that
-    the session's end waits for none: until then it is put off.
+    the session's end waits for none: until then it is put off. ``video`` gives the source of a condition's view, None
+    where videos are not shown.
     """
 
     servo: ServoPort
@@ -75,3 +77,4 @@ class Ports:
     recorder: RecorderPort | None = None
     paints: bool = True
     settled: Callable[[], bool] = lambda: True
+    video: Callable[[str], VideoSource] | None = None

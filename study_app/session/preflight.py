@@ -20,6 +20,7 @@ from study_app.protocol.checks.pace import beyond_slope_limit, highest_damping
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.latin_squares import enrolment
+from study_app.video.sources import Looked
 
 if TYPE_CHECKING:
     from study_app.haptics.runtime.telemetry import Timing  # the compiler: whoever measures has loaded it
@@ -56,7 +57,8 @@ class Facts:
     ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
     delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
     the force that passivity controller and slew limit are expected to withhold in the fastest stroke of a task, by
-    liquid; None where it was not computed. ``outlets`` are the streams and ports to other programs.
+    liquid; None where it was not computed. ``outlets`` are the streams and ports to other programs; ``video`` is what
+    was found of the study's videos, None without any.
     """
 
     device: str
@@ -76,6 +78,7 @@ class Facts:
     delay_ticks: int = BELIEVED_TICKS
     withheld: Mapping[str, float] | None = None
     outlets: tuple[OutletStatus, ...] = ()
+    video: Looked | None = None
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
 
@@ -118,6 +121,7 @@ def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
         _folder(facts),
         _space(facts, protocol),
         _blinding(facts, protocol),
+        *_video(facts),
     ]
     found += _outlets(facts)
     return (*found, *_cost(facts, protocol), *_withheld(facts, protocol), *_balance(facts, protocol))
@@ -268,6 +272,15 @@ def _outlets(facts: Facts) -> Iterator[Check]:
         else:
             about = "open" if one.listens is None else "a program receives the stream"
             yield Check(one.title, "ok", "ready" if one.listens is None else "listener", about)
+
+
+def _video(facts: Facts) -> tuple[Check, ...]:
+    """Say whether the study's videos can be shown; nothing that tells which condition shows one."""
+    if facts.video is None:
+        return ()
+    if facts.video.fault:
+        return (Check("Video", "failure", "not usable", facts.video.about, facts.video.fault),)
+    return (Check("Video", "ok", "ready", facts.video.about),)
 
 
 def _cost(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:

@@ -31,6 +31,7 @@ class NewSession:
     ``resumes`` is the folder of the session that goes on, None for a new one; ``device_options`` are the values
     of the device's options, by name. ``row_of`` is the id whose rows of squares the session takes, None: its own.
     ``played`` says that it is played from the designer: exactly from where it was left, without an operator's window.
+    ``footage`` is the folder of the study's footage, None: that of its file.
     """
 
     source: str
@@ -49,6 +50,7 @@ class NewSession:
     device_options: Mapping[str, str | Path] = field(default_factory=dict)
     row_of: str | None = None
     played: bool = False
+    footage: Path | None = None
 
     def read_source(self) -> bytes:
         """Return the protocol's source; of a session that goes on, with its liquid files as they were sealed."""

@@ -318,6 +318,7 @@ class Runner:
 
     def _prepared(self, command: StartTrial) -> RunningTrial:
         schedule = self._state.plan.schedule
+        condition = self._protocol.conditions[command.presented.condition]
         seed = link_seed(schedule.seed, schedule.participant, command.trial, command.attempt, command.interval)
         return RunningTrial(
             command,
@@ -327,7 +328,9 @@ class Runner:
             reader=self._reader,
             recording=self._recording,
             paints=self._ports.paints,
-            hides_ball=self._protocol.conditions[command.presented.condition].ball == "hidden",
+            hides_ball=condition.ball == "hidden",
+            video=self._ports.video(condition.view) if self._ports.video and condition.shows_video else None,
+            videos=any(one.shows_video for one in self._protocol.conditions.values()),
         )
 
     def _done(self, running: RunningTrial, outcome: Outcome) -> TaskDone:

@@ -12,6 +12,7 @@ from study_app.devices.rig import Rig
 from study_app.errors import SessionError
 from study_app.outlets.session_outlets import Outlets, OutletStatus
 from study_app.protocol.model import Protocol
+from study_app.protocol.source.files import find
 from study_app.session.masking import Masking
 from study_app.session.preflight import Facts, Screen
 from study_app.session.request import NewSession, check_row
@@ -26,6 +27,7 @@ from study_app.store.sessions.participant_ids import check_participant, check_un
 from study_app.store.sessions.reopen import reopen
 from study_app.store.tables.study_description import check_study
 from study_app.store.workstation import MachineSettings
+from study_app.video.sources import Videos
 
 if TYPE_CHECKING:
     from study_app.haptics.runtime.servo import Servo
@@ -38,13 +40,15 @@ PLAYED_MEASURED_S = 0.5  # and before one that is played from the designer
 class Ready:
     """Device and servo at rest, and what was measured of them; ``masking`` of its motors, where that was asked.
 
-    ``outlets`` are open already, so that programs that record them can be connected before the session.
+    ``outlets`` are open already, so that programs that record them can be connected before the session; ``videos`` are
+    those of the study, None where it shows none.
     """
 
     rig: Rig
     facts: Facts
     masking: Masking | None = None
     outlets: Outlets | None = None
+    videos: Videos | None = None
 
     def facts_with(self, refresh_hz: float, scaling: float) -> Facts:
         """Return the facts with those of the outlets and of the screen: its refresh rate and scaling of its pixels."""
@@ -76,11 +80,25 @@ def check(chosen: NewSession, study: Protocol) -> None:
     check_conditions(folder.path, study)
 
 
-def measured(rig: Rig, chosen: NewSession, *, sleep: Callable[[float], object] = time.sleep) -> Facts:
-    """Return what the pre-flight judges, but for the screen; a ``sleep`` that does not wait cuts it short."""
+def videos_of(chosen: NewSession, study: Protocol, camera: str, rig: Rig) -> Videos | None:
+    """Return the videos of a study, not open yet; None where it shows none. ``camera`` is that of this machine."""
+    if not any(condition.shows_video for condition in study.conditions.values()):
+        return None
+    folder = find(chosen.source).parent if chosen.footage is None else chosen.footage
+    return Videos(study, folder, camera, rig.servo.now_ns)
+
+
+def measured(
+    rig: Rig, chosen: NewSession, videos: Videos | None = None, *, sleep: Callable[[float], object] = time.sleep
+) -> Facts:
+    """Return what the pre-flight judges, but for the screen; a ``sleep`` that does not wait cuts it short.
+
+    ``videos`` that are not open yet, or failed, are opened.
+    """
     from study_app.session.preflight_measurements import measure  # noqa: PLC0415 - the compiler: only once it is needed
 
-    return measure(
+    looked = None if videos is None else videos.look()
+    facts = measure(
         rig.servo,
         chosen.results,
         device=rig.device.name,
@@ -90,6 +108,7 @@ def measured(rig: Rig, chosen: NewSession, *, sleep: Callable[[float], object] =
         lasts_s=PLAYED_MEASURED_S if chosen.played else MEASURED_S,
         sleep=sleep,
     )
+    return replace(facts, video=looked)
 
 
 def open_outlets(machine: MachineSettings, servo: Servo, blinding: str) -> Outlets | None:
@@ -107,9 +126,11 @@ def open_store(
     screens: dict[str, Any],
     masking: Masking | None = None,
     outlets: Outlets | None = None,
+    videos: Videos | None = None,
 ) -> SessionStore:
     """Claim a new session on the disk, or open the one that goes on; ``outlets`` get the markers of its events."""
     sent = None if outlets is None else outlets.described
+    video = None if videos is None else videos.describe()
     if chosen.resumes is not None:
         store = reopen(
             chosen.resumes,
@@ -120,6 +141,7 @@ def open_store(
             screens=screens,
             motors_masked=None if masking is None else masking.entry,
             outlets=sent,
+            video=video,
             now_ns=rig.servo.now_ns,
         )
     else:
@@ -136,6 +158,7 @@ def open_store(
             recordings=chosen.recordings,
             motors_masked=None if masking is None else masking.entry,
             outlets=sent,
+            video=video,
             row_of=chosen.row_of,
         )
         store = begin(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))

@@ -23,6 +23,7 @@ from study_app.session.transitions.commands import StartTrial
 from study_app.session.trial_recording import Recording
 from study_app.session.trial_statistics import TrialStatistics
 from study_app.store.tables.delivered import JUDGED, judged
+from study_app.video.frames import VideoFrame, VideoSource
 
 # Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every
 # delay, none included, and is met exactly; else the newest sample, up to a tick old, would stand in where there is no
@@ -39,13 +40,14 @@ FROZEN_S = 1.0
 class TankView:
     """What is drawn in the tank: the proxy's place [m, hand frame] (3,), the task, and the time all this is of [ns].
 
-    ``ball_hidden`` is whether the proxy is not drawn.
+    ``ball_hidden`` is whether the proxy is not drawn; ``video`` is the frame of a video behind it, None without one.
     """
 
     position_m: NDArray[np.float64]
     task: TaskView
     sample_time_ns: int
     ball_hidden: bool = False
+    video: VideoFrame | None = None
 
 
 class RunningTrial:
@@ -69,6 +71,10 @@ class RunningTrial:
         Whether a window paints frames as long as the trial runs.
     hides_ball : bool
         Whether the ball is not drawn once the lead of the task is over.
+    video : VideoSource, optional
+        The video that is seen.
+    videos : bool
+        Whether a condition of the study shows a video.
     """
 
     def __init__(
@@ -82,8 +88,14 @@ class RunningTrial:
         recording: Recording,
         paints: bool,
         hides_ball: bool = False,
+        video: VideoSource | None = None,
+        videos: bool = False,
     ) -> None:
         self.trial = command.trial
+        self._video = video
+        self._drawn_video: VideoFrame | None = None
+        if video is not None:
+            video.rewind()
         self._hides_ball = hides_ball
         self._taken: list[bytes] = []
         self.command = command
@@ -95,7 +107,9 @@ class RunningTrial:
         self._serial: int | None = None
         self._dropped_before = 0
         self._tracker = track(command.task)
-        self._statistics = TrialStatistics(rate_hz=servo.rate_hz, late_s=late_s, due_ns=servo.now_ns(), paints=paints)
+        self._statistics = TrialStatistics(
+            rate_hz=servo.rate_hz, late_s=late_s, due_ns=servo.now_ns(), paints=paints, videos=videos
+        )
 
     @property
     def task(self) -> TaskView:
@@ -109,7 +123,8 @@ class RunningTrial:
         position_m, shown_ns = self._servo.telemetry.position_at(drawn_ns)
         task = self._tracker.at(shown_ns)
         hidden = self._hides_ball and task.elapsed_s >= self.command.task.lead_s
-        return TankView(position_m, task, shown_ns, hidden)
+        self._drawn_video = None if self._video is None else self._video.frame_at(drawn_ns)
+        return TankView(position_m, task, shown_ns, hidden, self._drawn_video)
 
     def frame(self, painted_ns: int, sample_ns: int) -> None:
         """Take a frame that was painted at one moment and showed another [ns, servo's clock]; the first one begins.
@@ -123,8 +138,10 @@ class RunningTrial:
             self._serial = self._servo.load(self._scene)
             self._dropped_before = self._reader.dropped
             self._recording.start(self.trial, self.command.attempt, self.command.interval)
-        self._statistics.frame(painted_ns, sample_ns, self._drawn_delay_s)
-        self._recording.frame(painted_ns, sample_ns)
+            if self._video is not None:
+                self._video.begin(painted_ns)
+        self._statistics.frame(painted_ns, sample_ns, self._drawn_delay_s, self._drawn_video)
+        self._recording.frame(painted_ns, sample_ns, self._drawn_video)
 
     def follow(self, samples: Any) -> list[TargetReached]:
         """Take the newest samples, in order (array of ``layout.SAMPLE``); return which targets were reached."""

@@ -10,6 +10,7 @@ from collections import deque
 from typing import Any
 
 from study_app.session.ports import RecorderPort
+from study_app.video.frames import VideoFrame
 
 LEAD_S = 0.6  # longer than the slowest fade
 
@@ -59,10 +60,10 @@ class Recording:
         for index, samples in enumerate(self._before):
             self._recorder.append(samples[spare:] if index == 0 else samples)
 
-    def frame(self, painted_ns: int, sample_ns: int) -> None:
-        """Take a frame that was painted at one moment and showed another [ns]."""
+    def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
+        """Take a frame that was painted at one moment and showed another [ns], and the frame of a video in it."""
         if self._recorder is not None and self._running:
-            self._recorder.frame(painted_ns, sample_ns)
+            self._recorder.frame(painted_ns, sample_ns, video)
 
     def stop(self) -> None:
         """End the recording."""

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NAMES, SAMPLE
 from study_app.haptics.runtime.telemetry import timing
+from study_app.video.frames import VideoFrame
+from study_app.video.statistics import VideoStatistics
 
 _TIMES = np.dtype([(name, SAMPLE[name]) for name in ("tick", "time_ns", "lateness_ns")])
 
@@ -29,9 +31,14 @@ class TrialStatistics:
         When the trial's first frame was due: when its page was asked for [ns].
     paints : bool
         Whether frames come as long as the trial runs; else its first frame may be the only one.
+    videos : bool
+        Whether a condition of the study shows a video.
     """
 
-    def __init__(self, *, rate_hz: float, late_s: float, due_ns: int, paints: bool = True) -> None:
+    def __init__(
+        self, *, rate_hz: float, late_s: float, due_ns: int, paints: bool = True, videos: bool = False
+    ) -> None:
+        self._video = VideoStatistics() if videos else None
         self._rate_hz = rate_hz
         self._late_s = late_s
         self._fewest = 1 if paints else 2  # frames before the first of them can have stood
@@ -71,8 +78,13 @@ class TrialStatistics:
             bits = np.arange(len(LIMITER_NAMES))
             self._limited += ((limiters[:, None] >> bits) & 1).sum(axis=0)
 
-    def frame(self, painted_ns: int, shown_ns: int, delay_s: float) -> None:
-        """Take a frame that was painted at one moment and showed another [ns], at the delay then asked for [s]."""
+    def frame(self, painted_ns: int, shown_ns: int, delay_s: float, video: VideoFrame | None = None) -> None:
+        """Take a frame that was painted at one moment and showed another [ns], at the delay then asked for [s].
+
+        ``video`` is the frame of a video in it.
+        """
+        if self._video is not None and video is not None:
+            self._video.frame(painted_ns, video, delay_s)
         gap_ns = painted_ns - self._painted_ns
         if self._errors_s:
             self._frame_gap_ns = max(self._frame_gap_ns, gap_ns)
@@ -123,6 +135,7 @@ class TrialStatistics:
             "loop_delay_changes": self._delay_changes if ticks else None,
             **{f"limiter_{name}": int(count) for name, count in zip(LIMITER_NAMES, self._limited, strict=True)},
             **self._frames(until_ns),
+            **({} if self._video is None else self._video.columns()),
         }
 
     def _move(self, positions: NDArray[np.float64]) -> None:

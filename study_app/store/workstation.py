@@ -90,8 +90,9 @@ class MachineSettings(_Strict):
     ``viewing_distance_mm`` and ``screen_width_mm`` are None until they are measured. ``firmware`` is the file
     of a device's program, ``workspace`` the folder of protocols and results (None: not chosen: `study_app.workspace`);
     ``recent`` are the protocol files outside it that were opened last, newest first; ``operator`` are the initials that
-    were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at; ``benches`` are the
-    latest measurements of devices. ``lsl_markers``, ``lsl_samples`` and ``triggers`` (the address of a port, "": none)
+    were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at; ``camera`` is the one
+    that conditions show (see `video.camera`), "" for the usual one of the system; ``benches`` are the latest
+    measurements of devices. ``lsl_markers``, ``lsl_samples`` and ``triggers`` (the address of a port, "": none)
     are what sessions send to other programs. Whether ``device`` is known is for those to say who open it.
     """
 
@@ -107,6 +108,7 @@ class MachineSettings(_Strict):
     theme: Literal["light", "dark"] = "light"
     sound: bool = False
     photodiode: bool = True
+    camera: Annotated[str, Field(max_length=400)] = ""
     operator: Annotated[str, Field(max_length=40)] = ""
     benches: Annotated[tuple[DeviceBench, ...], Field(strict=False)] = ()
     lsl_markers: bool = False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
@@ -19,7 +20,8 @@ from study_app.authoring.writer.refused import Refused
 from study_app.errors import StoreError
 from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import shipped, shipped_file
-from study_app.protocol.source.liquid_files import unbundled, with_liquid_files
+from study_app.protocol.source.liquid_files import file_hash, hashes_in, unbundled, with_liquid_files
+from study_app.store.atomic import cannot_write
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import is_open
 from study_app.viewmodels.designer.form_rows import first_element
@@ -160,15 +162,15 @@ class OpenStudy:
         """
         source = self.source()
         check_saving(content_hash(source), self.version, known)
-        self._bring_liquid_files(source)
+        self._bring_files(source)
         keep_content(source)
         self.base = save(self.file, self.study.text, self.base)
         self.saved = self.study.text
         self.keeper.saved(self.base)
         self.kept = self.draft = None
 
-    def _bring_liquid_files(self, source: bytes) -> None:
-        """Write the liquid files that the study names into its own folder, where it was copied from another one."""
+    def _bring_files(self, source: bytes) -> None:
+        """Write the files that the study names into its own folder, where it was copied from another one."""
         folder = self.file.resolve().parent
         if self.study.folder.resolve() == folder:
             return
@@ -177,6 +179,11 @@ class OpenStudy:
             if path.exists() and _content(path) != text.encode():
                 raise Refused(f"{path} is there with another liquid: rename one of the two files")
             write_whole(path, text.encode())
+        for name, digest in hashes_in(source).items():
+            if (there := file_hash(folder / name)) is None:
+                _copy(self.study.folder / name, folder / name)
+            elif there != digest:
+                raise Refused(f"{folder / name} is there with another video: rename one of the two files")
         self.history = replace(self.history, study=replace(self.study, folder=folder))
 
     def saved_as(self, name: str) -> OpenStudy:
@@ -272,6 +279,14 @@ def why_read_only(opened: OpenStudy, results: Path) -> str:
     if any(is_open(session.path) for session in StudyFolder(results / opened.name).sessions()):
         return "A session of this study is under way. Make a copy, or wait until it has ended."
     return ""
+
+
+def _copy(file: Path, to: Path) -> None:
+    try:
+        to.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, to)
+    except OSError as error:
+        raise cannot_write(to, error) from error
 
 
 def _content(file: Path) -> bytes:

@@ -85,6 +85,8 @@ class SessionBridge(QObject):
         ports = Ports(parts.servo, parts.journal, self.present, parts.clock, parts.recorder)
         if parts.recorder is not None:
             ports = replace(ports, settled=parts.recorder.settled)
+        if parts.videos is not None:
+            ports = replace(ports, video=parts.videos.source)
         self._leaves = False
         self.runner = Runner(
             parts.session.protocol, parts.session.schedule, parts.key, ports, parts.language, parts.start, parts.secret
@@ -140,6 +142,9 @@ class SessionBridge(QObject):
         """Put a page before the participant; the runner's port."""
         self.participant.show_page(page)
         self._hand = self.parts.hand_for(page) if self.parts.hand_for is not None else None
+        tank, videos = self.participant.tank, self.parts.videos
+        if tank is not None and videos is not None:
+            videos.fit(*tank.video.size(tank.devicePixelRatioF()))
         if not isinstance(page, TaskPage):
             self.lookout.health.frames_rest()
 

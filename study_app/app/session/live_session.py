@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 import traceback
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,7 +36,7 @@ from study_app.protocol.wording.without_force import without_force
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.request import NewSession
 from study_app.session.resume import FIRST, resume_at
-from study_app.session.start import Ready, check, measured, open_outlets, open_store
+from study_app.session.start import Ready, check, measured, open_outlets, open_store, videos_of
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.folders import StudyFolder
 
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from study_app.app.session.preflight_controller import Preflight
     from study_app.outlets.session_outlets import Outlets
     from study_app.store.sessions.open_session import SessionStore
+    from study_app.video.sources import Videos
 
 CANCELLED = 130
 BUG = 1
@@ -104,6 +105,7 @@ class LiveSession(QObject):
         self.note: OpeningWindow | None = None
         self.rig: Rig | None = None
         self._outlets: Outlets | None = None
+        self._videos: Videos | None = None
         self._store: SessionStore | None = None
         self._crash_trace: CrashTrace | None = None
         self._closed = False
@@ -159,6 +161,7 @@ class LiveSession(QObject):
         """Compile, open, start and measure, in a thread of its own; whatever comes of it goes to ``_begin``."""
         rig: Rig | None = None
         outlets: Outlets | None = None
+        videos: Videos | None = None
         try:
             load_windows()
             study = self.chosen.read_protocol()
@@ -166,11 +169,15 @@ class LiveSession(QObject):
             settings = study_settings(study, self.chosen.tremor(), self.chosen.device_options)
             rig = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
             outlets = None if self.chosen.played else open_outlets(self.settings, rig.servo, study.study.blinding)
-            made: object = Ready(rig, measured(rig, self.chosen, sleep=self._ending.wait), outlets=outlets)
+            videos = videos_of(self.chosen, study, self.settings.camera, rig)
+            facts = measured(rig, self.chosen, videos, sleep=self._ending.wait)
+            made: object = Ready(rig, facts, outlets=outlets, videos=videos)
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
             if outlets is not None:
                 outlets.close()
+            if videos is not None:
+                videos.close()
             if rig is not None:
                 with suppress(StudyError):  # what came first says why
                     rig.stop()
@@ -180,7 +187,7 @@ class LiveSession(QObject):
         """Ask the operator, or claim the session on the disk and open the two windows at once."""
         self._working = False
         if isinstance(made, Ready):
-            self.rig, self._outlets = made.rig, made.outlets
+            self.rig, self._outlets, self._videos = made.rig, made.outlets, made.videos
         if self._closed:
             self._let_go()
             self.deleteLater()
@@ -229,7 +236,7 @@ class LiveSession(QObject):
         found = checks(made.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()), protocol)
         self._pass_checks(found)
         screens = described(self.settings, shown_on, operated_on)
-        self._store = open_store(chosen, protocol, source, rig, screens, made.masking, made.outlets)
+        self._store = open_store(chosen, protocol, source, rig, screens, made.masking, made.outlets, made.videos)
         self._crash_trace = CrashTrace(self._store.folder.crash)
         self._store.append("preflight", checks=[one.entry for one in found])
         protocol = self._store.as_recorded(protocol)
@@ -250,6 +257,7 @@ class LiveSession(QObject):
             start,
             text_scale=text_scale,
             photodiode=self.settings.photodiode,
+            videos=made.videos,
         )
         self.bridge.done.connect(self._finished)
         self.bridge.diagnose_asked.connect(self.diagnose)
@@ -353,15 +361,10 @@ class LiveSession(QObject):
         store, self._store = self._store, None
         outlets, self._outlets = self._outlets, None
         crash_trace, self._crash_trace = self._crash_trace, None
-        try:
+        videos, self._videos = self._videos, None
+        with ExitStack() as closing:  # closes the last one first, whatever fails
+            for part in (outlets, store, crash_trace, videos):
+                if part is not None:
+                    closing.callback(part.close)
             if rig is not None:
                 rig.stop()
-        finally:
-            if crash_trace is not None:
-                crash_trace.close()
-            try:
-                if store is not None:
-                    store.close()
-            finally:
-                if outlets is not None:
-                    outlets.close()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.session.pages import Page
 from study_app.session.resume import FIRST, Start
+from study_app.video.sources import Videos
 from study_app.viewmodels.operator import Session
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ class Parts:
     is where a resumed session goes on. ``exclude`` leaves a trial, or with None the session, out of the analysis for a
     reason. ``aim_m`` gives where hand or pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse
     on, None where the device is not the mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
-    ``outlets`` send its events to other programs. ``reconnect`` opens a device that failed again and starts the servo
-    at zero force; it may take minutes.
+    ``outlets`` send its events to other programs; ``videos`` are those of the study, None where it shows none.
+    ``reconnect`` opens a device that failed again and starts the servo at zero force; it may take minutes.
     """
 
     session: Session
@@ -47,3 +48,4 @@ class Parts:
     press: Callable[[int], None] | None = None
     hand_for: Callable[[Page], Hand | None] | None = None
     reconnect: Callable[[], dict[str, Any]] | None = None
+    videos: Videos | None = None

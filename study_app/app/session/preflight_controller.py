@@ -198,7 +198,7 @@ class Preflight(QObject):
 
     def _measure(self) -> None:
         try:
-            found: object = measured(self._ready.rig, self._chosen, sleep=self._ending.wait)
+            found: object = measured(self._ready.rig, self._chosen, self._ready.videos, sleep=self._ending.wait)
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             found = error
         self._measured.emit(found)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from study_app.haptics.runtime.servo import Servo
     from study_app.session.request import NewSession
     from study_app.store.sessions.open_session import SessionStore
+    from study_app.video.sources import Videos
 
 
 def open_windows(
@@ -50,12 +51,13 @@ def open_windows(
     text_scale: float = 1.0,
     photodiode: bool = True,
     refresh_hz: float | None = None,
+    videos: Videos | None = None,
 ) -> SessionBridge:
     """Open the operator's and the participant's window; the bridge returned is to be started.
 
     ``start`` is where a resumed session goes on, ``text_scale`` how much larger than designed the participant's words
     must be at least, ``photodiode`` whether the tank has a corner for one. With ``refresh_hz`` there are so many
-    frames a second by the clock, at any refresh rate of the screen.
+    frames a second by the clock, at any refresh rate of the screen. ``videos`` are open.
     """
     clock, device, servo = store.clock.seconds, rig.device, rig.servo
     journal = WatchedJournal(store, progress_of(opened(store.lines, store.key)), clock)
@@ -95,6 +97,7 @@ def open_windows(
         start=start,
         exclude=_excluder(chosen),
         reconnect=rig.reconnect,
+        videos=videos,
         aim_m=_aim(hand, servo),
         point_to=getattr(device, "point_to", None) if described.pointer else None,
         press=getattr(device, "press", None) if described.pointer else None,

@@ -35,6 +35,8 @@ from study_app.gui.participant.tank.frame import (
 )
 from study_app.gui.participant.tank.onset_patch import OnsetPatch
 from study_app.gui.participant.tank.photodiode_patch import paint_patch, patch_place
+from study_app.gui.participant.tank.target_marks import paint_marks
+from study_app.gui.participant.tank.video_layer import VideoLayer, video_place
 from study_app.gui.theme.theme import TANK
 from study_app.protocol.model import Explore, Follow, Reach
 from study_app.session.pages import TaskPage
@@ -105,6 +107,7 @@ class TankWidget(QWidget):
         self._box = Box.around(page.workspace_m, page.body_radius_m)
         self._captions = Captions(page, words, text_scale)
         self.patch = OnsetPatch()
+        self.video = VideoLayer()
         self.view: TankView | None = None
         self._unpainted = False
         self._showing = False
@@ -156,6 +159,7 @@ class TankWidget(QWidget):
         if self.view is not None:  # the ball stays where it is until the next view
             self.view = replace(self.view, task=track(page.task).now(), ball_hidden=False)
         self._unpainted = False
+        self.video.show(None)
         self.things = self._frame()
         self._announce()
         if self._pane is None:
@@ -180,6 +184,7 @@ class TankWidget(QWidget):
         self._unpainted = True
         x, y, z = (float(value) for value in view.position_m)
         self.patch.follow((x, y, z), view.sample_time_ns)
+        self.video.show(view.video)
         self._ready()
         things = self._frame()
         changed = changes(self.things, things) + ALWAYS
@@ -241,10 +246,14 @@ class TankWidget(QWidget):
 
     def _paint(self, painter: QPainter, region: QRegion) -> None:
         still = self._ready()
-        painter.drawImage(QPointF(0, 0), still.back)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        self._paint_things(painter, region)
-        if region.intersects(still.front_at.toAlignedRect()):
+        if self._page.video:
+            self.video.paint(painter, region)
+        else:
+            painter.drawImage(QPointF(0, 0), still.back)
+        if self._page.overlay:
+            self._paint_things(painter, region)
+        if not self._page.video and region.intersects(still.front_at.toAlignedRect()):
             painter.drawImage(still.front_at.topLeft(), still.front)
         self._captions.draw(painter, region, self._task, self._hint())
         self._paint_patch(painter, region)
@@ -286,6 +295,7 @@ class TankWidget(QWidget):
         if self.controls is not None:
             self.controls.place(self._captions)
         self.placer = BallPlacer(self.camera, self._box, self._page.body_radius_m)
+        self.video.place = video_place(self.camera, self._box)
         for step in range(DEPTH_STEPS):
             radius, haze = self.placer.size(step)
             sprites.ball(radius, ratio, haze)
@@ -319,6 +329,8 @@ class TankWidget(QWidget):
             self.ball = self.placer.place((x, y, z))
             things |= ball_things(self.ball)
         things |= self._captions.things(task, self._hint())
+        if self._page.video:
+            things["video"] = self.video.thing
         if self._photodiode:
             things["patch"] = Placed(self.patch.lit, self.patch_area())
         return things
@@ -328,7 +340,7 @@ class TankWidget(QWidget):
         lit = self._task.lit if self._task else None
         for index, target in enumerate(self.targets):
             if region.intersects(target.marks.toAlignedRect()):
-                self._paint_marks(painter, target, is_lit=index == lit)
+                paint_marks(painter, target, self._stroke, is_lit=index == lit)
         ratio = self.devicePixelRatioF()
         ball = self.ball
         if ball is not None and region.intersects(self.things["shadow"].place.toAlignedRect()):
@@ -345,24 +357,6 @@ class TankWidget(QWidget):
                 self._paint_target(painter, target, is_lit=index == lit)
         if ball is not None and not drawn:
             self._paint_ball(painter, region, ball)
-
-    def _paint_marks(self, painter: QPainter, target: TargetPlace, *, is_lit: bool) -> None:
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        ink = QColor(TANK.lit if is_lit else TANK.dim)
-        ink.setAlphaF(0.62 if is_lit else 0.55)
-        if is_lit:
-            painter.setPen(QPen(ink, self._stroke * 0.36))
-            painter.drawPolygon(target.circle)
-            return
-        thin = self._stroke * 0.3
-        points = target.diamond.toList()
-        for start, end in zip(points, points[1:] + points[:1], strict=True):
-            along = end - start
-            painter.setPen(sprites.dashes(ink, thin, (along.x() ** 2 + along.y() ** 2) ** 0.5, 4))
-            painter.drawLine(start, end)
-        ink.setAlphaF(0.45)
-        painter.setPen(QPen(ink, self._stroke * 0.3, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-        painter.drawPoints(target.feet)
 
     def _paint_target(self, painter: QPainter, target: TargetPlace, *, is_lit: bool) -> None:
         ratio = self.devicePixelRatioF()

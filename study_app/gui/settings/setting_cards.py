@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QButtonGroup, QFileDialog, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QFileDialog,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
 
 from study_app.devices.registry import list_devices, title_of
 from study_app.gui.display.screens import ScreenShown
@@ -15,6 +24,7 @@ from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice, Radio, Toggle
 from study_app.gui.widgets.labels import Elided, label
 from study_app.store.workstation import DISTANCE_MM, LEAST_X_HEIGHT_DEG, WIDTH_MM, MachineSettings
+from study_app.video.camera import USUAL
 
 SAMPLE = "I think this feels like interacting with a liquid."
 MOST_SAMPLE = 2.4
@@ -228,9 +238,18 @@ class SessionsCard(Card):
             row.addWidget(field, 1)
             row.addWidget(button)
             self.column.addLayout(row)
+        self.camera = QLineEdit()
+        self.camera.setFont(font("body"))
+        self.camera.setMinimumHeight(40)
+        self.camera.setPlaceholderText(USUAL)
+        self.camera.setAccessibleName("Camera of conditions that show one")
+        self.camera.editingFinished.connect(lambda: self.changed.emit("camera", self.camera.text().strip()))
+        self.column.addWidget(_named("Camera of conditions that show one", self.camera))
+        self.column.addWidget(self.camera)
 
     def show_settings(self, settings: MachineSettings, folder: str) -> None:
         """Show what is set; ``folder`` is the workspace."""
+        self.camera.setText(settings.camera)
         self.device.setCurrentIndex(self.device.findData(settings.device.partition(":")[0]))
         self.folder.show_text(folder)
 

@@ -37,7 +37,7 @@ def page(state: SessionState) -> Page:
     match state.phase:
         case Phase.TASK | Phase.RESTING:
             made = replace(_task_page(state, state.trial), task=state.task, interval=_interval(state))
-            return replace(made, adjusts=state.adjusts and state.phase is Phase.TASK)
+            return made if state.phase is Phase.RESTING else _presenting(state, made)
         case Phase.ANSWERING:
             return _answer_page(state)
         case Phase.FEEDBACK:
@@ -93,16 +93,32 @@ def _task_page(state: SessionState, trial: Trial) -> TaskPage:
     protocol = state.plan.protocol
     block = protocol.blocks[trial.block]
     task = protocol.tasks[block.task]
-    drawn = state.plan.condition(trial) if block.design is None else protocol.conditions_in(block.id)[0]
     return TaskPage(
         trial=trial.number,
         instruction=_words(state).follow_target if task.instruction is None else _text(state, task.instruction),
         task=task,
         workspace_m=protocol.device.workspace_m,
-        body_radius_m=protocol.scene_for(drawn).body.diameter_m / 2 / protocol.scene.scale,
+        body_radius_m=protocol.scene_for(_drawn_condition(state, trial)).body.diameter_m / 2 / protocol.scene.scale,
         progress=_progress(state, trial),
         question=_setting_question(state, block),
     )
+
+
+def _drawn_condition(state: SessionState, trial: Trial) -> str:
+    """Return the condition whose ball a trial draws."""
+    protocol = state.plan.protocol
+    designed = protocol.blocks[trial.block].design is not None
+    return protocol.conditions_in(trial.block)[0] if designed else state.plan.condition(trial)
+
+
+def _presenting(state: SessionState, made: TaskPage) -> TaskPage:
+    """Return a page of a task with what is seen in what the trial, or its interval, presents."""
+    named = _drawn_condition(state, state.trial)
+    if state.due is not None:
+        named = state.due.intervals[state.interval - 1].condition
+    condition = state.plan.protocol.conditions[named]
+    shown = condition.overlay == "shown"
+    return replace(made, adjusts=state.adjusts, video=condition.shows_video, overlay=shown)
 
 
 def _setting_question(state: SessionState, block: Block) -> str:

@@ -338,6 +338,10 @@ def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_pat
     liquid = shipped_file("demo").read_text().split("[liquids.thick]")[1].split("\n\n")[0]
     (elsewhere / "syrup.toml").write_text(f"[liquids.syrup]{liquid}\n")
     text = designer.file.read_text().replace(f"[liquids.thick]{liquid}", '[liquids.thick]\nfile = "syrup.toml"')
+    text = text.replace("format = 1", "format = 2", 1)
+    text = text.replace("[conditions.thick]\n", '[conditions.thick]\nview = "sea/waves.mp4"\n')
+    (elsewhere / "sea").mkdir()
+    (elsewhere / "sea" / "waves.mp4").write_bytes(b"copied, not decoded")
     (elsewhere / "kitchen.toml").write_text(text)
     designer.controller.open(str(elsewhere / "kitchen.toml"))
     assert designer.editing.opened.study.faults == ()
@@ -345,6 +349,7 @@ def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_pat
     designer.saving.save()
     assert designer.editing.opened.file.exists()
     assert (designer.file.parent / "syrup.toml").read_bytes() == (elsewhere / "syrup.toml").read_bytes()
+    assert (designer.file.parent / "sea" / "waves.mp4").read_bytes() == b"copied, not decoded"
     designer.controller.open("kitchen")
     again = DesignerController(designer.results)
     again.open("mine")

@@ -22,7 +22,7 @@ class Tape:
     def append(self, samples: Any) -> None:
         self.told.append(samples)
 
-    def frame(self, painted_ns: int, sample_ns: int) -> None:
+    def frame(self, painted_ns: int, sample_ns: int, _video: Any = None) -> None:
         self.told.append(("frame", painted_ns, sample_ns))
 
     def stop(self) -> None:

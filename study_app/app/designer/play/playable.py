@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path as Folder
 from typing import Any, Final
 
 from study_app.app.designer.participant.shown_step import StepPosition, step_name
@@ -38,6 +39,8 @@ class Playable:
     ----------
     source : bytes
         The study's source.
+    folder : Path
+        Where its footage is.
     protocol : Protocol
         What it says.
     step : int
@@ -49,6 +52,7 @@ class Playable:
     """
 
     source: bytes = field(repr=False)
+    folder: Folder
     protocol: Protocol = field(repr=False)
     step: int
     words: str
@@ -96,6 +100,7 @@ def playable(study: Study, path: Path, position: StepPosition | None = None) -> 
     step = _step_at(shown, position) if position.name else first_step(shown, path)
     return Playable(
         with_liquid_files(found.text.encode(), found.folder),
+        found.folder,
         found.protocol,
         step,
         step_words(shown, shown.schedule.steps[step], language),

@@ -252,7 +252,7 @@ def _prepared(pilot: _Pilot) -> tuple[_Pilot, NewSession | StudyError]:
         session = begin_at(pilot.folder / "results" / study.name, found.protocol, found.source, start, found.step)
         options = descriptor_of(pilot.device).window_values(settings_here()[0].device_options)
         choices = resumed(session, protocol=str(file), device=pilot.device, windowed=True, device_options=options)
-        return pilot, replace(choices, played=True)
+        return pilot, replace(choices, played=True, footage=found.folder)
     except StudyError as error:
         return pilot, error
 

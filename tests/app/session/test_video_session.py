@@ -1,0 +1,126 @@
+"""A session in windows whose conditions show footage: what is kept of it, and what does not tell a condition."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app import app
+from study_app.app.session.bridge import SessionBridge
+from study_app.errors import DeviceError, SessionError
+from study_app.store.blinded.blinding import read_key
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.recording_files import read_frames
+from study_app.store.verification.verify_study import verify
+from tests.app.people import Person, events, receipt_of, rows
+from tests.compiled import needs_servo
+
+pytest.importorskip("av", reason="the optional extra video is not installed")
+
+from tests.video.clips import RATE_HZ, write_clip
+
+pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp", "nobody_stays", "quick_preflight")]
+
+NAME = "zanzibar.mp4"
+
+
+@pytest.fixture
+def study(short_demo: str) -> Path:
+    """Return a short demo in format 2 whose condition ``thick`` shows footage."""
+    path = Path(short_demo)
+    text = path.read_text().replace("format = 1", "format = 2", 1)
+    head = '[conditions.thick]\nliquid = "thick"\n'
+    assert head in text
+    path.write_text(text.replace(head, f'{head}view = "{NAME}"\n'))
+    return path
+
+
+@pytest.fixture
+def run(study: Path, results: Path) -> Callable[[], int]:
+    def begin() -> int:
+        person = Person()
+        try:
+            return app.run(
+                str(study), participant="P001", seed=5, device="scripted", windowed=True, operator="AK", results=results
+            )
+        finally:
+            person.deleteLater()
+
+    return begin
+
+
+def test_footage_is_shown_recorded_and_sealed(study: Path, run: Any, results: Path) -> None:
+    write_clip(study.parent / NAME, frames=20, size=(320, 180))
+    assert run() == 0
+    ended = events(results)
+    assert ended[-1]["status"] == "completed"
+    digest = hashlib.sha256((study.parent / NAME).read_bytes()).hexdigest()
+    assert receipt_of(results)["video"] == {"footage_sha256": [digest]}
+    assert "video_frames" not in rows(results, "trials")[0]
+    assert len({len(event["sealed"]) for event in ended if event["event"] == "trial_ended"}) == 1
+    texts = [path for path in results.rglob("*") if path.is_file() and path.suffix not in {".parquet", ".sealed"}]
+    assert not [path for path in texts if NAME.encode() in path.read_bytes()]
+    key = read_key(results)
+    assert not verify(results).errors
+    unblind(results, by="AK", reason="a test")
+    shown = {row["trial"]: row["video_frames"] for row in rows(results, "trials")}
+    thick = {row["trial"] for row in rows(results, "trials") if key.condition(row["block"], row["code"]) == "thick"}
+    assert {trial for trial, frames in shown.items() if frames != "n/a"} == thick
+    for row in rows(results, "trials"):
+        recorded = read_frames(results / "data" / "sub-P001" / "ses-01" / row["recording_frames"])
+        if row["trial"] not in thick:
+            assert set(recorded["video_frame"]) == {-1}
+            continue
+        assert row["video_age_mean_ms"] == "0.0"
+        assert set(recorded["video_age_ns"][recorded["video_frame"] >= 0]) == {0}
+        assert recorded["video_frame"].max() >= 3
+        period_ns = 1e9 / RATE_HZ
+        recorded = recorded[recorded["video_frame"] >= 0]
+        times, numbers = recorded["video_ns"] - recorded["video_ns"].min(), recorded["video_frame"]
+        assert abs(times - numbers * period_ns).max() < 2 * period_ns  # before the first frame it does not run
+
+
+def test_footage_that_cannot_be_read_is_refused_and_nothing_is_created(study: Path, run: Any, results: Path) -> None:
+    (study.parent / NAME).write_bytes(b"no video")
+    with pytest.raises(SessionError, match=rf"video: .*{NAME} cannot be shown"):
+        run()
+    assert not results.exists()
+    command = [sys.executable, "-m", "study_app", "check", str(study)]
+    checked = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (checked.returncode, checked.stdout) == (2, "")
+    (line,) = checked.stderr.splitlines()
+    assert f"{NAME} cannot be shown" in line
+
+
+def test_a_source_that_fails_in_a_trial_ends_in_zero_force(
+    study: Path, run: Any, results: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    write_clip(study.parent / NAME, frames=20, size=(320, 180))
+    forces: list[bool] = []
+    fail = SessionBridge.fail
+
+    def failed(bridge: SessionBridge, error: BaseException) -> None:
+        fail(bridge, error)
+        forces.append(bridge.parts.servo.force_is_on)
+        bridge.leave_now()
+
+    monkeypatch.setattr(SessionBridge, "fail", failed)
+    monkeypatch.setattr("study_app.video.footage.Footage.frame_at", _lost)
+    with pytest.raises(Exception, match="the session was stopped: the file is gone"):
+        run()
+    assert forces[0] is False
+    assert "broke" in {event["event"] for event in events(results)}
+    assert json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())["status"] == "unfinished"
+    assert "the file is gone" in caplog.text
+    caplog.clear()
+
+
+def _lost(*_: Any) -> Any:
+    raise DeviceError("the file is gone")

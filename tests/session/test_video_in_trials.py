@@ -1,0 +1,145 @@
+"""A video in a trial: the delay asked for holds for it too; late and lost frames are counted, ages recorded."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from study_app.errors import DeviceError
+from study_app.haptics.model.scene import Scene
+from study_app.protocol.trials.stimuli import Stimulated
+from study_app.protocol.trials.tasks.explore import Explore
+from study_app.session.transitions.commands import StartTrial
+from study_app.session.trial import SETTLED_S, RunningTrial
+from study_app.session.trial_recording import Recording
+from study_app.video.frames import VideoFrame
+from study_app.video.statistics import VideoStatistics
+from tests.session.fakes import FakeServo
+
+TASK = Explore(kind="explore", instruction="Move", min_s=1, max_s=60)
+DELAY_S = 0.1
+PERIOD_NS = 33_000_000
+
+
+def frame(number: int, due_ns: int, age_ns: int | None = None) -> VideoFrame:
+    return VideoFrame(number, 2, 2, 8, bytes(16), due_ns, age_ns, PERIOD_NS)
+
+
+class FakeVideo:
+    """A camera whose frame ``n`` was ready n periods after 0."""
+
+    def __init__(self) -> None:
+        self.calls: list[Any] = []
+
+    def rewind(self) -> None:
+        self.calls.append("rewind")
+
+    def begin(self, at_ns: int) -> None:
+        self.calls.append(("begin", at_ns))
+
+    def fit(self, width: int, height: int) -> None:
+        """Do nothing."""
+
+    def frame_at(self, moment_ns: int) -> VideoFrame | None:
+        self.calls.append(moment_ns)
+        number = moment_ns // PERIOD_NS
+        return frame(number, number * PERIOD_NS, 7_000_000)
+
+
+class Recorded:
+    def __init__(self) -> None:
+        self.frames: list[Any] = []
+
+    def start(self, *_: Any) -> None:
+        """Do nothing."""
+
+    def append(self, samples: Any) -> None:
+        """Do nothing."""
+
+    def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
+        self.frames.append((painted_ns, sample_ns, video))
+
+    def stop(self) -> None:
+        """Do nothing."""
+
+
+def begun(video: Any, recorder: Recorded) -> tuple[RunningTrial, FakeServo]:
+    servo = FakeServo([])
+    servo.run(0.5)
+    reader = servo.telemetry.reader()
+    trial = RunningTrial(
+        StartTrial(1, 1, TASK, Stimulated("seen"), DELAY_S, DELAY_S),
+        Scene(),
+        late_s=0.05,
+        servo=servo,
+        reader=reader,
+        recording=Recording(recorder, servo.rate_hz),
+        paints=False,
+        video=video,
+        videos=True,
+    )
+    reader.read()
+    return trial, servo
+
+
+def test_the_video_is_as_late_as_the_ball_and_both_are_recorded() -> None:
+    video, recorder = FakeVideo(), Recorded()
+    trial, servo = begun(video, recorder)
+    assert video.calls == ["rewind"]
+    view = trial.view(servo.now_ns())
+    asked_ns = servo.now_ns() - round((DELAY_S + SETTLED_S) * 1e9)
+    assert video.calls[-1] == asked_ns
+    assert abs(view.sample_time_ns - asked_ns) <= 1_000_000
+    trial.frame(servo.now_ns() + 5, view.sample_time_ns)
+    assert video.calls[-1] == ("begin", servo.now_ns() + 5)
+    assert recorder.frames == [(servo.now_ns() + 5, view.sample_time_ns, view.video)]
+    for _ in range(30):
+        servo.run(0.016)
+        view = trial.view(servo.now_ns())
+        trial.frame(servo.now_ns(), view.sample_time_ns)
+    columns = trial.summary()
+    assert columns["video_frames"] == 15
+    assert (columns["video_frames_late"], columns["video_frames_lost"]) == (0, 0)
+    assert 0 <= columns["video_delay_error_max_ms"] <= 1e-6 * PERIOD_NS
+    assert columns["video_age_mean_ms"] == 7.0
+
+
+def test_a_trial_without_a_video_has_no_numbers_of_one() -> None:
+    trial, servo = begun(None, Recorded())
+    view = trial.view(servo.now_ns())
+    trial.frame(servo.now_ns(), view.sample_time_ns)
+    assert view.video is None
+    assert {trial.summary()[name] for name in VideoStatistics().columns()} == {None}
+
+
+def test_a_camera_that_stops_stops_the_trial() -> None:
+    class Stopped(FakeVideo):
+        def frame_at(self, moment_ns: int) -> VideoFrame | None:
+            raise DeviceError("the camera stopped")
+
+    trial, servo = begun(Stopped(), Recorded())
+    with pytest.raises(DeviceError, match="the camera stopped"):
+        trial.view(servo.now_ns())
+
+
+def test_late_and_lost_frames_are_counted_once_each() -> None:
+    counted = VideoStatistics()
+    delay_ns = round(DELAY_S * 1e9)
+    painted = (  # number, how late beyond the delay [ns]
+        (3, 0),
+        (3, 16_000_000),
+        (4, PERIOD_NS),
+        (7, PERIOD_NS + 1),  # 5 and 6 were lost, and this one is late
+        (8, 2 * PERIOD_NS),
+        (8, 3 * PERIOD_NS),
+    )
+    for number, late_ns in painted:
+        counted.frame(number * PERIOD_NS + delay_ns + late_ns, frame(number, number * PERIOD_NS), DELAY_S)
+    assert counted.columns() == {
+        "video_frames": 4,
+        "video_frames_late": 2,
+        "video_frames_lost": 2,
+        "video_delay_error_max_ms": 66.0,
+        "video_age_mean_ms": None,
+    }
