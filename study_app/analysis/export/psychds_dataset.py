@@ -21,6 +21,8 @@ from study_app.store.tables.column import Column
 FOLDER: Final = "psych-ds"
 KEYWORDS: Final = ("haptics", "psychophysics", "liquids", "Likert scale")
 SCRIPT: Final = "report.R"
+CONTEXT: Final = "https://schema.org/"
+VARIABLES: Final = "variableMeasured"
 CREDITS: Final = {"authors": "author", "license": "license", "citation": "citation", "funder": "funder", "url": "url"}
 """Keys of ``[study.credits]``, and the properties of schema.org that say the same."""
 
@@ -34,8 +36,11 @@ def dataset_files(
     copies of the tables among them.
     """
     shown = {name: content for name, content in report.items() if name not in tables and name != SCRIPT}
+    description = _description(study, columns)
     files = {
-        "dataset_description.json": _json(_description(study, columns)),
+        "dataset_description.json": _json(description),
+        "data/file_metadata.json": _json({key: description[key] for key in description if key != VARIABLES}),
+        **{f"data/{PurePosixPath(name).stem}.json": _sidecar(name, columns[name]) for name in tables},
         "README.md": _readme(study, tables, report),
         "CHANGES.md": f"# Changes\n\n- {study.version}: exported by liquid-study {__version__}\n".encode(),
         ".psychds-ignore": b".psychds-ignore\n",
@@ -48,6 +53,12 @@ def dataset_files(
         **{f"materials/{name}": content for name, content in _own_files(study)},
     }
     return {f"{FOLDER}/{name}": content for name, content in files.items()}
+
+
+def _sidecar(name: str, columns: tuple[Column, ...]) -> bytes:
+    """Return what describes the columns of one table alone."""
+    head = {"@context": CONTEXT, "@type": "Dataset", "name": PurePosixPath(name).stem}
+    return _json({**head, VARIABLES: [variable(column) for column in columns]})
 
 
 def _own_files(study: Study) -> Iterator[tuple[str, bytes]]:
@@ -79,7 +90,7 @@ def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dic
     head = study.protocol.get("study", {})
     description = head.get("description") or study.title
     return {
-        "@context": "https://schema.org/",
+        "@context": CONTEXT,
         "@type": "Dataset",
         "name": study.name,
         "alternateName": study.title,
@@ -88,7 +99,7 @@ def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dic
         else str(description).strip(),
         "version": study.version,
         "keywords": [*KEYWORDS, *(["simulated"] if study.simulated else [])],
-        "variableMeasured": [variable(column) for column in every.values()],
+        VARIABLES: [variable(column) for column in every.values()],
         **{CREDITS[name]: value for name, value in _credits(study).items()},
     }
 

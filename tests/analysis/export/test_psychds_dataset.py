@@ -72,6 +72,15 @@ def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path
     assert (folder / "materials" / "kitchen.toml").is_file()
     described = json.loads((folder / "dataset_description.json").read_bytes())
     assert {name for one in described["variableMeasured"] for name in one} <= OF_SCHEMA_ORG
+    tables = sorted((folder / "data").glob("*.csv"))
+    assert tables
+    for table in tables:
+        sidecar = json.loads(table.with_suffix(".json").read_bytes())
+        header = table.read_text(encoding="utf-8").splitlines()[0].split(",")
+        assert [one["name"] for one in sidecar["variableMeasured"]] == header
+        assert {name for one in sidecar["variableMeasured"] for name in one} <= OF_SCHEMA_ORG
+    of_folder = json.loads((folder / "data" / "file_metadata.json").read_bytes())
+    assert of_folder == {name: value for name, value in described.items() if name != "variableMeasured"}
     assert described["author"] == ["A. Kox", "B. Lam"]
     assert described["license"] == "CC-BY-4.0"
     assert described["citation"] == "Kox and Lam (2026)"

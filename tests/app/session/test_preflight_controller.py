@@ -114,7 +114,7 @@ def test_a_device_that_is_lost_meanwhile_is_told_once(asked: Preflight, machine:
 def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, monkeypatch: Any) -> None:
     begun, waited = threading.Event(), []
 
-    def slow(_machine: Any, _chosen: Any, *, sleep: Any) -> Facts:
+    def slow(_machine: Any, _chosen: Any, _videos: Any, *, sleep: Any) -> Facts:
         begun.set()
         waited.append(sleep(60.0))
         return FACTS
