@@ -16,4 +16,4 @@ The packages, from the inside out; each imports only those named before it (a te
 ``cli``         the commands
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

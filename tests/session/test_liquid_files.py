@@ -34,7 +34,7 @@ from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
-EARLIER = Path(__file__).parents[1] / "store" / "earlier_format"
+EARLIER = Path(__file__).parents[1] / "store" / "releases" / "0.1"
 THICK = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]\n'
 SYRUP = """format = 1
 
@@ -96,7 +96,7 @@ def test_the_key_of_an_earlier_study_is_drawn_again_but_for_smoothing_times_that
     protocol = load(EARLIER / "rek2024.toml")
     open_or_draw_key(tmp_path, protocol, stream(1, "blinding").random)
     drawn, earlier = (
-        json.loads(base64.b64decode(StudyFolder(folder).key.read_bytes())) for folder in (tmp_path, EARLIER / "results")
+        json.loads(base64.b64decode(StudyFolder(folder).key.read_bytes())) for folder in (tmp_path, EARLIER / "rek2024")
     )
     for key in (drawn, earlier):
         for liquid in key["tables"]["liquids"].values():

@@ -19,14 +19,14 @@ from tests.compiled import needs_servo
 
 pytestmark = pytest.mark.slow
 
-HELD = Path(__file__).parent / "earlier_format"
+HELD = Path(__file__).parent / "releases" / "0.1"
 ENDED = "data/sub-P001/ses-01"
 KILLED = "data/sub-P002/ses-01"
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return Path(shutil.copytree(HELD / "results", tmp_path_factory.mktemp("earlier") / "study"))
+    return Path(shutil.copytree(HELD / "rek2024", tmp_path_factory.mktemp("earlier") / "study"))
 
 
 def warned(study: Path) -> str:

@@ -1,0 +1,90 @@
+"""Results of every released version are read by this one; tests/store/releases/record.py records those of a new one."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from study_app import __version__
+from study_app.analysis.export.export import export
+from study_app.analysis.report.write_report import report
+from study_app.evaluation.replay import replay
+from study_app.session.simulated import rehearsal
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+
+pytestmark = pytest.mark.slow
+
+RELEASES = Path(__file__).parent / "releases"
+ROOT = Path(__file__).parents[2]
+STUDIES = [
+    (path.parent.name, study)
+    for path in sorted(RELEASES.glob("*/expected.json"))
+    for study in json.loads(path.read_text())
+]
+
+
+@pytest.fixture(params=STUDIES, ids="-".join)
+def held(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, dict[str, tuple[str, int]]]:
+    """Return a copy of a recorded study, and status and number of answers of each participant."""
+    version, study = request.param
+    expected = json.loads((RELEASES / version / "expected.json").read_text())[study]
+    return Path(shutil.copytree(RELEASES / version / study, tmp_path / study)), expected
+
+
+def test_every_released_version_is_recorded() -> None:
+    log = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    released = {version.rpartition(".")[0] for version in re.findall(r"^## \[(\d+\.\d+\.\d+)\]", log, re.MULTILINE)}
+    assert __version__.rpartition(".")[0] in released
+    assert {version for version, _ in STUDIES} == released
+
+
+def test_it_is_sound_but_for_what_is_unfinished(held: tuple[Path, dict[str, tuple[str, int]]]) -> None:
+    folder, expected = held
+    found = verify(folder)
+    assert found.errors == ()
+    said = "\n".join(map(str, found.warnings))
+    for participant, (status, _) in expected.items():
+        assert (f"sub-{participant}/ses-01: is unfinished" in said) == (status == "unfinished")
+
+
+def test_every_answer_is_exported_and_the_report_is_whole(
+    held: tuple[Path, dict[str, tuple[str, int]]], tmp_path: Path
+) -> None:
+    folder, expected = held
+    unblind(folder, by="AB", reason="a test")
+    written = export(folder, tmp_path / "tables")
+    (table,) = [path for path in written if path.name.endswith("responses_data.csv")]
+    counts = pd.read_csv(table, dtype=str).groupby("participant").size()
+    assert {name: int(counts.get(name, 0)) for name in expected} == {
+        name: count for name, (_, count) in expected.items()
+    }
+    failed: list[str] = []
+    assert report(folder, tmp_path / "report", failed=failed.append)[0].name == "report.html"
+    assert failed == []
+
+
+@needs_servo
+def test_its_recordings_give_the_same_forces(tmp_path: Path) -> None:
+    folder = StudyFolder(Path(shutil.copytree(RELEASES / "0.2" / "demo", tmp_path / "demo")))
+    found = replay(folder.session("P001", 1).path)
+    assert (found.recordings, found.differences, found.uncompared) == (4, (), ())
+
+
+@needs_servo
+def test_an_unfinished_session_is_resumed_to_its_end(tmp_path: Path) -> None:
+    folder = StudyFolder(Path(shutil.copytree(RELEASES / "0.2" / "demo", tmp_path / "demo")))
+    session = folder.session("P002", 1)
+    before = session.journal.read_bytes()
+    rehearsal.resume(session.path, protocol=RELEASES / "0.2" / "demo.toml")
+    assert session.journal.read_bytes().startswith(before)
+    assert journal.read(session.journal)[-1]["status"] == "completed"
+    assert verify(folder.path).errors == ()
