@@ -1,0 +1,91 @@
+"""The files for people who join or cite the project name what exists, and agree with the package."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app import __version__
+
+yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
+
+ROOT = Path(__file__).resolve().parent.parent
+DECISIONS = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+PAGES = [ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", ROOT / "docs" / "install.md", *DECISIONS]
+FOLDERS = ("study_app/", "tests/", "docs/", "protocols/", "packaging/", ".ci/", ".github/", "results/")
+
+
+def named(text: str) -> Iterator[str]:
+    """Yield the paths in a text that must exist: those in backticks and those that links lead to."""
+    for path in re.findall(r"`([^`\s]+)`", text):
+        if path.startswith(FOLDERS) and "NAME" not in path:
+            yield path
+    for _, path in re.findall(r"\[([^\]]+)\]\((?!https?:)([^)#]+)", text):
+        yield path
+
+
+def read_yaml(path: Path) -> Any:
+    return yaml.safe_load(path.read_text("utf-8"))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_path_that_a_page_names_exists(page: Path) -> None:
+    text = page.read_text("utf-8")
+    missing = [path for path in named(text) if not ((page.parent / path).exists() or (ROOT / path).exists())]
+    assert missing == []
+
+
+def test_changelog_and_citation_name_the_version_of_the_package() -> None:
+    log = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    releases = re.findall(r"^## \[(\d+\.\d+\.\d+)\] - (\d{4}-\d\d-\d\d)$", log, re.MULTILINE)
+    citation = read_yaml(ROOT / "CITATION.cff")
+    assert releases[0] == (__version__, citation["date-released"])
+    assert citation["version"] == __version__
+    assert releases == sorted(releases, reverse=True)
+    kinds = set(re.findall(r"^### (.+)$", log, re.MULTILINE))
+    assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+
+
+def test_the_citation_is_valid() -> None:
+    pytest.importorskip("cffconvert", reason="cffconvert is not installed")
+    from cffconvert import Citation
+
+    Citation((ROOT / "CITATION.cff").read_text("utf-8")).validate()
+
+
+def test_decisions_are_numbered_and_have_their_parts() -> None:
+    assert [int(path.name[:4]) for path in DECISIONS] == list(range(1, len(DECISIONS) + 1))
+    for number, path in enumerate(DECISIONS, start=1):
+        lines = path.read_text("utf-8").splitlines()
+        assert lines[0].startswith(f"# {number}. "), path.name
+        assert re.fullmatch(r"Date: \d{4}-\d\d-\d\d\. Status: (accepted|superseded by \d{4})\.", lines[2]), path.name
+        assert [line for line in lines if line.startswith("## ")] == ["## Context", "## Decision", "## Consequences"]
+
+
+def test_the_matrix_is_the_supported_pythons_on_three_systems() -> None:
+    matrix = read_yaml(ROOT / ".github" / "workflows" / "check.yml")["jobs"]["tests"]["strategy"]["matrix"]
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        wanted = tomllib.load(file)["project"]["requires-python"]
+    first, end = (int(minor) for minor in re.fullmatch(r">=3\.(\d+),<3\.(\d+)", wanted).groups())  # type: ignore[union-attr]
+    assert matrix["python"] == [f"3.{minor}" for minor in range(first, end)]
+    assert [system.split("-")[0] for system in matrix["system"]] == ["ubuntu", "windows", "macos"]
+
+
+def test_workflows_and_templates_can_be_read() -> None:
+    files = [*(ROOT / ".github").rglob("*.yml"), ROOT / ".pre-commit-config.yaml"]
+    assert len(files) >= 5
+    for path in files:
+        assert json.dumps(read_yaml(path), default=str)
+
+
+def test_pre_commit_runs_the_linters_of_the_check() -> None:
+    entries = [hook["entry"] for hook in read_yaml(ROOT / ".pre-commit-config.yaml")["repos"][0]["hooks"]]
+    check = (ROOT / ".ci" / "run").read_text("utf-8")
+    for entry in entries:
+        assert f".venv/bin/{entry.split(' --')[0]}" in check
