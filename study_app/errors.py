@@ -12,14 +12,17 @@
     ├── OutletError            a stream or port to another program that cannot be used
     ├── StoreError             results that cannot be written or read
     ├── AnalysisError          results that cannot be evaluated
+    ├── MissingExtra           what was asked for needs libraries that were not installed
     ├── WorkerError            a process that computes for this program ended unexpectedly
     └── DisplayError           no screen to open a window on
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 
 class StudyError(Exception):
@@ -100,6 +103,29 @@ class StoreError(StudyError):
 
 class AnalysisError(StudyError):
     """Results cannot be evaluated."""
+
+
+class MissingExtra(StudyError):
+    """What was asked for needs libraries that were not installed."""
+
+
+ANALYSIS_LIBRARIES: Final = frozenset({"fontTools", "jinja2", "markupsafe", "matplotlib", "pandas", "scipy"})
+"""What the extra ``analysis`` installs: a computer that only runs sessions does without."""
+
+
+@contextmanager
+def naming_the_extra() -> Iterator[None]:
+    """Raise `MissingExtra` where a library of the extra ``analysis`` is imported and is not installed."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        library = (error.name or "").partition(".")[0]
+        if library not in ANALYSIS_LIBRARIES:
+            raise
+        raise MissingExtra(
+            f"this needs {library}, which is not installed on this computer: run pip install 'liquid-study[analysis]', "
+            "or copy the results folder to a computer that has it"
+        ) from error
 
 
 class WorkerError(StudyError):

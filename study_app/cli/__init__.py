@@ -17,7 +17,7 @@ from study_app.cli import data, identify, listing, model, outlets, power, screen
 from study_app.cli.devices import devices, emulate_falcon
 from study_app.cli.evidence import accuracy, cfd, soak, stability, thresholds, timing
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands
-from study_app.errors import StudyError
+from study_app.errors import StudyError, naming_the_extra
 
 
 @click.group(cls=GroupedCommands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -71,7 +71,8 @@ def main() -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # a pipe or an old console may lack a letter of a study's title
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        code = commands.main(standalone_mode=False)
+        with naming_the_extra():
+            code = commands.main(standalone_mode=False)
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "liquid-study"
         click.echo(f"{command}: {error.format_message()} (see {command} --help)", err=True)

@@ -13,7 +13,7 @@ from typing import Any, Final, TypeAlias
 
 import psutil
 
-from study_app.errors import StudyError
+from study_app.errors import StudyError, naming_the_extra
 from study_app.workers.messages import Refused, Stopped
 from study_app.workers.spawning import ignore_interrupts
 
@@ -47,14 +47,17 @@ def serve(orders: Connection, answers: Connection, task: str, *, background: boo
     waiting: SimpleQueue[Any] = SimpleQueue()
     # Orders are read at once: a full pipe would make the client's window wait.
     threading.Thread(target=_read, args=(orders, waiting), name="orders", daemon=True).start()
-    carry_out: Task = resolve_name(task)
+    with suppress(ModuleNotFoundError):  # then the first order says so
+        resolve_name(task)
     with suppress(BrokenPipeError, ConnectionResetError):
         while (received := waiting.get()) is not _END:
             if received is _STOP:
                 continue  # the order that it was about has come to its end
             number, order = received
             try:
-                last = carry_out(order, partial(_tell, answers, number), lambda: not waiting.empty())
+                with naming_the_extra():
+                    carry_out: Task = resolve_name(task)
+                    last = carry_out(order, partial(_tell, answers, number), lambda: not waiting.empty())
             except StudyError as error:
                 last = Refused(str(error), stopped=isinstance(error, Stopped))
             answers.send((number, last, True))

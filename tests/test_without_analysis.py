@@ -1,0 +1,148 @@
+"""Sessions run where the extra ``analysis`` is not installed; what needs it says so in one line."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+from study_app.errors import ANALYSIS_LIBRARIES, MissingExtra, naming_the_extra
+from tests.compiled import needs_servo
+
+ROOT = Path(__file__).resolve().parent.parent
+
+BLOCK = f"import sys\nsys.modules.update(dict.fromkeys({sorted(ANALYSIS_LIBRARIES)}))\n"
+"""None among the modules: an import of it, or of a part of it, fails as that of a missing library."""
+
+PLACES = """
+import sys
+from pathlib import Path
+from PySide6.QtCore import QTimer
+from study_app.app.main_controller import home
+
+def visit_all(visit):
+    def step():
+        if visit.desk is not None and visit.desk.view.trouble is not None:
+            print(visit.desk.view.trouble)
+            visit.window.close()
+    for place in ("designer", "lab", "devices", "machine", "home", "results"):
+        visit.window.go(place)
+        assert visit.window.here == place, place
+    visit.timer = QTimer(interval=20)
+    visit.timer.timeout.connect(step)
+    visit.timer.start()
+
+sys.exit(home(Path(sys.argv[1]), then=visit_all))
+"""
+
+SESSION = """
+import sys
+from pathlib import Path
+from PySide6.QtCore import QEventLoop, QTimer
+from study_app.app.session.garbage_collection import collecting_here
+from study_app.app.session.live_session import LiveSession
+from study_app.gui.application import application_here
+from study_app.gui.theme.theme import LIGHT
+from study_app.session.request import NewSession
+
+application_here()
+live = LiveSession(NewSession("demo", "P001", 1, 1, "", "en", "scripted", True, None, Path(sys.argv[1])), LIGHT)
+loop = QEventLoop()
+live.over.connect(loop.quit)
+timer = QTimer(interval=20)
+
+def look():
+    if live.bridge is not None:
+        print("windows opened")
+        timer.stop()
+        QTimer.singleShot(1500, live.bridge.leave_now)
+
+timer.timeout.connect(look)
+timer.start()
+with collecting_here():
+    QTimer.singleShot(0, live.open)
+    loop.exec()
+    live.wait()
+if live.error:
+    raise live.error
+sys.exit(live.code)
+"""
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> dict[str, str]:
+    """Return the environment of processes, also of those that they start, without the libraries."""
+    (tmp_path / "blocked").mkdir()
+    (tmp_path / "blocked" / "sitecustomize.py").write_text(BLOCK)
+    path = os.pathsep.join([str(tmp_path / "blocked"), str(ROOT)])
+    own = {"LIQUID_STUDY_WORKSPACE": str(tmp_path), "LIQUID_STUDY_CONFIG": str(tmp_path / "settings")}
+    return os.environ | own | {"PYTHONPATH": path, "QT_QPA_PLATFORM": "offscreen"}
+
+
+def run(environment: dict[str, str], *words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "study_app", *words]
+    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == code, done.stderr
+    return done
+
+
+@pytest.mark.slow
+@needs_servo
+def test_a_study_is_rehearsed_verified_and_replayed_without_them(environment: dict[str, str], tmp_path: Path) -> None:
+    assert "62 per participant" in run(environment, "check", "rek2024").stdout
+    study = tmp_path / "demo"
+    run(environment, "rehearse", "demo", "--participants", "1", "--results", str(study))
+    assert run(environment, "verify", str(study)).stdout.endswith("1 session: sound\n")
+    session = str(study / "data" / "sub-P001" / "ses-01")
+    assert "all compared forces are equal" in run(environment, "replay", session).stdout
+    assert "reproduced" in run(environment, "reproduce", session).stdout
+    assert "demo" in run(environment, "studies").stdout
+    for words in (("export", str(study), "--to", "x"), ("report", str(study), "--to", "x"), ("power", "rek2024")):
+        failed = run(environment, *words, code=2).stderr
+        assert failed.startswith("liquid-study: this needs ")
+        assert failed.count("\n") == 1
+        assert "pip install 'liquid-study[analysis]'" in failed
+
+
+@pytest.mark.slow
+@needs_servo
+def test_a_session_opens_its_windows_without_them(environment: dict[str, str], tmp_path: Path) -> None:
+    command = [sys.executable, "-c", SESSION, str(tmp_path / "results")]
+    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "windows opened\n"), done.stderr
+    assert (tmp_path / "results" / "data" / "sub-P001" / "ses-01" / "journal.jsonl").is_file()
+
+
+@pytest.mark.slow
+@needs_servo
+def test_every_place_opens_without_them_and_results_says_what_to_install(
+    environment: dict[str, str], tmp_path: Path
+) -> None:
+    shutil.copytree(ROOT / "tests" / "store" / "releases" / "0.1" / "rek2024", tmp_path / "results" / "rek2024")
+    command = [sys.executable, "-c", PLACES, str(tmp_path / "results")]
+    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False, timeout=150)
+    assert done.returncode == 0, done.stderr
+    assert "pip install 'liquid-study[analysis]'" in done.stdout
+
+
+def test_another_missing_module_stays_the_bug_that_it_is() -> None:
+    with pytest.raises(ModuleNotFoundError, match="numpy_x"), naming_the_extra():
+        raise ModuleNotFoundError("No module named 'numpy_x'", name="numpy_x")
+    with pytest.raises(MissingExtra, match="needs scipy"), naming_the_extra():
+        raise ModuleNotFoundError("No module named 'scipy.stats'", name="scipy.stats")
+
+
+def test_the_extra_is_what_is_blocked_here_and_no_dependency() -> None:
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        project = tomllib.load(file)["project"]
+    extra = {Requirement(line).name.lower() for line in project["optional-dependencies"]["analysis"]}
+    assert extra == {library.lower() for library in ANALYSIS_LIBRARIES}
+    assert not extra & {Requirement(line).name.lower() for line in project["dependencies"]}
+    for name in ("test", "cfd", "spss"):
+        assert "liquid-study[analysis]" in project["optional-dependencies"][name]
