@@ -88,6 +88,7 @@ class LiveSession(QObject):
     over = Signal()
     _ready = Signal(object)
     _said = Signal(str)
+    _compiled = Signal(float)
 
     def __init__(
         self, chosen: NewSession, theme: Theme, tell: Callable[[str], object] | None = None, *, asks: bool = False
@@ -115,6 +116,7 @@ class LiveSession(QObject):
         self._opening: threading.Thread | None = None
         self._ready.connect(self._begin, Qt.ConnectionType.QueuedConnection)
         self._said.connect(self._say, Qt.ConnectionType.QueuedConnection)
+        self._compiled.connect(self._show_compiled, Qt.ConnectionType.QueuedConnection)
 
     def open(self) -> None:
         """Show the note, and make device and servo ready; a mistake ends in order, with ``over``."""
@@ -164,14 +166,19 @@ class LiveSession(QObject):
         videos: Videos | None = None
         try:
             load_windows()
+            from study_app.haptics.runtime.compile_progress import (  # noqa: PLC0415 - the compiler: only in this thread
+                following_compilation,
+            )
+
             study = self.chosen.read_protocol()
             check(self.chosen, study)
             settings = study_settings(study, self.chosen.tremor(), self.chosen.device_options)
-            rig = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
-            outlets = None if self.chosen.played else open_outlets(self.settings, rig.servo, study.study.blinding)
-            videos = videos_of(self.chosen, study, self.settings.camera, rig)
-            facts = measured(rig, self.chosen, videos, sleep=self._ending.wait)
-            made: object = Ready(rig, facts, outlets=outlets, videos=videos)
+            with following_compilation(self._compiled.emit):
+                rig = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
+                outlets = None if self.chosen.played else open_outlets(self.settings, rig.servo, study.study.blinding)
+                videos = videos_of(self.chosen, study, self.settings.camera, rig)
+                facts = measured(rig, self.chosen, videos, sleep=self._ending.wait)
+                made: object = Ready(rig, facts, outlets=outlets, videos=videos)
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
             if outlets is not None:
@@ -282,6 +289,11 @@ class LiveSession(QObject):
             return
         held = not device.simulated
         diagnosis(self.bridge.operator, self.bridge.operator.theme, name, self.settings, held=held).show()
+
+    def _show_compiled(self, share: float) -> None:
+        """Show how far the compiler is."""
+        if self.note is not None:
+            self.note.show_compiled(share)
 
     def _say(self, line: str) -> None:
         """Tell what the device asks for while it is being opened."""

@@ -39,7 +39,7 @@ class OpeningWindow(QWidget):
         self.lasted = figures("", "label", "text2")
         self.cancel = ActionButton("", "Cancel")
         self.cancel.clicked.connect(self.close)
-        bar = QProgressBar()
+        bar = self._bar = QProgressBar()
         bar.setRange(0, 0)
         bar.setTextVisible(False)
         bar.setFixedHeight(8)
@@ -75,6 +75,13 @@ class OpeningWindow(QWidget):
         self.lasted.setText(minutes(seconds))
         if seconds > LONG_AFTER_S and not self._said:
             self.step.setText(FIRST_TIME)
+
+    def show_compiled(self, share: float) -> None:
+        """Show that the force model is compiled, and the share done (0 to 1)."""
+        if not self._said:
+            self.step.setText(FIRST_TIME)
+        self._bar.setRange(0, 100)
+        self._bar.setValue(round(100 * share))
 
     def say(self, line: str) -> None:
         """Show what the device asks for, from now on instead of what goes on."""

@@ -2,7 +2,8 @@
 
 numba keys its on-disk cache on the file of the outermost function alone, so a change in a function it calls would go
 unseen. The cache therefore lives in a folder named after a digest of every source file that may hold kernels; those of
-other sources go when they are old.
+other sources go when they are old. Within it a function is found by its place in the package, so that the package's
+folder may move. A program that ships with a filled cache (see docs/install.md) begins with a copy of it.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core.caching import UserProvidedCacheLocator
 from numba.core.options import DefaultOptions
 from platformdirs import user_cache_path
 
@@ -27,6 +29,8 @@ log = logging.getLogger(__name__)
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 _KERNEL_FOLDERS = ("haptics", "devices", "evaluation", "validation")
+SHIPPED_CACHE = _PACKAGE / "compiled"
+"""Caches that came with the program; only the bundle has them."""
 
 KEPT_FOLDERS = 8  # of caches so many stay however old they are
 UNUSED_S = 86_400.0  # no program that runs since less than a day loses its cache
@@ -58,6 +62,7 @@ def _use_own_cache() -> Path | None:
     ]
     digest = _digest_of_sources()
     for place in wanted:
+        copy_shipped(place / digest)
         if _writable(place / digest):
             if place is not wanted[0]:
                 log.warning("%s cannot be written: compiled code is stored in %s", wanted[0], place)
@@ -69,6 +74,20 @@ def _use_own_cache() -> Path | None:
         "%s cannot be written: every start compiles again, for up to a minute; name a folder in NUMBA_CACHE_DIR", places
     )
     return None
+
+
+def copy_shipped(own: Path) -> None:
+    """Begin an own cache that is not there yet with the one of the same sources that came with the program, if any."""
+    shipped = SHIPPED_CACHE / own.name
+    if own.exists() or not shipped.is_dir():
+        return
+    making = own.with_name(f".{own.name}.{secrets.token_hex(4)}.gone")  # swept should the program be killed here
+    with contextlib.suppress(OSError):
+        try:
+            shutil.copytree(shipped, making, copy_function=shutil.copyfile)
+            making.rename(own)
+        finally:
+            shutil.rmtree(making, ignore_errors=True)
 
 
 def _writable(folder: Path) -> bool:
@@ -112,6 +131,35 @@ def remove_cache(path: Path, used_at: float) -> None:
 CACHE: Path | None = _use_own_cache()
 """Where what is compiled is kept; None where nothing can be."""
 _OPTIONS["cache"] = CACHE is not None
+
+
+class PackageCacheLocator(UserProvidedCacheLocator):
+    """Finds compiled functions of this package by the sources' digest and their place in the package.
+
+    numba would look under the absolute path of their file, and in a frozen program under the bytes of its executable.
+    """
+
+    def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
+        super().__init__(py_func, py_file)  # type: ignore[no-untyped-call]
+        self._cache_path = str(Path(str(CACHE), *Path(py_file).resolve().relative_to(_PACKAGE).parent.parts))
+
+    def get_source_stamp(self) -> str:
+        """Return the digest: the folder's name."""
+        return Path(str(CACHE)).name
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> PackageCacheLocator | None:
+        """Return the locator of a function, or None where its file is not covered by the digest."""
+        file = Path(py_file).resolve()
+        if not file.is_relative_to(_PACKAGE) or file.relative_to(_PACKAGE).parts[0] not in _KERNEL_FOLDERS:
+            return None
+        found = super().from_function(py_func, py_file)  # type: ignore[no-untyped-call]
+        return cast("PackageCacheLocator | None", found)
+
+
+if CACHE is not None:  # numba of before 0.61.1 ignores it, and compiles again where the package's folder has moved
+    _LOCATORS = (f"{__name__}.{PackageCacheLocator.__name__}", "UserProvidedCacheLocator", "IPythonCacheLocator")
+    vars(numba.config)["CACHE_LOCATOR_CLASSES"] = ",".join(_LOCATORS)
 
 
 def kernel(function: F) -> F:

@@ -1,4 +1,5 @@
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -171,3 +172,73 @@ def test_where_nothing_can_be_kept_the_program_works_and_says_what_to_do(tmp_pat
 @about_user_cache
 def test_nobody_hears_of_a_cache_that_works(tmp_path: Path) -> None:
     assert said_at_start(tmp_path, {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": str(tmp_path)})[1] == ""
+
+
+PACKAGE = Path(__file__).parents[3] / "study_app"
+ADDS = """
+from study_app.haptics.kernels import compiled, vector
+import numpy as np
+vector.norm(np.zeros(3))
+hits = sum(vector.norm.stats.cache_hits.values())
+print(compiled.CACHE, hits)
+"""
+
+
+def started(package: Path, variables: dict[str, str]) -> tuple[Path, int]:
+    """Run a copy of the package that computes a length; return its cache and the number of functions found there."""
+    environment = os.environ | {"PYTHONPATH": str(package.parent), "PYTHONSAFEPATH": "1"} | variables
+    done = subprocess.run(
+        [sys.executable, "-c", ADDS], env=environment, capture_output=True, text=True, check=False, cwd=package.parent
+    )
+    assert done.returncode == 0, done.stderr
+    cache, hits = done.stdout.rsplit(maxsplit=1)
+    return Path(cache), int(hits)
+
+
+def copy_of_package(to: Path) -> Path:
+    shutil.copytree(PACKAGE, to / "study_app", ignore=shutil.ignore_patterns("__pycache__", "gui", "analysis", "app"))
+    return to / "study_app"
+
+
+@about_compiled_code
+def test_a_package_that_moved_finds_what_it_compiled(tmp_path: Path) -> None:
+    own = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    first, second = copy_of_package(tmp_path / "a"), copy_of_package(tmp_path / "b")
+    made, hits = started(first, own)
+    assert hits == 0
+    assert started(second, own) == (made, 1)
+
+
+@about_compiled_code
+def test_a_cache_that_came_with_the_program_is_begun_with_unless_it_is_for_another_processor(tmp_path: Path) -> None:
+    package = copy_of_package(tmp_path / "a")
+    generic = {"NUMBA_CPU_NAME": "generic"}
+    made, hits = started(package, generic | {"NUMBA_CACHE_DIR": str(tmp_path / "made")})
+    assert hits == 0
+    shutil.copytree(made, package / "compiled" / made.name)
+    fresh = {"NUMBA_CACHE_DIR": str(tmp_path / "fresh")}
+    assert started(package, generic | fresh) == (tmp_path / "fresh" / made.name, 1)
+    other = fresh | {"NUMBA_CPU_NAME": "x86-64-v2"}
+    assert started(package, other)[1] == 0
+    assert started(package, other)[1] == 1
+    assert started(package, generic | fresh)[1] == 1
+
+
+def test_a_shipped_cache_is_copied_once_and_a_torn_copy_is_swept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = tmp_path / "cache" / ("a" * 16)
+    shipped = tmp_path / "shipped"
+    (shipped / own.name / "haptics").mkdir(parents=True)
+    (shipped / own.name / "haptics" / "tick.nbi").write_bytes(b"x")
+    monkeypatch.setattr(compiled, "SHIPPED_CACHE", shipped)
+    own.parent.mkdir()
+    with monkeypatch.context() as disk_full:
+        disk_full.setattr(shutil, "copytree", lambda *_a, **_n: (_ for _ in ()).throw(OSError("full")))
+        compiled.copy_shipped(own)
+    assert list(own.parent.iterdir()) == []
+    compiled.copy_shipped(own)
+    assert [path.name for path in own.parent.iterdir()] == [own.name]
+    (own / "haptics" / "tick.nbi").write_bytes(b"mine")
+    compiled.copy_shipped(own)
+    assert (own / "haptics" / "tick.nbi").read_bytes() == b"mine"

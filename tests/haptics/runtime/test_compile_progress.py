@@ -1,0 +1,61 @@
+"""The share of the force model that is compiled is said while it is; nothing where all is stored."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from study_app.haptics.kernels.compiled import workings
+from study_app.haptics.runtime.compile_progress import EXPECTED, following_compilation
+from tests.compiled import needs_servo
+
+pytestmark = needs_servo
+
+ROOT = Path(__file__).parents[3]
+OPENED = """
+from random import Random
+from study_app.devices.rig import open_rig, study_settings
+from study_app.haptics.runtime.compile_progress import following_compilation
+from study_app.protocol.load import load
+
+shares = []
+with following_compilation(shares.append) as counter:
+    open_rig("scripted", study_settings(load("demo"), Random(1))).stop()
+assert shares == sorted(shares)
+print(counter.compiled)
+"""
+
+
+def test_each_compiled_function_is_counted_and_a_stored_one_is_not() -> None:
+    @workings
+    def inner(x):
+        return x + 1
+
+    @workings
+    def outer(x):
+        return inner(x) * 2
+
+    shares: list[float] = []
+    with following_compilation(shares.append) as counter:
+        assert outer(3) == 8
+        assert outer(4) == 10
+    assert counter.compiled == 2
+    assert shares == [1 / EXPECTED, 2 / EXPECTED]
+    with following_compilation(shares.append):
+        outer(5)
+    assert len(shares) == 2
+
+
+@pytest.mark.nightly
+def test_opening_the_first_session_compiles_about_what_is_expected_and_the_second_nothing(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", OPENED]
+    own = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_CPU_NAME": "generic"}
+    first, second = (
+        int(subprocess.run(command, env=own, cwd=ROOT, capture_output=True, text=True, check=True).stdout) for _ in "12"
+    )
+    assert 0.85 * EXPECTED <= first <= 1.1 * EXPECTED
+    assert second == 0
