@@ -35,6 +35,7 @@ CELL_PADDING, MARGIN = 6, 28
 WIDEST_TEXT = 860  # px: longer lines are hard to read
 HEADING_SIZES = {1: 26, 2: 20, 3: 16, 4: 15}  # px
 CODE_SIZE = 14  # px
+PICTURE = "\N{OBJECT REPLACEMENT CHARACTER}"
 CODE = (QTextFormat.Property.BlockCodeFence, QTextFormat.Property.BlockCodeLanguage)
 
 
@@ -152,7 +153,8 @@ class PageReader(Themed, QTextBrowser):
             elif not in_table:
                 shape.setTopMargin(6)
                 shape.setBottomMargin(4)
-                shape.setLineHeight(125, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
+                if PICTURE not in block.text():
+                    shape.setLineHeight(125, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
             cursor.setBlockFormat(shape)
             self._colour_links(block)
             block = block.next()
