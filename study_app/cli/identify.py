@@ -123,6 +123,7 @@ def estimate(
     from study_app.haptics.model.overrides import override_all
     from study_app.lab.estimation.estimator import OnlineEstimator
     from study_app.lab.estimation.growing_csv import GrowingCsv
+    from study_app.lab.estimation.liquid_model import prepare
     from study_app.lab.estimation.lsl_stream import LslForce
     from study_app.protocol.load import load_scene
 
@@ -132,6 +133,7 @@ def estimate(
     fitted = tuple(name.strip() for name in names.split(","))
     estimator = OnlineEstimator(chosen, fitted, memory_s=memory_s)
     source = LslForce(stream or "") if measured is None else GrowingCsv(measured)
+    prepare()
     rows, computing_s, shown_s, came_s = 0, 0.0, None, time.monotonic()
     while time.monotonic() - came_s <= idle_s or rows == 0:
         found = source.poll()

@@ -28,6 +28,12 @@ _DRAG_ALONE: Final = {"drag", "wake", "local_wake", "current", "surface"}
 """Effects without a force besides drag."""
 
 
+def prepare() -> None:
+    """Compile what follows a motion, or load it from the cache."""
+    nowhere = np.zeros((1, 3))
+    ModelAlong(Scene(), given=True).follow(np.zeros(1), nowhere, nowhere)
+
+
 def refusal(scene: Scene, names: tuple[str, ...]) -> str:
     """Return why parameters of a scene cannot be estimated, "" where they can."""
     if len(scene.liquids) != 1:
