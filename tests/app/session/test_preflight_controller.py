@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.app.session import preflight_controller
 from study_app.app.session.preflight_controller import Appraisal, Preflight
@@ -20,6 +20,7 @@ from study_app.evaluation.appraisal_worker import Question
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.telemetry import Timing
+from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load
 from study_app.protocol.trials.tasks.explore import Explore
 from study_app.protocol.trials.tasks.reach import Reach
@@ -127,6 +128,32 @@ def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, m
     asked.close()
     assert not measuring.is_alive()
     assert waited == [True]
+
+
+class ConnectedLater:
+    """Outlets with one stream, to which a recording program is connected when a test says so."""
+
+    listens = False
+
+    def statuses(self) -> tuple[OutletStatus, ...]:
+        return (OutletStatus("LSL markers", listens=self.listens),)
+
+
+def test_a_recording_program_that_is_connected_meanwhile_is_shown(qapp: Any, machine: Any, qtbot: Any) -> None:
+    outlets: Any = ConnectedLater()
+    screen = QGuiApplication.primaryScreen()
+    made = Preflight(CHOSEN, load("demo"), Ready(machine, FACTS, outlets=outlets), screen, "P001", LIGHT)
+    made.open()
+
+    def shown() -> list[str]:
+        return [one.text() for one in made.window.findChildren(QLabel) if one.isVisible()]
+
+    assert "no listener" in shown()
+    outlets.listens = True
+    qtbot.waitUntil(lambda: "listener" in shown())
+    assert "no listener" not in shown()
+    made.close()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_changed(

@@ -12,6 +12,7 @@ from study_app import app
 from study_app.gui.operator import OperatorWindow
 from study_app.outlets.marker import CODES
 from study_app.store import workstation
+from study_app.store.verification.verify_study import verify
 from study_app.store.workstation import MachineSettings
 from study_app.validation.outlets.localhost import localhost_only
 from tests.app.people import Person, events, receipt_of, window
@@ -60,6 +61,7 @@ def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, p
     assert came == [CODES[one["event"]] for one in lines_written if one["event"] in CODES]
     assert {CODES[event] for event in ("trial_started", "trial_ended", "responses", "session_ended")} < set(came)
     assert "outlet_lost" not in {one["event"] for one in lines_written}
+    assert verify(results).sound
     outlets = receipt_of(results)["outlets"]
     assert set(outlets) == {"LSL markers", "Serial port"}
     assert outlets["Serial port"]["codes"] == dict(CODES)
@@ -97,6 +99,7 @@ def test_a_port_that_is_unplugged_stops_no_session_and_is_said_once(short_demo, 
     assert lost[0][1].startswith(f"serial:{name} failed")
     assert any(text.startswith(f"Serial port: serial:{name} failed") for (text,) in shown[1:])
     assert sum(one["event"] == "responses" for one in lines_written) == 4
+    assert verify(results).sound
 
 
 def test_a_port_that_is_not_there_is_said_before_and_the_session_runs(short_demo, results):
