@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import tempfile
 from functools import cache
@@ -27,5 +28,6 @@ def localhost_only() -> Path:
     """
     path = Path(tempfile.gettempdir(), f"liquid-study-lsl-{os.getpid()}.cfg")
     path.write_text(_FILE.format(process=os.getpid()), encoding="utf-8")
+    atexit.register(path.unlink, missing_ok=True)
     os.environ[VARIABLE] = str(path)
     return path
