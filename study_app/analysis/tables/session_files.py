@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from study_app.analysis.results.levels import OwnDynamics
 from study_app.analysis.tables import typed_files
 from study_app.analysis.tables.asked_questions import NOTHING_ELSE, AskedQuestions, asked_questions
 from study_app.analysis.tables.compared_blocks import Block, main_blocks, spoken
@@ -111,6 +112,23 @@ def _own_dynamics(bench: Mapping[str, Any] | None) -> tuple[float, float, float]
         float(np.mean([float(value) for value in bench[name]])) for name in ("damping_nspm", "friction_n", "mass_kg")
     )
     return damping_nspm, friction_n, mass_kg
+
+
+def estimators_of(records: Sequence[Session]) -> str | None:
+    """Return the names of the velocity estimators of all sessions: "kalman", "device" or "kalman or device"."""
+    own = records[0].protocol.get("scene", {}).get("velocity", {}).get("kind")
+    measured = [one.device_velocity for one in records]
+    names = [*([] if all(measured) or own is None else [str(own)]), *(["device"] if any(measured) else [])]
+    return " or ".join(names) or None
+
+
+def mean_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
+    """Return the mean of what sessions know of the device's own dynamics; None where none knows them."""
+    known = [one.own_dynamics for one in records if one.own_dynamics is not None]
+    if not known:
+        return None
+    damping_nspm, friction_n, mass_kg = np.mean(known, axis=0).tolist()
+    return OwnDynamics(damping_nspm, friction_n, mass_kg, len(known), len(records))
 
 
 def _masking(answer: Mapping[str, Any] | None) -> str | None:

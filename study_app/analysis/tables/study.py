@@ -10,22 +10,28 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 import pandas as pd
 
 from study_app.analysis.results.levels import OwnDynamics
 from study_app.analysis.tables import measures
 from study_app.analysis.tables import planned_analysis as decided
+from study_app.analysis.tables import pooled_sites as pools
 from study_app.analysis.tables.asked_questions import NOTHING_ELSE, AskedQuestion, AskedQuestions
 from study_app.analysis.tables.compared_blocks import Block, Kind, Setting, settings_of
 from study_app.analysis.tables.excluded_rows import check_there, with_excluded
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.planned_analysis import Decided
-from study_app.analysis.tables.session_files import Session, read_session, read_tables
+from study_app.analysis.tables.session_files import (
+    Session,
+    estimators_of,
+    mean_dynamics,
+    read_session,
+    read_tables,
+)
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.forms.kinds import STATEMENT
 from study_app.store.blinded import blinding
@@ -204,14 +210,48 @@ def load_study(folder: Path) -> Study:
 
 def _load_sites(merged: Merged) -> Study:
     """Read a merged study; a site from which all participants withdrew has nothing to read."""
-    from study_app.analysis.tables.pooled_sites import pool  # noqa: PLC0415 - it makes studies
-
     places = {name: StudyFolder(merged.folder(name)) for name in merged.names}
     opened = all_opened(merged.path)
     sites = {name: _load(place.path, sealed=not opened) for name, place in places.items() if place.sessions()}
     if not sites:
         raise AnalysisError(f"{merged.path} holds no sessions: all participants of its sites withdrew")
-    return pool(merged, sites, sum(len(tombstones(place)) for place in places.values()))
+    return pooled(merged.path, sites, sum(len(tombstones(place)) for place in places.values()))
+
+
+def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
+    """Return a merged study from those of its sites, by their names; all of them are revealed, or none."""
+    studies = list(sites.values())
+    estimators = [one.estimator.split(" or ") for one in studies if one.estimator is not None]
+
+    def table(name: str) -> pd.DataFrame:
+        return pools.pooled_table({site: (one.settings, getattr(one, name)) for site, one in sites.items()})
+
+    return replace(
+        studies[0],
+        folder=folder,
+        sites=tuple(sites),
+        blocks=pools.pooled_blocks({site: one.blocks for site, one in sites.items()}),
+        levels=pools.pooled_blocks({site: one.levels for site, one in sites.items()}),
+        others=pools.pooled_questions({site: one.others for site, one in sites.items()}),
+        settings=pools.pooled_settings({site: one.settings for site, one in sites.items()}),
+        responses=table("responses"),
+        trials=table("trials"),
+        participants=table("participants"),
+        answered=table("answered"),
+        intervals=table("intervals"),
+        exclusions=tuple(
+            replace(row, participant=f"{site}{DASH}{row.participant}")
+            for site, one in sites.items()
+            for row in one.exclusions
+        ),
+        doubts=tuple(doubt for one in studies for doubt in one.doubts),
+        decided=replace(studies[0].decided, changed=any(one.decided.changed for one in studies)),
+        own_dynamics=pools.pooled_dynamics(
+            (one.own_dynamics for one in studies), sum(len(one.participants) for one in studies)
+        ),
+        estimator=" or ".join(dict.fromkeys(part for parts in estimators for part in parts)) or None,
+        withdrawn=withdrawn,
+    )
 
 
 def _load(folder: Path, *, sealed: bool = False) -> Study:
@@ -254,27 +294,10 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
         others=records[0].others,
         decided=decided.read([session.protocol.get("analysis") for session in records]),
         protocol=records[0].protocol,
-        own_dynamics=_own_dynamics(records),
-        estimator=_estimator(records),
+        own_dynamics=mean_dynamics(records),
+        estimator=estimators_of(records),
         withdrawn=len(tombstones(place)),
     )
-
-
-def _estimator(records: Sequence[Session]) -> str | None:
-    """Return the names of the velocity estimators of all sessions: "kalman", "device" or "kalman or device"."""
-    own = records[0].protocol.get("scene", {}).get("velocity", {}).get("kind")
-    measured = [one.device_velocity for one in records]
-    names = [*([] if all(measured) or own is None else [str(own)]), *(["device"] if any(measured) else [])]
-    return " or ".join(names) or None
-
-
-def _own_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
-    """Return the mean of what sessions know of the device's own dynamics; None where none knows them."""
-    known = [one.own_dynamics for one in records if one.own_dynamics is not None]
-    if not known:
-        return None
-    damping_nspm, friction_n, mass_kg = np.mean(known, axis=0).tolist()
-    return OwnDynamics(damping_nspm, friction_n, mass_kg, len(known), len(records))
 
 
 def _intervals(

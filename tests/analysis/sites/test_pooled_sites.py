@@ -19,13 +19,11 @@ from study_app.analysis.findings.factors.site_comparison import FINDING as SITES
 from study_app.analysis.report.write_report import report
 from study_app.analysis.results.levels import LevelsFound, ThresholdFound
 from study_app.analysis.tables.group_means import group_counts, group_means
-from study_app.analysis.tables.pooled_sites import pool
-from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.tables.study import Study, load_study, pooled
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude
 from study_app.store.sites.merge import merge
-from study_app.store.sites.merged import Merged
 from study_app.store.sites.unblind_sites import unblind_folder
 from study_app.store.withdrawals.withdraw import withdraw
 from tests.analysis.levels.conftest import ADAPTIVE
@@ -35,8 +33,6 @@ from tests.protocol.trials.studies import text_of_damper
 from tests.studies import made_up
 
 pytestmark = pytest.mark.slow
-
-MERGED = Merged(Path("nowhere"), "made_up", "", ())
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +168,7 @@ def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(open
 
 
 def pooled_of(first: Study, second: Study) -> Study:
-    return pool(MERGED, {"A": first, "B": second}, 0)
+    return pooled(Path("nowhere"), {"A": first, "B": second}, 0)
 
 
 def test_planted_differences_between_sites_are_found_and_nothing_else() -> None:
@@ -247,8 +243,8 @@ def test_thresholds_are_compared_between_sites_at_each_standard() -> None:
             )
         ),
     )
-    pooled = pooled_of(study(delays([0]), []), study(delays([0]), []))
-    first, second = site_thresholds(pooled, [found], 1)
+    both = pooled_of(study(delays([0]), []), study(delays([0]), []))
+    first, second = site_thresholds(both, [found], 1)
     assert (first.standard, first.sites, first.medians) == (1.0, ("A", "B"), pytest.approx((1.2, 1.25)))
     assert second.outcome.p == pytest.approx(2 / 252)
     assert first.outcome.p > 0.5
