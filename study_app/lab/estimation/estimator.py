@@ -103,7 +103,8 @@ class OnlineEstimator:
     def restart(self) -> None:
         """Forget all rows: the next one is the first of a liquid at rest."""
         self._rate_hz: float | None = None
-        self._waiting = self._kept = no_rows()
+        self._waiting = no_rows()
+        self._kept: list[Rows] = []
         self._last_s = math.nan
         self._seconds = 0.0
         self._model: LiquidModel | None = None
@@ -167,20 +168,21 @@ class OnlineEstimator:
     def _search(self, rows: Rows) -> None:
         """Keep rows, and search them now and then."""
         assert self._rate_hz is not None  # noqa: S101 - known before
-        self._kept = joined(self._kept, rows)
-        oldest = int(np.searchsorted(self._kept.t_s, self._kept.t_s[-1] - KEPT_S))
-        if oldest:
-            self._kept, self._dropped = self._kept.part(oldest), True
+        self._kept.append(rows)
         if self._seconds < LEAST_S:
             self._estimate = _waits(self._seconds)
             return
         if self._last_s - self._searched_s < SEARCH_S or (self._pending is not None and not self._pending.done()):
             return
         self._searched_s = self._last_s
+        kept = joined(*self._kept)
+        if oldest := int(np.searchsorted(kept.t_s, kept.t_s[-1] - KEPT_S)):
+            kept, self._dropped = kept.part(oldest), True
+        self._kept = [kept]
         search = WakeSearch(
             self._scene,
             self.names,
-            self._kept,
+            kept,
             self._rate_hz,
             from_rest=not self._dropped,
             memory_s=self._memory_s,

@@ -112,10 +112,10 @@ class WakeSearch:
         """Return where a step of Gauss–Newton leads, None where none is better, and whether it is a small one."""
         weights = self._counting(at.length)
         residual_n = self._flat(at.y_n - at.drag * at.g_n)
-        normal = slopes.T @ (weights[:, np.newaxis] * slopes)
+        normal = np.einsum("ni,n,nj->ij", slopes, weights, slopes)
         sizes, directions = np.linalg.eigh(normal)
         inverse = np.where(sizes > _DAMPING * sizes[-1], 1 / np.maximum(sizes, 1e-300), 0.0)
-        step = directions @ (inverse * (directions.T @ (slopes.T @ (weights * residual_n))))
+        step = directions @ (inverse * (directions.T @ np.einsum("ni,n->i", slopes, weights * residual_n)))
         by_name = dict(zip(self._names, np.clip(step, -_MOST_STEP, _MOST_STEP), strict=True))
         for _ in range(_HALVINGS):
             length = at.length * math.exp(by_name.get(LENGTH, 0.0))
@@ -151,11 +151,11 @@ class WakeSearch:
         g_n, h_n = model.follow(self._rows)
         y_n = self._rows.force_n - h_n
         weights, g, y = self._counting(length), self._flat(g_n), self._flat(y_n)
-        size = float(weights @ (g * g))
-        drag = float(weights @ (g * y)) / size if size > 0 else math.nan
+        size = _dot(weights, g, g)
+        drag = _dot(weights, g, y) / size if size > 0 else math.nan
         left = y - drag * g if size > 0 else y
         share = max(float(weights.sum()), 1e-12)  # longer wakes leave fewer rows
-        return _At(length, scaling, g_n, y_n, drag, float(weights @ (left * left)) / share)
+        return _At(length, scaling, g_n, y_n, drag, _dot(weights, left, left) / share)
 
     def _slopes(self, at: _At) -> Floats:
         """Return the derivatives (m, p) of the force by the logarithms of the parameters [N]."""
@@ -178,11 +178,11 @@ class WakeSearch:
         weights = self._counting(at.length)
         residual = self._flat(at.y_n - at.drag * at.g_n)
         share = max(float(weights.sum()), 1e-12)
-        squares = float(weights @ (residual * residual))
+        squares = _dot(weights, residual, residual)
         rows = residual.reshape(len(self._rows), -1)
         each = weights.reshape(rows.shape)
         follow = float(np.sum(np.minimum(each[1:], each[:-1]) * rows[1:] * rows[:-1]))
-        normal = slopes.T @ (weights[:, np.newaxis] * slopes)
+        normal = np.einsum("ni,n,nj->ij", slopes, weights, slopes)
         following = follow / squares if squares > 0 else 0.0
         found = information(normal, squares / share, following)
         values = {DRAG: at.drag, LENGTH: float(at.length), SCALING: at.scaling}
@@ -193,7 +193,7 @@ class WakeSearch:
             found,
             following,
             math.sqrt(squares / share * axes),
-            math.sqrt(float(weights @ (measured * measured)) / share * axes),
+            math.sqrt(_dot(weights, measured, measured) / share * axes),
             edge=LENGTH in self._names and at.length > _EDGE * min(LONGEST, self._most_ticks()),
         )
 
@@ -209,3 +209,8 @@ class WakeSearch:
     def _flat(self, vectors_n: Floats) -> Floats:
         """Return the components that count of (rows, 3) as (m,)."""
         return np.ascontiguousarray(vectors_n[:, self._axes]).ravel()
+
+
+def _dot(weights: Floats, one: Floats, other: Floats) -> float:
+    """Return Σ w a b, in one thread: a linear algebra library would take others for so little."""
+    return float(np.einsum("n,n,n->", weights, one, other))
