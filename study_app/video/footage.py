@@ -13,8 +13,8 @@ from study_app.errors import DeviceError
 from study_app.video.decoding import SECOND_NS, Scaler, make_less_urgent, open_video, period_ns, reason
 from study_app.video.frames import VideoFrame
 
-AHEAD: Final = 8
-"""Frames that wait decoded: a quarter of a second at 30 Hz, 24 MB at 1152 x 648 pixels. [choice]"""
+AHEAD: Final = 15
+"""Frames that wait decoded: half a second at 30 Hz, 45 MB at 1152 x 648 pixels. [choice]"""
 PATIENCE_S: Final = 5.0
 
 
@@ -88,6 +88,7 @@ class Footage:
             self._media_ns = max(0, moment_ns - began_ns)
             while self._frames and self._frames[0].due_ns <= self._media_ns:
                 self._shown = self._frames.popleft()
+            if len(self._frames) <= AHEAD // 2:  # seldom: the decoder contends with the painting for the interpreter
                 self._changed.notify_all()
             if self._failure and not self._frames:
                 raise DeviceError(f"{self.path} cannot be shown any further: {self._failure}")
