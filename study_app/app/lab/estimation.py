@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -52,7 +53,7 @@ class LabEstimation(QObject):
         self._loading: Future[LiveEstimation] | None = None
         self._wanted: tuple[str, str, Path | None] = (OFF, DRAG, None)
         self.estimation: LiveEstimation | None = None
-        self._trouble = ""
+        self._trouble = self._refused = ""
         self._sources = (*SOURCES, *(LSL if available() else ()))
         place.estimate_source_chosen.connect(self._choose_source)
         place.estimate_parameters_chosen.connect(self._choose_parameters)
@@ -72,14 +73,14 @@ class LabEstimation(QObject):
             self._begin()
         if self.estimation is None or self._wanted[0] == OFF:
             return
+        from study_app.lab.estimation.live_estimation import set_values  # noqa: PLC0415 - loads the compiler
+
         values = self.estimation.poll(self._lab.live, self._lab.bench)
         if self.estimation.trouble:
             self._trouble = f"{self.estimation.trouble[:1].upper()}{self.estimation.trouble[1:]}"
             self._wanted = (OFF, *self._wanted[1:])
         elif values:
-            from study_app.lab.estimation.live_estimation import set_values  # noqa: PLC0415 - loads the compiler
-
-            self._lab.feel(set_values(self._lab.bench, values, held=True))
+            self._change(lambda bench: set_values(bench, values, held=True))
 
     def close(self) -> None:
         """Estimate nothing; a search that is under way ends by itself."""
@@ -117,7 +118,7 @@ class LabEstimation(QObject):
         return replace(
             shown,
             rows=rows,
-            message=message.replace("..", "."),
+            message=f"{message.replace('..', '.')}{self._refused}",
             sound=found.identified,
             may_apply=applies and found.identified,
             may_follow=applies,
@@ -134,7 +135,7 @@ class LabEstimation(QObject):
 
     def _want(self, source: str, parameters: str, path: Path | None) -> None:
         """Estimate from a source; load what that needs in the thread first."""
-        self._wanted, self._trouble = (source, parameters, path), ""
+        self._wanted, self._trouble, self._refused = (source, parameters, path), "", ""
         if self.estimation is not None:
             self._begin()
         elif source != OFF and self._loading is None:
@@ -156,7 +157,19 @@ class LabEstimation(QObject):
     @guarded
     def _apply(self) -> None:
         if self.estimation is not None:
-            self._lab.feel(self.estimation.applied(self._lab.bench))
+            self._change(self.estimation.applied)
+
+    def _change(self, edit: Callable[[Workbench], Workbench]) -> None:
+        """Change the felt setting; where it refuses the values, say so and apply none continuously."""
+        assert self.estimation is not None  # noqa: S101 - of which the values are
+        try:
+            bench = edit(self._lab.bench)
+        except StudyError as error:
+            self.estimation.follows = False
+            self._refused = f" Not applied: {error}."
+            return
+        self._refused = ""
+        self._lab.feel(bench)
 
     @guarded
     def _follow(self, on: bool) -> None:

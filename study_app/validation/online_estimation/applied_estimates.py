@@ -48,7 +48,7 @@ from study_app.validation.stability.verdict import (
     TIRED,
 )
 
-LIQUIDS: Final = ("water", "oil", "light_oil", "honey", "dense")
+LIQUIDS: Final = ("water", "light_oil", "honey", "dense")
 MOVING_S: Final = 4.0
 LASTS_S: Final = 5.0
 FRAME_S: Final = 0.033

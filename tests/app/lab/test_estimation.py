@@ -64,3 +64,18 @@ def test_a_file_that_cannot_be_read_is_said_in_the_card(beside: LabController, q
     assert beside.view().estimate.source == "off"
     assert beside.trouble == ""
     assert beside.live is not None
+
+
+def test_a_value_that_the_setting_refuses_is_said_and_the_force_goes_on(
+    beside: LabController, qtbot: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beside.place.estimate_source_chosen.emit("other", None)
+    qtbot.waitUntil(lambda: beside.view().estimate.may_apply, timeout=OPENS_MS)
+    estimation = beside.estimation.estimation
+    assert estimation is not None
+    monkeypatch.setattr(type(estimation), "applied", lambda _self, bench: bench.change("body.drag_coefficient", -1.0))
+    beside.place.estimate_apply_asked.emit()
+    assert "Not applied: " in beside.view().estimate.message
+    assert beside.live is not None
+    assert beside.live.servo.force_is_on
+    assert drag(beside) == pytest.approx(0.47)
