@@ -119,7 +119,7 @@ class Workbench:
         return self._edited(self.felt, edited, held=key if held else None, goes_on=goes_on)
 
     def put(self, scene: Scene, key: str | None = None) -> Workbench:
-        """Return this with the felt setting as ``scene``; changes of one ``key`` after another are one step for undo.
+        """Return this with another scene selected; changes of one ``key`` after another are one step for undo.
 
         Raises
         ------

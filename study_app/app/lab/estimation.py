@@ -43,7 +43,7 @@ class LabEstimation(QObject):
     Parameters
     ----------
     place : the lab's widgets, whose requests it takes
-    lab : whose felt setting it estimates and changes
+    lab : whose selected setting it estimates and changes
     """
 
     def __init__(self, place: LabPlace, lab: Lab) -> None:
@@ -160,7 +160,7 @@ class LabEstimation(QObject):
             self._change(self.estimation.applied)
 
     def _change(self, edit: Callable[[Workbench], Workbench]) -> None:
-        """Change the felt setting; where it refuses the values, say so and apply none continuously."""
+        """Change the selected setting; where it refuses the values, say so and apply none continuously."""
         assert self.estimation is not None  # noqa: S101 - of which the values are
         try:
             bench = edit(self._lab.bench)

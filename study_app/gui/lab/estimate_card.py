@@ -69,7 +69,7 @@ class EstimateCard(ReadingCard):
         self.follow.clicked.connect(self._ask_follow)
 
     def show_view(self, view: LabView) -> None:
-        """Show the estimation of the felt setting."""
+        """Show the estimation of the selected setting."""
         shown = view.estimate
         if self.show_blind(view.workbench.blind):
             return

@@ -1,4 +1,4 @@
-"""An estimate applied to the scene that is felt: at once, or by and by, within the slope and force limits.
+"""An estimate applied to the selected scene: at once, or by and by, within the slope and force limits.
 
 With the constant law of drag, F = c w², the damping F/w that a hand meets grows up to the force limit F_max, where it
 is √(F_max c). The drag coefficient is applied up to the value at which that is the slope limit of the loop: so no

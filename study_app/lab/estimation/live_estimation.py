@@ -1,4 +1,4 @@
-"""The lab's estimation: where the force comes from, what is estimated, and what of it goes into the felt setting."""
+"""The lab's estimation: where the force comes from, what is estimated, what of it goes into the selected setting."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class LiveEstimation:
         return self._following(bench)
 
     def applied(self, bench: Workbench) -> Workbench:
-        """Return a workbench whose felt setting has the estimated values, as far as they may be applied."""
+        """Return a workbench whose selected setting has the estimated values, as far as they may be applied."""
         if self._live is None or not self.applies:
             return bench
         scene, live = bench.in_hand.scene, self._live
@@ -169,7 +169,7 @@ class LiveEstimation:
 
 
 def set_values(bench: Workbench, values: dict[str, float], *, held: bool = False) -> Workbench:
-    """Return a workbench whose felt setting has these values, by the names of the estimation.
+    """Return a workbench whose selected setting has these values, by the names of the estimation.
 
     Held, the changes since the last one that was not are one step for undo.
 

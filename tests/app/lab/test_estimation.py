@@ -17,8 +17,8 @@ pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
 
 
 @pytest.fixture
-def beside(visit: LabController, qtbot: Any) -> LabController:
-    """The lab entered, water felt beside a planted water, going in circles."""
+def lab(visit: LabController, qtbot: Any) -> LabController:
+    """The lab entered, water selected, a planted water as B, going in circles."""
     other = planted(drag=0.42, length=1700, scaling=1700)
     visit.bench = visit.bench.choose("A", "Water", WATER).choose("B", "Planted", other)
     visit.place.show()
@@ -31,51 +31,51 @@ def drag(visit: LabController) -> float:
     return float(visit.bench.setting("A").value("body.drag_coefficient"))  # type: ignore[arg-type]
 
 
-def test_an_estimate_is_shown_applied_on_a_click_and_taken_back(beside: LabController, qtbot: Any) -> None:
-    beside.place.estimate_source_chosen.emit("other", None)
-    assert beside.view().estimate.message
-    qtbot.waitUntil(lambda: beside.view().estimate.may_apply, timeout=OPENS_MS)
-    (row,) = beside.view().estimate.rows
+def test_an_estimate_is_shown_applied_on_a_click_and_taken_back(lab: LabController, qtbot: Any) -> None:
+    lab.place.estimate_source_chosen.emit("other", None)
+    assert lab.view().estimate.message
+    qtbot.waitUntil(lambda: lab.view().estimate.may_apply, timeout=OPENS_MS)
+    (row,) = lab.view().estimate.rows
     assert row.name == "Drag coefficient"
     assert 0.40 < float(row.value) < 0.44
-    assert drag(beside) == Setting("Water", WATER, WATER).value("body.drag_coefficient")
-    beside.place.estimate.apply.click()
-    assert drag(beside) == pytest.approx(0.42, rel=0.03)
-    beside.place.undo_asked.emit()
-    assert drag(beside) == pytest.approx(0.47)
+    assert drag(lab) == Setting("Water", WATER, WATER).value("body.drag_coefficient")
+    lab.place.estimate.apply.click()
+    assert drag(lab) == pytest.approx(0.42, rel=0.03)
+    lab.place.undo_asked.emit()
+    assert drag(lab) == pytest.approx(0.47)
 
 
-def test_it_follows_until_the_place_is_left(beside: LabController, qtbot: Any) -> None:
-    beside.place.estimate_source_chosen.emit("other", None)
-    qtbot.waitUntil(lambda: beside.view().estimate.may_follow, timeout=OPENS_MS)
-    beside.place.estimate_follow_asked.emit(True)
-    qtbot.waitUntil(lambda: drag(beside) == pytest.approx(0.42, rel=0.03), timeout=SOON_MS)
-    assert beside.view().estimate.follows
-    assert beside.live is not None
-    assert beside.live.shadow.differing == 0
-    beside.place.hide()
-    assert beside.estimation.estimation is None
-    assert beside.view().estimate.source == "off"
+def test_it_follows_until_the_place_is_left(lab: LabController, qtbot: Any) -> None:
+    lab.place.estimate_source_chosen.emit("other", None)
+    qtbot.waitUntil(lambda: lab.view().estimate.may_follow, timeout=OPENS_MS)
+    lab.place.estimate_follow_asked.emit(True)
+    qtbot.waitUntil(lambda: drag(lab) == pytest.approx(0.42, rel=0.03), timeout=SOON_MS)
+    assert lab.view().estimate.follows
+    assert lab.live is not None
+    assert lab.live.shadow.differing == 0
+    lab.place.hide()
+    assert lab.estimation.estimation is None
+    assert lab.view().estimate.source == "off"
 
 
-def test_a_file_that_cannot_be_read_is_said_in_the_card(beside: LabController, qtbot: Any, tmp_path: Path) -> None:
-    beside.place.estimate_source_chosen.emit("file", tmp_path / "none.csv")
-    qtbot.waitUntil(lambda: "none.csv" in beside.view().estimate.message, timeout=OPENS_MS)
-    assert beside.view().estimate.source == "off"
-    assert beside.trouble == ""
-    assert beside.live is not None
+def test_a_file_that_cannot_be_read_is_said_in_the_card(lab: LabController, qtbot: Any, tmp_path: Path) -> None:
+    lab.place.estimate_source_chosen.emit("file", tmp_path / "none.csv")
+    qtbot.waitUntil(lambda: "none.csv" in lab.view().estimate.message, timeout=OPENS_MS)
+    assert lab.view().estimate.source == "off"
+    assert lab.trouble == ""
+    assert lab.live is not None
 
 
 def test_a_value_that_the_setting_refuses_is_said_and_the_force_goes_on(
-    beside: LabController, qtbot: Any, monkeypatch: pytest.MonkeyPatch
+    lab: LabController, qtbot: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    beside.place.estimate_source_chosen.emit("other", None)
-    qtbot.waitUntil(lambda: beside.view().estimate.may_apply, timeout=OPENS_MS)
-    estimation = beside.estimation.estimation
+    lab.place.estimate_source_chosen.emit("other", None)
+    qtbot.waitUntil(lambda: lab.view().estimate.may_apply, timeout=OPENS_MS)
+    estimation = lab.estimation.estimation
     assert estimation is not None
     monkeypatch.setattr(type(estimation), "applied", lambda _self, bench: bench.change("body.drag_coefficient", -1.0))
-    beside.place.estimate_apply_asked.emit()
-    assert "Not applied: " in beside.view().estimate.message
-    assert beside.live is not None
-    assert beside.live.servo.force_is_on
-    assert drag(beside) == pytest.approx(0.47)
+    lab.place.estimate_apply_asked.emit()
+    assert "Not applied: " in lab.view().estimate.message
+    assert lab.live is not None
+    assert lab.live.servo.force_is_on
+    assert drag(lab) == pytest.approx(0.47)

@@ -33,7 +33,7 @@ def live() -> Any:
 
 
 def pair(b: Any = None) -> Workbench:
-    """Return water felt beside a planted water."""
+    """Return water selected, and a planted water as B."""
     other = planted(drag=0.42, length=1700, scaling=1700) if b is None else b
     return Workbench(Setting("water", WATER, WATER), Setting("planted", other, other))
 
