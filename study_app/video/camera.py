@@ -16,7 +16,7 @@ import numpy as np
 
 from study_app.errors import DeviceError
 from study_app.video.decoding import SECOND_NS, Scaler, make_less_urgent, open_video, period_ns, reason
-from study_app.video.frames import VideoFrame
+from study_app.video.frames import VideoFrame, stopped
 
 LIVE: Final = {"fflags": "nobuffer", "flags": "low_delay", "probesize": "65536", "analyzeduration": "0"}
 OF_DEVICE: Final = {"video_size": "1280x720", "framerate": "30"}
@@ -98,7 +98,7 @@ class Camera:
         if not failure and self._now_ns() - held[-1].due_ns > STALLS_S * SECOND_NS:
             failure = f"no picture for {STALLS_S:g} s"
         if failure:
-            raise DeviceError(f"the camera {self.source} stopped: {failure}; connect it again, then resume the session")
+            raise stopped(failure)
         return next((frame for frame in reversed(held) if frame.due_ns <= moment_ns), None)
 
     def close(self) -> None:

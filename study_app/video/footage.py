@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from study_app.errors import DeviceError
 from study_app.video.decoding import SECOND_NS, Scaler, make_less_urgent, open_video, period_ns, reason
-from study_app.video.frames import VideoFrame
+from study_app.video.frames import VideoFrame, stopped
 
 AHEAD: Final = 15
 """Frames that wait decoded: half a second at 30 Hz, 45 MB at 1152 x 648 pixels. [choice]"""
@@ -91,7 +91,7 @@ class Footage:
             if len(self._frames) <= AHEAD // 2:  # seldom: the decoder contends with the painting for the interpreter
                 self._changed.notify_all()
             if self._failure and not self._frames:
-                raise DeviceError(f"{self.path} cannot be shown any further: {self._failure}")
+                raise stopped(self._failure)
             shown = self._shown
         return None if shown is None else replace(shown, due_ns=began_ns + shown.due_ns)
 

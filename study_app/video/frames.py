@@ -5,6 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from study_app.errors import DeviceError
+
+
+def stopped(why: str) -> DeviceError:
+    """Return the error of a source that fails in a trial: it names no source, which would tell the condition."""
+    return DeviceError(f"a video of the study stopped ({why}): check camera and files, then resume the session")
+
 
 @dataclass(frozen=True, slots=True)
 class VideoFrame:

@@ -14,6 +14,7 @@ from study_app.errors import DeviceError
 
 pytest.importorskip("av", reason="the optional extra video is not installed")
 
+from study_app.video import decoding
 from study_app.video.footage import Footage
 from tests.video.clips import number_in, write_clip
 
@@ -88,6 +89,23 @@ def test_frames_are_scaled_to_the_tank_with_their_own_ratio(footage: Footage) ->
     assert frame.height == 200
     assert abs(frame.width / frame.height - SIZE[0] / SIZE[1]) < 0.01
     assert number_in(pixels_of(frame)) == 20 % FRAMES
+
+
+def test_a_file_that_fails_later_stops_without_its_name(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[Any] = []
+
+    def once(source: str) -> Any:
+        if opened:
+            raise DeviceError("it is gone")
+        opened.append(source)
+        return decoding.open_video(source)
+
+    monkeypatch.setattr("study_app.video.footage.open_video", once)
+    footage = Footage(clip)
+    footage.thread.join(10)
+    with pytest.raises(DeviceError, match=r"a video of the study stopped \(it is gone\)") as refused:
+        footage.frame_at(0)
+    assert clip.name not in str(refused.value)
 
 
 @pytest.mark.parametrize("content", [b"", b"no video at all" * 100])
