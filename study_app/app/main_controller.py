@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEventLoop, QObject, QTimer
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 
 from study_app.app.devices import DevicesController
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.session.termination import BY_SIGNAL_S, Patience, ended_from_outside
-from study_app.app.workstation import WorkstationController, theme_named
+from study_app.app.workstation import WorkstationController, screen_number, theme_named
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import place
@@ -29,6 +29,7 @@ from study_app.workspace import Workspace, chosen_workspace, offered_workspace, 
 LOOK_AFTER_MS = 300  # the window stands by then
 
 if TYPE_CHECKING:
+    from study_app.app.computer_check import ComputerCheck
     from study_app.app.designer.controller import DesignerController
     from study_app.app.designer.feeling import LabLiquids
     from study_app.app.lab.controller import LabController
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from study_app.gui.help.view import HelpPlace
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.results.view import ResultsPlace
+    from study_app.gui.settings.view import MachinePlace
     from study_app.lab.ab_comparison import Setting, Side
     from study_app.viewmodels.sessions import SessionFacts
 
@@ -83,6 +85,7 @@ class MainController(QObject):
         self._follows_machine = results is None
         self.results = results if results is not None else workspace().results
         self.question: WorkspaceDialog | None = None
+        self.check: ComputerCheck | None = None
         self.window = MainWindow(
             {
                 "home": self._home,
@@ -90,7 +93,7 @@ class MainController(QObject):
                 "results": self._results,
                 "lab": self._lab,
                 "devices": self.devices.make_place,
-                "machine": self.machine.make_place,
+                "machine": self._machine,
                 "help": self._help,
             },
             theme=theme_named(self.machine.settings.theme),
@@ -141,6 +144,22 @@ class MainController(QObject):
             self.window.tell("This folder cannot be used as the workspace", f"{error}.")
             return
         self.machine.change({"workspace": str(folder.absolute())})
+        self.check_computer()
+
+    def check_computer(self) -> None:
+        """Open the check of this computer, and measure."""
+        from study_app.app.computer_check import ComputerCheck  # noqa: PLC0415 - only where it is asked for
+
+        screens = QGuiApplication.screens()
+        participants = screens[screen_number(self.machine.settings) - 1]
+        self.check = ComputerCheck(self.window, self.window.theme, self.results, participants)
+        self.check.window.open()
+        self.check.measure()
+
+    def _machine(self) -> MachinePlace:
+        made = self.machine.make_place()
+        made.check_asked.connect(self.check_computer)
+        return made
 
     def _home(self) -> HomePlace:
         made = HomePlace(self.results)

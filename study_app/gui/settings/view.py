@@ -29,12 +29,14 @@ class MachinePlace(Place):
     """What is set, under headings.
 
     ``changed(values)`` carries new values by their names in `MachineSettings`; ``offset_measured(mean [ms], spread
-    [ms], how, screen)`` what a photodiode said of a screen; ``undo_asked`` takes the last change back.
+    [ms], how, screen)`` what a photodiode said of a screen; ``undo_asked`` takes the last change back;
+    ``check_asked`` opens the check of this computer.
     """
 
     changed = Signal(dict)
     offset_measured = Signal(float, float, str, str)
     undo_asked = Signal()
+    check_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -45,6 +47,7 @@ class MachinePlace(Place):
         self.screens, self.seen, self.offset = ScreensCard(), SeenCard(), OffsetCard()
         self.sessions, self.windows, self.outlets = SessionsCard(), WindowsCard(), OutletsCard()
         self.undo = ActionButton("undo", "Undo")
+        self.check = ActionButton("check", "Check this computer …")
         self.kept_in = Elided("label", "text2")
         self.kept_in.setFont(font("label", weight=400))
         self._lay_out()
@@ -60,6 +63,7 @@ class MachinePlace(Place):
         head.setContentsMargins(SHADOW, 0, SHADOW, 0)
         head.setSpacing(16)
         head.addLayout(titles, 1)
+        head.addWidget(self.check)
         head.addWidget(self.undo)
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(18)
@@ -101,6 +105,7 @@ class MachinePlace(Place):
         self.offset.form.kept.connect(self._measured)
         self.offset.form.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
         self.undo.clicked.connect(self.undo_asked)
+        self.check.clicked.connect(self.check_asked)
         QShortcut(QKeySequence.StandardKey.Undo, self, self.undo.click, context=Qt.ShortcutContext.WindowShortcut)
 
     def enter(self) -> None:

@@ -1,0 +1,47 @@
+"""The check of this computer, from the button to the rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication
+
+from study_app.app.main_controller import MainController
+from study_app.viewmodels.computer_check import OF_THE_COMPUTER
+from tests.compiled import needs_servo
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+
+@pytest.fixture
+def visit(qapp: Any, tmp_path: Path) -> Any:
+    made = MainController(tmp_path / "results")
+    made.window.show()
+    yield made
+    made.window.close()
+    made.end()
+    made.window.deleteLater()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+def test_the_machines_place_opens_it_and_it_measures_this_computer(visit: MainController, qtbot: Any) -> None:
+    visit.window.go("machine")
+    assert visit.machine.place is not None
+    visit.machine.place.check.click()
+    check = visit.check
+    assert check is not None
+    assert check.window.isVisible()
+    assert not check.window.back.isEnabled()
+    qtbot.waitUntil(lambda: bool(check.window.rows), timeout=120_000)
+    names = [row.check.name for row in check.window.rows]
+    assert names == [*OF_THE_COMPUTER, "Haptic devices", "Compiled code"]
+    assert check.window.state.text().endswith("of 8 passed.")
+    check.window.back.click()
+    assert not check.window.back.isEnabled()
+    check.window.go_on.click()  # while it measures
+    assert not check.window.isVisible()
+    with qtbot.waitSignal(check.destroyed, timeout=120_000):
+        pass
