@@ -1,0 +1,90 @@
+"""The bundle's own files: its start runs commands and modules, its recipe finds every library, its sizes are sums."""
+
+from __future__ import annotations
+
+import os
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app import __version__
+
+pytestmark = pytest.mark.slow
+
+PACKAGING = Path(__file__).resolve().parents[1] / "packaging"
+
+
+def started(*words: str, code: int = 0, send: bytes = b"", **variables: str) -> str:
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CPU_NAME"} | variables
+    environment |= {"PYTHONPATH": str(PACKAGING.parent)}
+    command = [sys.executable, str(PACKAGING / "start.py"), *words]
+    done = subprocess.run(command, env=environment, input=send, capture_output=True, check=False, timeout=120)
+    assert done.returncode == code, done.stderr
+    return done.stdout.decode()
+
+
+@pytest.fixture
+def bundle() -> dict[str, Any]:
+    """The functions of packaging/bundle.py."""
+    return runpy.run_path(str(PACKAGING / "bundle.py"))
+
+
+def test_its_start_is_the_commands() -> None:
+    assert started("--version").split()[-1] == __version__
+    started("check", "nothing-like-this", code=2)
+
+
+def test_its_start_runs_modules_and_code_as_python_does() -> None:
+    """The Falcon's guard is `sys.executable -P -m`, the load of a timing `-S -c`."""
+    guard = "study_app.devices.falcon.guard"
+    assert started("-P", "-m", guard, "socket:/nowhere", send=b"done\n") == "ready\n"
+    assert started("-S", "-c", "import sys; print(sys.argv[1:], __name__)", "a") == "['a'] __main__\n"
+
+
+def test_it_compiles_for_any_processor_unless_asked_otherwise() -> None:
+    code = "import numba; print(numba.config.CPU_NAME, repr(numba.config.CPU_FEATURES))"
+    assert started("-c", code) == "generic ''\n"
+    assert started("-c", code, NUMBA_CPU_NAME="host") == "None None\n"
+    assert started("-c", code, NUMBA_CPU_NAME="x86-64-v2").startswith("x86-64-v2 ")
+
+
+def test_sizes_add_up_and_the_compile_cache_is_counted_apart(bundle: dict[str, Any], tmp_path: Path) -> None:
+    files = {
+        "liquid-study": 7,
+        "_internal/libarrow.so.1": 11,
+        "_internal/pyarrow/lib.so": 13,
+        "_internal/study_app/compiled/x/a.nbc": 17,
+        "_internal/study_app/cli.py": 19,
+    }
+    for name, size in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(b"x" * size)
+    found = bundle["sizes"](tmp_path)
+    assert found == {"program": 7, "pyarrow": 24, "compile cache": 17, "study_app": 19}
+
+
+def test_only_equal_copies_of_a_library_are_dropped(bundle: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "pyarrow").mkdir()
+    for name, there, inside in (("same", b"x", b"x"), ("other", b"x", b"y")):
+        (tmp_path / name).write_bytes(there)
+        (tmp_path / "pyarrow" / name).write_bytes(inside)
+    (tmp_path / "pyarrow" / "alone").write_bytes(b"z")
+    assert bundle["drop_twins"](tmp_path) == 1
+    assert sorted(path.name for path in (tmp_path / "pyarrow").iterdir()) == ["alone", "other"]
+
+
+def test_the_recipe_names_every_library_whose_version_a_receipt_or_a_report_states() -> None:
+    from study_app.analysis.report.number_files import LIBRARIES
+
+    recipe = (PACKAGING / "liquid-study.spec").read_text("utf-8")
+    assert 'project["optional-dependencies"]["analysis"]' in recipe
+    with (PACKAGING.parent / "pyproject.toml").open("rb") as file:
+        import tomllib
+
+        project = tomllib.load(file)["project"]
+    needed = " ".join((*project["dependencies"], *project["optional-dependencies"]["analysis"])).lower()
+    assert [name for name in LIBRARIES if name.lower() not in needed] == []
