@@ -100,7 +100,7 @@ class Room:
     def stop(self):
         pass
 
-    def frame(self, painted_ns, sample_ns):
+    def frame(self, painted_ns, sample_ns, _video):
         self.frames[-1][1].append((painted_ns, sample_ns))
 
     def delay_s(self, trial):
@@ -132,6 +132,7 @@ def test_what_is_drawn_is_of_the_moment_that_was_asked_for_at_every_delay(room):
     while not room.bridge.runner.finished:
         room.servo.advance(ticks[seen % len(ticks)])
         seen += 1
+        assert not room.bridge.trouble, room.bridge.trouble
         samples.append(reader.read())
         count = len(room.frames[-1][1]) if room.frames else 0
         room.bridge.draw_frame()
