@@ -263,12 +263,13 @@ def _outlets(facts: Facts) -> Iterator[Check]:
             yield Check(one.title, "ok", "off", "in a double-blind study: whoever sees the force can tell the liquid")
         elif one.lost:
             yield Check(one.title, "warning", "not available", one.lost, "The session can run without it.")
+        elif one.shows_force:
+            advice = "A viewer of the force can tell the liquid: show the stream to no one."
+            who = "listener" if one.listens else "no listener"
+            yield Check(one.title, "warning", who, "the study is double-blind", advice)
         elif one.listens is False:
             advice = "Start the program that records it, such as LabRecorder, and select this stream."
             yield Check(one.title, "warning", "no listener", "no program receives the stream", advice)
-        elif one.shows_force:
-            advice = "A viewer of the force can tell the liquid: show the stream to no one."
-            yield Check(one.title, "warning", "listener", "the study is double-blind", advice)
         else:
             about = "open" if one.listens is None else "a program receives the stream"
             yield Check(one.title, "ok", "ready" if one.listens is None else "listener", about)

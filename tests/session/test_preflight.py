@@ -55,6 +55,7 @@ def test_where_all_is_well_nothing_is_said_but_so() -> None:
         (OutletStatus("LSL markers", listens=False), "warning", "no listener; no program receives the stream; Start"),
         (OutletStatus("LSL samples", withheld=True), "ok", "off; in a double-blind study: whoever sees the force can"),
         (OutletStatus("LSL samples", listens=True, shows_force=True), "warning", "listener; the study is double-blind"),
+        (OutletStatus("LSL samples", listens=False, shows_force=True), "warning", "no listener; the study is double-b"),
         (OutletStatus("Serial port"), "ok", "ready; open"),
         (OutletStatus("Serial port", lost="it is gone"), "warning", "not available; it is gone; The session can run"),
     ],
