@@ -66,7 +66,7 @@ class Progress:
     task took ``trial_lasted_s``, None until it ended. ``answered`` counts the responses to each trial and form, of a
     trial's last attempt; ``broken`` has for each trial done the limits that it broke: column, value and limit. ``lost``
     says why a trial's recording could not be kept, ``lacking`` how many samples it lacks; ``outlets_lost`` why an
-    outlet to other programs failed.
+    outlet to other programs failed since the session began or was resumed.
 
     ``of_intervals`` is the latest trial if it is one of intervals; ``trial_answers`` are the answers to all of them,
     ``repeated`` says of each why it was presented again, ``undelivered`` names the limits that its intervals broke, in
@@ -241,6 +241,7 @@ class Progress:
         self.resumed += 1
         self._reason = "program ended"
         self.paused, self.broke, self.trial_since_s, self.trial_lasted_s = False, "", None, None
+        self.outlets_lost = {}  # they were opened again
         self.here_since_s += gap_s
         self.away_s += gap_s
 

@@ -77,6 +77,7 @@ class SessionStore:
         self._tables = GrowingTables(lambda name: place.folder.table(place.study, name))
         self._kept: list[Kept] = []
         self._over = False
+        self._ended_s: float | None = None
         self.outlets: Outlets | None = None
         self._marked: Marker | None = None  # of the line that the disk did not accept
         self._outlets_lost: set[str] = set()  # that are journalled
@@ -172,7 +173,10 @@ class SessionStore:
             if self.recorder is not None:
                 self.recorder.close()
             self._keep_recordings()
-            self.append("session_ended", status=status, reason=reason)
+            self._ended_s = (
+                self.clock.seconds() if self._ended_s is None else self._ended_s
+            )  # the same when tried again
+            self.append("session_ended", t_s=self._ended_s, status=status, reason=reason)
             self.journal.close()
             self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1]["at"]}
         self.write_tables()

@@ -61,6 +61,19 @@ def test_a_marker_does_not_wait_for_the_disk_and_is_not_sent_again(
     assert outlets.events == ["session_started", "trial_started", "trial_started"]
 
 
+def test_an_end_that_the_disk_does_not_accept_is_marked_once(
+    store: SessionStore, outlets: Collector, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(store.journal, "append", lambda *_given, **_named: _refuse())
+        for _ in range(3):
+            with pytest.raises(StoreError):
+                store.finish("completed")
+    store.finish("completed")
+    assert outlets.events == ["session_started", "session_ended"]
+    assert journal.read(store.folder.journal)[-1]["t_s"] == round(outlets.markers[-1].t_s, 6)
+
+
 def _refuse() -> None:
     raise StoreError("the disk is full")
 
@@ -94,3 +107,16 @@ def test_a_resumed_session_begins_with_its_resumption(start: Start, protocol: Pr
         assert outlets.events == ["session_resumed"]
         receipt = json.loads(again.folder.receipt.read_text(encoding="utf-8"))
         assert receipt["resumed"][-1]["outlets"] == {"a": {}}
+
+
+def test_an_outlet_that_failed_before_a_session_was_resumed_is_lost_no_more(
+    start: Start, protocol: Protocol, outlets: Collector
+) -> None:
+    outlets.lost = {"Serial port": "it was unplugged"}
+    with start() as store:
+        store.attach(outlets)
+        store.write_tables()
+        assert progress_of(store.lines).outlets_lost == outlets.lost
+        path = store.folder.path
+    with reopen(path, protocol, SOURCE, operator="AB", device={"name": "scripted"}, screens={}) as again:
+        assert progress_of(again.lines).outlets_lost == {}
