@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import click
@@ -21,7 +20,7 @@ OFF = "off"
 def outlets(markers: str | None, samples: str | None, triggers: str | None) -> None:
     """Print what sessions on this machine send to other programs; with options, change it."""
     from study_app.errors import OutletError
-    from study_app.outlets.session_outlets import sink_kinds
+    from study_app.outlets.session_outlets import is_port, port_examples
     from study_app.store import workstation
 
     settings = workstation.load()
@@ -30,11 +29,8 @@ def outlets(markers: str | None, samples: str | None, triggers: str | None) -> N
         changes["lsl_samples"] = samples
     if triggers is not None:
         changes["triggers"] = "" if triggers == OFF else triggers
-        kind, _, place = triggers.partition(":")
-        ports = {name: one.example for name, one in sink_kinds().items() if ":" in one.example}
-        understood = kind in ports and place and re.fullmatch(workstation.TRIGGERS_PATTERN, triggers)
-        if triggers != OFF and not understood:
-            examples = " or ".join(ports.values())
+        if triggers != OFF and not is_port(triggers):
+            examples = " or ".join(port_examples())
             raise OutletError(f"--triggers '{triggers}' is not the address of a port: use one like {examples}, or off")
     if changes:
         settings = type(settings).model_validate(settings.model_dump() | changes)

@@ -90,7 +90,8 @@ class SampleStream:
     @property
     def listens(self) -> bool:
         """Whether a program receives the stream."""
-        return bool(self._outlet is not None and self._outlet.have_consumers())
+        outlet = self._outlet  # its thread may let go of it meanwhile
+        return bool(outlet is not None and outlet.have_consumers())
 
     def close(self) -> None:
         """Send what is left, and end the stream."""

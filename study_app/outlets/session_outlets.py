@@ -54,6 +54,18 @@ def sink_kinds() -> Mapping[str, SinkKind]:
     return {kind.name: kind for kind in kinds}
 
 
+def is_port(address: str) -> bool:
+    """Return whether an address is that of a port for triggers, such as ``serial:COM3``; it is not opened."""
+    name, _, place = address.partition(":")
+    kind = sink_kinds().get(name)
+    return kind is not None and ":" in kind.example and bool(place) and place.isprintable()
+
+
+def port_examples() -> tuple[str, ...]:
+    """Return an address of each kind of port for triggers."""
+    return tuple(kind.example for kind in sink_kinds().values() if is_port(kind.example))
+
+
 def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
     """Open the sink of an address, such as ``lsl`` or ``serial:/dev/ttyUSB0``.
 

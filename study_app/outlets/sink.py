@@ -22,7 +22,7 @@ PATIENCE_S: Final = 1.0
 
 
 class Sink(Protocol):
-    """A place that markers go to. All calls may wait, and come from one thread."""
+    """A place that markers go to. `send` and `close` may wait and come from one thread, the properties from others."""
 
     @property
     def title(self) -> str:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol
 
+from study_app.errors import OutletError
 from study_app.outlets.marker import CODES, Marker
 
 HIGH_S: Final = 0.010
@@ -48,6 +49,11 @@ class TriggerSink:
     now_ns : callable
         The servo's clock [ns].
 
+    Raises
+    ------
+    OutletError
+        The port does not accept a byte; it is closed then.
+
     Attributes
     ----------
     delays_ns : list of int
@@ -61,7 +67,11 @@ class TriggerSink:
         self._now_ns = now_ns
         self.delays_ns: list[int] = []
         self._clear = 0.0
-        port.write(0)
+        try:
+            port.write(0)
+        except OutletError:
+            port.close()
+            raise
 
     @property
     def title(self) -> str:

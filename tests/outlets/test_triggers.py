@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import sys
 import time
 from pathlib import Path
@@ -84,7 +85,12 @@ class TestSerial:
         for event in ("trial_started", "interval_started", "responses", "trial_ended"):
             thread.mark(marker(event=event))
         thread.close(5)
-        assert os.read(ours, 64) == bytes([0, 10, 0, 20, 0, 31, 0, 11, 0])
+        sent = bytes([0, 10, 0, 20, 0, 31, 0, 11, 0])
+        came = b""
+        while len(came) < len(sent):  # the kernel hands the last byte over a moment later
+            assert select.select([ours], [], [], 5.0)[0], came
+            came += os.read(ours, 64)
+        assert came == sent
         assert thread.lost == ""
         assert thread.sink.title == "Serial port"
         assert thread.sink.described["address"] == f"serial:{name}@9600"
@@ -172,6 +178,13 @@ def test_a_parallel_port_sets_the_lines_before_the_strobe(parport: str) -> None:
 def test_a_parallel_port_that_does_not_answer_is_named(parport: str, fails_at: int) -> None:
     with pytest.raises(OutletError, match=f"parallel:{parport} failed: No such device or address; is another"):
         ParallelPort(parport, Ioctl(fails_at)).write(1)
+
+
+def test_a_parallel_port_that_accepts_no_byte_is_released(parport: str) -> None:
+    ioctl = Ioctl(PPWDATA)
+    with pytest.raises(OutletError, match="failed: No such device"):
+        TriggerSink(ParallelPort(parport, ioctl), time.monotonic_ns)
+    assert ioctl.calls[-1] == (PPRELEASE,)
 
 
 def test_a_parallel_port_that_is_not_there_is_named() -> None:

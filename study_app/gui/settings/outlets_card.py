@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QLineEdit
 
@@ -12,7 +10,8 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import Choice, Toggle
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.store.workstation import TRIGGERS_PATTERN, MachineSettings
+from study_app.outlets.session_outlets import is_port
+from study_app.store.workstation import MachineSettings
 
 SAMPLES = (
     ("off", "Off"),
@@ -62,7 +61,7 @@ class OutletsCard(Card):
         if not self.triggers.isModified():
             return
         typed = self.triggers.text().strip()
-        understood = re.fullmatch(TRIGGERS_PATTERN, typed) is not None
+        understood = not typed or is_port(typed)
         self._say(refused=not understood)
         if understood:
             self.triggers.setModified(False)

@@ -44,7 +44,8 @@ class MarkerStream:
     @property
     def listens(self) -> bool:
         """Whether a program receives the stream."""
-        return bool(self._outlet is not None and self._outlet.have_consumers())
+        outlet = self._outlet  # its thread may let go of it meanwhile
+        return bool(outlet is not None and outlet.have_consumers())
 
     def send(self, marker: Marker) -> None:
         """Send a marker with the time of its event."""

@@ -218,7 +218,9 @@ def test_a_trigger_port_is_typed_and_what_is_none_is_refused(place, qtbot):
         type_into(qtbot, outlets.triggers, "serial:/dev/ttyUSB0")
     assert changed.args == [{"triggers": "serial:/dev/ttyUSB0"}]
     with qtbot.assertNotEmitted(place.changed):
-        type_into(qtbot, outlets.triggers, "COM3")
+        for typed in ("usb:1", "lsl:1", "serial:", "COM3"):
+            type_into(qtbot, outlets.triggers, typed)
+            assert outlets.triggers.property("state") == "refused", typed
     assert outlets.below.text().startswith("This is not the address of a port")
     assert outlets.triggers.property("state") == "refused"
     with qtbot.waitSignal(place.changed) as changed:
