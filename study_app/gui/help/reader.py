@@ -74,6 +74,7 @@ class PageReader(Themed, QTextBrowser):
         super().__init__()
         self.page = ""
         self._folder = folder
+        self._drawn: QTextDocument | None = None
         self.setAccessibleName("Page")
         self.setOpenLinks(False)
         self.setFrameShape(QTextBrowser.Shape.NoFrame)
@@ -131,7 +132,10 @@ class PageReader(Themed, QTextBrowser):
         document.setMarkdown(text_of(self.page), QTextDocument.MarkdownFeature.MarkdownDialectGitHub)
         self._style_blocks(document)
         self._style_tables(document)
-        self.setDocument(document)  # last: laid out once; deletes the one before, with its cached pictures
+        self.setDocument(document)  # last: laid out once
+        before, self._drawn = self._drawn, document
+        if before is not None:
+            before.deleteLater()  # with its cached pictures: it is this widget's, which would keep it
 
     def _style_blocks(self, document: QTextDocument) -> None:
         cursor = QTextCursor(document)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices, QFontDatabase, QTextTable
+from PySide6.QtGui import QDesktopServices, QFontDatabase, QTextDocument, QTextTable
 
 from study_app.gui.help.view import PAGE, HelpPlace
 from study_app.gui.theme.theme import DARK, LIGHT
@@ -41,6 +41,12 @@ def test_a_page_is_chosen_from_the_list_by_key_and_by_mouse(place, qtbot):
     item = place.list.item(4)
     qtbot.mouseClick(place.list.viewport(), Qt.MouseButton.LeftButton, pos=place.list.visualItemRect(item).center())
     assert place.reader.page == item.data(PAGE)
+
+
+def test_pages_shown_before_are_let_go_of_with_their_pictures(place, qtbot):
+    for name in ("first-session", "video", "triggers", "video"):
+        place.open_page(name)
+    qtbot.waitUntil(lambda: len(place.reader.findChildren(QTextDocument)) == 1)
 
 
 def test_words_leave_the_pages_that_contain_them(place, qtbot):
