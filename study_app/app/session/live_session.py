@@ -181,13 +181,8 @@ class LiveSession(QObject):
                 made: object = Ready(rig, facts, outlets=outlets, videos=videos)
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
-            if outlets is not None:
-                outlets.close()
-            if videos is not None:
-                videos.close()
-            if rig is not None:
-                with suppress(StudyError):  # what came first says why
-                    rig.stop()
+            with suppress(Exception):  # what came first says why
+                _close_all(rig, videos, outlets)
         self._ready.emit(made)
 
     def _begin(self, made: object) -> None:
@@ -374,9 +369,14 @@ class LiveSession(QObject):
         outlets, self._outlets = self._outlets, None
         crash_trace, self._crash_trace = self._crash_trace, None
         videos, self._videos = self._videos, None
-        with ExitStack() as closing:  # closes the last one first, whatever fails
-            for part in (outlets, store, crash_trace, videos):
-                if part is not None:
-                    closing.callback(part.close)
-            if rig is not None:
-                rig.stop()
+        _close_all(rig, videos, crash_trace, store, outlets)
+
+
+def _close_all(rig: Rig | None, *parts: SessionStore | CrashTrace | Outlets | Videos | None) -> None:
+    """Zero force, then close the parts in this order, even if one fails."""
+    with ExitStack() as closing:
+        for part in reversed(parts):
+            if part is not None:
+                closing.callback(part.close)
+        if rig is not None:
+            rig.stop()
