@@ -86,7 +86,7 @@ def timing(
         measure_streams(seconds, load, to)
         return
     if triggers is not None:
-        measure_triggers(triggers, seconds, to)
+        measure_triggers(triggers, seconds, load, to)
         return
     if of_devices:
         if spin_us is not None:
@@ -176,17 +176,19 @@ def measure_streams(seconds: float, load: LoadName, to: Path | None) -> None:
         click.get_current_context().exit(EXIT_FOUND)
 
 
-def measure_triggers(port: str, seconds: float, to: Path | None) -> None:
+def measure_triggers(port: str, seconds: float, load: LoadName, to: Path | None) -> None:
     """Print how long events take to their bytes on a port."""
     from study_app.store.output_files import make_folder
     from study_app.validation.outlets.outlet_report import trigger_text
     from study_app.validation.outlets.trigger_delays import measure
+    from study_app.validation.timing.machine_load import under_load
 
     check_seconds(seconds)
     if to is not None:
         make_folder(to)
+    windows = windows_thread(load) if load != "none" else None
     with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
-        found = measure(port, seconds, ending=ending, tell=show)
+        found = under_load(load, windows, lambda: measure(port, seconds, ending=ending, tell=show))
     print_and_keep(trigger_text(found), to, "triggers.txt")
     if found.wrong:
         click.get_current_context().exit(EXIT_FOUND)

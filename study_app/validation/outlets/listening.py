@@ -1,4 +1,4 @@
-"""Starts the listener and hears what it found; the stand with a servo, its streams and a listener."""
+"""The listener's process and what it received, and a stream of samples that is compared with that."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PATIENCE_S: Final = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Received:
     """What a listener received.
 
     ``samples`` counts them, ``sha256`` is that of their channels, ``worst_gap_ms`` the longest time between two.
@@ -36,7 +36,7 @@ class Heard:
 
 
 class Listener:
-    """The listener's process; `ready` waits until it receives both streams, `heard` ends it."""
+    """The listener's process; `ready` waits until it receives both streams, `end` ends it."""
 
     def __init__(self) -> None:
         self._process = subprocess.Popen(
@@ -59,7 +59,7 @@ class Listener:
         if self._process.stdout.readline() != "ready\n":
             raise WorkerError(f"the listener does not receive the streams: {self._process.communicate()[1].strip()}")
 
-    def heard(self) -> Heard:
+    def end(self) -> Received:
         """End the listener and return what it received.
 
         Raises
@@ -72,7 +72,7 @@ class Listener:
             raise WorkerError(f"the listener ended: {error.strip()}")
         found: dict[str, Any] = json.loads(said)
         markers = tuple((one["text"], one["time_ns"], one["arrived_ns"]) for one in found["markers"])
-        return Heard(found["samples"], found["sha256"], found["worst_gap_ms"], markers)
+        return Received(found["samples"], found["sha256"], found["worst_gap_ms"], markers)
 
     def kill(self) -> None:
         """End it without a result."""

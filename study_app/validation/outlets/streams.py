@@ -14,8 +14,8 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.outlets.marker import Marker, marker_of
 from study_app.outlets.session_outlets import open_sink
 from study_app.outlets.sink import SinkThread
-from study_app.validation.outlets.listening import Heard, MeasuredStream, listening
-from study_app.validation.outlets.percent import paced
+from study_app.validation.outlets.listening import MeasuredStream, Received, listening
+from study_app.validation.outlets.pacing import paced
 from study_app.validation.timing.timed_scene import FULL, PlayedHand
 
 MOST_ERROR_MS: Final = 1.0
@@ -79,11 +79,11 @@ def stream(seconds: float, *, ending: threading.Event, tell: Callable[[str], obj
                 servo.stop()
             samples.close()
             sink.close()
-            heard = listener.heard()
+            received = listener.end()
     finally:
         samples.close()
         sink.close()
-    return _found(seconds, samples, sent, heard)
+    return _found(seconds, samples, sent, received)
 
 
 def numbered(number: int, now_ns: int, origin_ns: int) -> Marker:
@@ -93,18 +93,18 @@ def numbered(number: int, now_ns: int, origin_ns: int) -> Marker:
     return marker
 
 
-def _found(seconds: float, samples: MeasuredStream, sent: list[Marker], heard: Heard) -> Streamed:
+def _found(seconds: float, samples: MeasuredStream, sent: list[Marker], received: Received) -> Streamed:
     times_ns = {marker.text: marker.time_ns for marker in sent}
-    arrived = [(time_ns - times_ns[text], at_ns - times_ns[text]) for text, time_ns, at_ns in heard.markers]
+    arrived = [(time_ns - times_ns[text], at_ns - times_ns[text]) for text, time_ns, at_ns in received.markers]
     errors_ns, took_ns = np.array(arrived, np.float64).reshape(-1, 2).T
     return Streamed(
         seconds=seconds,
         samples_sent=samples.sent,
-        samples_lost=samples.sent - heard.samples,
-        intact=heard.sha256 == samples.hashed.hexdigest() and not samples.lost,
-        worst_gap_ms=heard.worst_gap_ms,
+        samples_lost=samples.sent - received.samples,
+        intact=received.sha256 == samples.hashed.hexdigest() and not samples.lost,
+        worst_gap_ms=received.worst_gap_ms,
         markers_sent=len(sent),
-        markers_lost=len(sent) - len({json.loads(text)["trial"] for text, _, _ in heard.markers}),
+        markers_lost=len(sent) - len({json.loads(text)["trial"] for text, _, _ in received.markers}),
         errors_us=np.abs(errors_ns) * 1e-3,
         arrivals_ms=took_ns * 1e-6,
     )

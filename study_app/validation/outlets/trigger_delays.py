@@ -21,7 +21,7 @@ from study_app.outlets.marker import CODES, marker_of
 from study_app.outlets.session_outlets import open_sink
 from study_app.outlets.sink import SinkThread
 from study_app.outlets.trigger_pulse import TriggerSink
-from study_app.validation.outlets.percent import paced
+from study_app.validation.outlets.pacing import paced
 
 VIRTUAL: Final = "virtual"
 EVERY_S: Final = 0.05
