@@ -35,6 +35,7 @@ REMEMBERED_OPTIONS: Final = ("firmware",)
 """Options of devices that are settings of this computer, by name; others are asked for before each session."""
 OFFSET_MS: Final = (0.0, 500.0)
 SPREAD_MS: Final = (0.0, 200.0)
+CAMERA_LENGTH: Final = 400
 TRIGGERS_PATTERN: Final = r"^([a-z]+:[^\x00-\x1f]+)?$"
 Place = Annotated[str, Field(pattern=r"^[^\x00]+$")]
 OfAxes = Annotated[tuple[float, float, float], Field(strict=False)]
@@ -108,7 +109,7 @@ class MachineSettings(_Strict):
     theme: Literal["light", "dark"] = "light"
     sound: bool = False
     photodiode: bool = True
-    camera: Annotated[str, Field(max_length=400)] = ""
+    camera: Annotated[str, Field(max_length=CAMERA_LENGTH)] = ""
     operator: Annotated[str, Field(max_length=40)] = ""
     benches: Annotated[tuple[DeviceBench, ...], Field(strict=False)] = ()
     lsl_markers: bool = False

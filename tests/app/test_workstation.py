@@ -59,6 +59,7 @@ def test_what_is_set_is_kept_at_once_and_taken_back(desk, qtbot):
         ("lsl_markers", True, "LSL markers"),
         ("lsl_samples", "always", "LSL samples"),
         ("triggers", "serial:COM3", "trigger port"),
+        ("camera", "tcp://127.0.0.1:5000", "camera"),
     ],
 )
 def test_every_setting_of_the_page_can_be_undone(desk, name, value, called):
@@ -324,14 +325,3 @@ def test_initials_are_remembered_and_survive_a_change_taken_back(qapp):
     assert settings_here()[0].operator == "AK"
     desk.undo()
     assert (settings_here()[0].operator, settings_here()[0].sound) == ("AK", False)
-
-
-@pytest.mark.parametrize(
-    ("values", "called"),
-    [({"photodiode": False}, "photodiode square"), ({"camera": "tcp://127.0.0.1:5000"}, "camera")],
-)
-def test_photodiode_square_and_camera_are_changes_that_can_be_undone(desk, values, called):
-    desk.change(values)
-    assert desk.undo_called == called
-    desk.undo()
-    assert load() == DEFAULTS

@@ -23,7 +23,7 @@ from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
 from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice, Radio, Toggle
 from study_app.gui.widgets.labels import Elided, label
-from study_app.store.workstation import DISTANCE_MM, LEAST_X_HEIGHT_DEG, WIDTH_MM, MachineSettings
+from study_app.store.workstation import CAMERA_LENGTH, DISTANCE_MM, LEAST_X_HEIGHT_DEG, WIDTH_MM, MachineSettings
 from study_app.video.camera import USUAL
 
 SAMPLE = "I think this feels like interacting with a liquid."
@@ -241,6 +241,7 @@ class SessionsCard(Card):
         self.camera = QLineEdit()
         self.camera.setFont(font("body"))
         self.camera.setMinimumHeight(40)
+        self.camera.setMaxLength(CAMERA_LENGTH)
         self.camera.setPlaceholderText(USUAL)
         self.camera.setAccessibleName("Camera of conditions that show one")
         self.camera.editingFinished.connect(lambda: self.changed.emit("camera", self.camera.text().strip()))
