@@ -89,6 +89,10 @@ class ServoFault(StudyError):
     """The servo stopped itself and sends zero force."""
 
 
+class VideoError(StudyError):
+    """A camera or footage cannot be shown, or stopped; unlike a haptic device it is not reconnected in a session."""
+
+
 class OutletError(StudyError):
     """A stream or a port to another program cannot be used; the session goes on without it."""
 

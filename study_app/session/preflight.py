@@ -20,7 +20,7 @@ from study_app.protocol.checks.pace import beyond_slope_limit, highest_damping
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.latin_squares import enrolment
-from study_app.video.sources import Looked
+from study_app.video.sources import VideosFound
 
 if TYPE_CHECKING:
     from study_app.haptics.runtime.telemetry import Timing  # the compiler: whoever measures has loaded it
@@ -78,7 +78,7 @@ class Facts:
     delay_ticks: int = BELIEVED_TICKS
     withheld: Mapping[str, float] | None = None
     outlets: tuple[OutletStatus, ...] = ()
-    video: Looked | None = None
+    video: VideosFound | None = None
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
 

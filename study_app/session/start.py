@@ -97,7 +97,7 @@ def measured(
     """
     from study_app.session.preflight_measurements import measure  # noqa: PLC0415 - the compiler: only once it is needed
 
-    looked = None if videos is None else videos.look()
+    looked = None if videos is None else videos.open()
     facts = measure(
         rig.servo,
         chosen.results,

@@ -5,6 +5,7 @@ It is open throughout a session, so that neither its light nor its sound tells w
 
 from __future__ import annotations
 
+import re
 import sys
 import threading
 import time
@@ -14,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.errors import DeviceError
+from study_app.errors import VideoError
 from study_app.video.decoding import SECOND_NS, Scaler, make_less_urgent, open_video, period_ns, reason
 from study_app.video.frames import VideoFrame, stopped
 
@@ -26,6 +27,7 @@ OPENS_S, STALLS_S, ENDS_S = 8.0, 1.0, 5.0
 MOST_AGE_S: Final = 10.0
 """Time stamps further from both clocks of the system are not on either. [choice]"""
 SPARE_NS: Final = SECOND_NS // 2
+LOGIN: Final = re.compile(r"//[^/@]*@")
 COUNTED: Final = 30
 """So many times between frames give the period by their median."""
 
@@ -44,19 +46,18 @@ class Camera:
 
     Raises
     ------
-    DeviceError
+    VideoError
         There is no camera, or it sends no frame.
     """
 
     def __init__(self, source: str, now_ns: Callable[[], int], holds_s: float) -> None:
-        self.source = source
+        self.source = source  # may hold a name and a password: `without_login` for what is shown or kept
         if not source:
-            raise DeviceError("no camera is set: give one with --camera, such as dshow:video=NAME")
+            raise VideoError("no camera is set: set one under This machine, such as dshow:video=NAME")
         self._now_ns = now_ns
         self._holds_ns = round(holds_s * SECOND_NS) + SPARE_NS
         self._changed = threading.Condition()
         self._frames: deque[VideoFrame] = deque()
-        self._scaler: Scaler | None = None
         self._fitted: tuple[int, int] | None = None
         self._failure = ""
         self._closed = False
@@ -68,7 +69,7 @@ class Camera:
             failure = self._failure or ("" if self._frames else f"no picture in {OPENS_S:g} s")
         if failure:
             self.close()
-            raise DeviceError(f"the camera {source} cannot be used: {failure}")
+            raise VideoError(f"the camera {without_login(source)} cannot be used: {failure}")
 
     @property
     def newest(self) -> VideoFrame:
@@ -90,7 +91,7 @@ class Camera:
 
         Raises
         ------
-        DeviceError
+        VideoError
             The camera ended, or sent nothing for a second.
         """
         with self._changed:
@@ -111,7 +112,7 @@ class Camera:
         try:
             self._read()
             failure = "it ended"
-        except (DeviceError, OSError, ValueError) as error:
+        except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no common base but this
             failure = reason(error)
         with self._changed:
             self._failure = failure
@@ -142,6 +143,11 @@ class Camera:
             while self._frames[0].due_ns < ready_ns - self._holds_ns:
                 self._frames.popleft()
             self._changed.notify_all()
+
+
+def without_login(source: str) -> str:
+    """Return the address of a camera without name and password."""
+    return LOGIN.sub("//", source)
 
 
 class _Numbers:

@@ -8,7 +8,7 @@ import threading
 from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
-from study_app.errors import DeviceError
+from study_app.errors import VideoError
 
 EXTRA: Final = "needs the optional extra video: pip install 'liquid-study[video]'"
 SIZE: Final = (1280, 720)
@@ -34,27 +34,29 @@ def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **o
 
     Raises
     ------
-    DeviceError
+    VideoError
         It cannot be opened, or PyAV is not installed; the reason alone.
     """
     try:
         import av  # noqa: PLC0415 - an optional extra
         from av.error import FFmpegError  # noqa: PLC0415
     except ImportError as error:
-        raise DeviceError(f"a video {EXTRA}") from error
+        raise VideoError(f"a video {EXTRA}") from error
     try:
         container = av.open(source, format=kind, options=options, timeout=timeout)
     except (FFmpegError, OSError, ValueError) as error:
-        raise DeviceError(reason(error)) from error
+        raise VideoError(reason(error)) from error
     if not container.streams.video:
         container.close()
-        raise DeviceError("it holds no video")
+        raise VideoError("it holds no video")
     container.streams.video[0].codec_context.thread_count = 1
     return container
 
 
 def reason(error: Exception) -> str:
     """Return why a video cannot be read, in the words of the system or of FFmpeg."""
+    if type(error).__name__ == "ExitError":  # FFmpeg: "Immediate exit requested", after the time that it was given
+        return "no data came in time"
     return str(getattr(error, "strerror", None) or error or type(error).__name__)
 
 

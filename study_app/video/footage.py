@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.errors import DeviceError
+from study_app.errors import VideoError
 from study_app.video.decoding import SECOND_NS, Scaler, make_less_urgent, open_video, period_ns, reason
 from study_app.video.frames import VideoFrame, stopped
 
@@ -28,7 +28,7 @@ class Footage:
 
     Raises
     ------
-    DeviceError
+    VideoError
         It cannot be read as a video.
     """
 
@@ -38,13 +38,16 @@ class Footage:
             with open_video(str(path)) as container:
                 stream = container.streams.video[0]
                 self._period_ns = period_ns(stream)
-                self._start_s = next(container.decode(stream)).time or 0.0
+                if (first := next(container.decode(stream), None)) is None:
+                    raise VideoError("it holds no frame")  # noqa: TRY301 - said with the file's name below
+                self._start_s = first.time or 0.0
                 self.size = (stream.width, stream.height)
-        except (DeviceError, OSError, ValueError, StopIteration) as error:
-            raise DeviceError(f"{path} cannot be shown: {reason(error)}") from error
+        except Exception as error:
+            raise VideoError(f"{path} cannot be shown: {reason(error)}") from error
         self._scaler = Scaler()
         self._changed = threading.Condition()
         self._frames: deque[VideoFrame] = deque()
+        self._first: VideoFrame | None = None
         self._shown: VideoFrame | None = None
         self._play = 0
         self._began_ns: int | None = None
@@ -64,11 +67,11 @@ class Footage:
         self._scaler.size = (width, height)
 
     def rewind(self) -> None:
-        """Begin the footage anew."""
+        """Begin the footage anew; its first frame is kept, so that a trial need not wait for the decoder."""
         with self._changed:
             self._play += 1
             self._frames.clear()
-            self._shown, self._began_ns, self._media_ns = None, None, 0
+            self._shown, self._began_ns, self._media_ns = self._first, None, 0
             self._changed.notify_all()
 
     def begin(self, at_ns: int) -> None:
@@ -80,7 +83,7 @@ class Footage:
 
         Raises
         ------
-        DeviceError
+        VideoError
             The file cannot be read any further.
         """
         began_ns = moment_ns if self._began_ns is None else self._began_ns
@@ -111,7 +114,7 @@ class Footage:
                     for frame in self._decoded(container, play):
                         if not self._put(frame, play):
                             break
-        except (DeviceError, OSError, ValueError) as error:
+        except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no common base but this
             with self._changed:
                 self._failure = reason(error)
 
@@ -131,7 +134,7 @@ class Footage:
                     yield VideoFrame(number, width, height, stride, pixels, offset_ns + media_ns, 0, self._period_ns)
                 number += 1
             if end_ns == 0:
-                raise DeviceError("it holds no frame")
+                raise VideoError("it holds no frame")
             offset_ns += end_ns
 
     def _put(self, frame: VideoFrame, play: int) -> bool:
@@ -141,5 +144,7 @@ class Footage:
                 self._changed.wait()
             if play != self._play or self._closed:
                 return False
+            if frame.number == 0:
+                self._first = frame
             self._frames.append(frame)
         return True

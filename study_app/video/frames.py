@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from study_app.errors import DeviceError
+from study_app.errors import VideoError
 
 
-def stopped(why: str) -> DeviceError:
+def stopped(why: str) -> VideoError:
     """Return the error of a source that fails in a trial: it names no source, which would tell the condition."""
-    return DeviceError(f"a video of the study stopped ({why}): check camera and files, then resume the session")
+    return VideoError(f"a video of the study stopped ({why}): check camera and files, then resume the session")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class VideoSource(Protocol):
 
         Raises
         ------
-        DeviceError
+        VideoError
             The source failed.
         """
 

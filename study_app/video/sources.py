@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from study_app.errors import DeviceError
+from study_app.errors import VideoError
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.stimuli import DELAY, MOST_DELAY_MS
-from study_app.video.camera import USUAL, Camera
+from study_app.video.camera import USUAL, Camera, without_login
 from study_app.video.footage import Footage
 
 CAMERA = "camera"
 
 
 @dataclass(frozen=True, slots=True)
-class Looked:
+class VideosFound:
     """What was found of a study's videos: in words, and why they cannot be used ("" where they can)."""
 
     about: str
@@ -49,8 +49,10 @@ class Videos:
         self._holds_s = MOST_DELAY_MS / 1000 if varied else max((one.delay_ms for one in shown), default=0.0) / 1000
         self._open: dict[str, Camera | Footage] = {}
         self._opening = threading.Lock()
+        self._changing = threading.Lock()
+        self._closed = False
 
-    def look(self) -> Looked:
+    def open(self) -> VideosFound:
         """Open what is not open yet, or failed; return what was found."""
         with self._opening:
             for view in self.views:
@@ -58,10 +60,10 @@ class Videos:
                 if before is not None and before.thread.is_alive():
                     continue
                 try:
-                    self._open[view] = self._opened(view)
-                except DeviceError as error:
-                    return Looked("every video of the study must open", str(error))
-        return Looked("; ".join(self._words()))
+                    self._keep(view, self._opened(view))
+                except VideoError as error:
+                    return VideosFound("every video of the study must open", str(error))
+        return VideosFound("; ".join(self._words()))
 
     def source(self, view: str) -> Camera | Footage:
         """Return the open source of a condition's view."""
@@ -78,7 +80,7 @@ class Videos:
         if isinstance(camera := self._open.get(CAMERA), Camera):
             age_ns = camera.newest.age_ns
             found["camera"] = {
-                "source": camera.source,
+                "source": without_login(camera.source),
                 "size": list(camera.size),
                 "rate_hz": round(1e9 / camera.newest.period_ns, 3),
                 "age": "unknown" if age_ns is None else "by the source's time stamps",
@@ -86,9 +88,22 @@ class Videos:
         return found
 
     def close(self) -> None:
-        """Let go of all."""
-        for one in self._open.values():
+        """Let go of all, also of what another thread is still opening."""
+        with self._changing:
+            self._closed = True
+            every = tuple(self._open.values())
+        for one in every:
             one.close()
+
+    def _keep(self, view: str, source: Camera | Footage) -> None:
+        """Keep an open source; close it where all were closed meanwhile."""
+        with self._changing:
+            closed = self._closed
+            if not closed:
+                self._open = {**self._open, view: source}
+        if closed:
+            source.close()
+            raise VideoError("the videos were closed meanwhile")
 
     def _opened(self, view: str) -> Camera | Footage:
         return Camera(self._camera, self._now_ns, self._holds_s) if view == CAMERA else Footage(self._folder / view)
@@ -108,12 +123,12 @@ def refuse_unusable(protocol: Protocol, folder: Path, camera: str, now_ns: Calla
 
     Raises
     ------
-    DeviceError
+    VideoError
         Why, in one line.
     """
     videos = Videos(protocol, folder, camera, now_ns)
     try:
-        if fault := videos.look().fault:
-            raise DeviceError(fault)
+        if fault := videos.open().fault:
+            raise VideoError(fault)
     finally:
         videos.close()

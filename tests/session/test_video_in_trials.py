@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from study_app.errors import DeviceError
+from study_app.errors import VideoError
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks.explore import Explore
@@ -116,10 +116,10 @@ def test_a_trial_without_a_video_has_no_numbers_of_one() -> None:
 def test_a_camera_that_stops_stops_the_trial() -> None:
     class Stopped(FakeVideo):
         def frame_at(self, moment_ns: int) -> VideoFrame | None:
-            raise DeviceError("the camera stopped")
+            raise VideoError("the camera stopped")
 
     trial, servo = begun(Stopped(), Recorded())
-    with pytest.raises(DeviceError, match="the camera stopped"):
+    with pytest.raises(VideoError, match="the camera stopped"):
         trial.view(servo.now_ns())
 
 

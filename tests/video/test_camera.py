@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -12,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.errors import DeviceError
+from study_app.errors import VideoError
 
 pytest.importorskip("av", reason="the optional extra video is not installed")
 
@@ -26,16 +28,22 @@ PERIOD_S = 1 / 30
 
 
 @contextmanager
-def camera(*options: str, holds_s: float = 0.5) -> Iterator[Camera]:
+def sending(*options: str) -> Iterator[tuple[Camera, subprocess.Popen[str]]]:
     command = [sys.executable, str(SENDER), *SIZE, *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
-        one = Camera(f"tcp://127.0.0.1:{int(process.stdout.readline())}", time.monotonic_ns, holds_s)
+        one = Camera(f"tcp://127.0.0.1:{int(process.stdout.readline())}", time.monotonic_ns, 0.5)
         try:
-            yield one
+            yield one, process
         finally:
             one.close()
             process.kill()
+
+
+@contextmanager
+def camera(*options: str) -> Iterator[Camera]:
+    with sending(*options) as (one, _):
+        yield one
 
 
 def test_a_camera_shows_the_frame_that_was_ready_at_a_moment_and_its_age() -> None:
@@ -71,9 +79,19 @@ def test_frames_that_were_lost_on_the_way_have_numbers() -> None:
 def test_a_camera_that_stops_is_said_in_one_line_that_does_not_name_it() -> None:
     with camera("--seconds", "2") as one:
         one.thread.join(10)
-        with pytest.raises(DeviceError, match=r"stopped \(it ended\): check camera and files") as refused:
+        with pytest.raises(VideoError, match=r"stopped \(it ended\): check camera and files") as refused:
             one.frame_at(time.monotonic_ns())
         assert one.source not in str(refused.value)  # the operator and the journal's readers are blind
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="this system cannot stop a process")
+def test_a_camera_that_sends_nothing_without_closing_is_said_in_words() -> None:
+    with sending("--seconds", "20") as (one, process):
+        os.kill(process.pid, signal.SIGSTOP)
+        one.thread.join(10)
+        assert not one.thread.is_alive()
+        with pytest.raises(VideoError, match=r"stopped \(no data came in time\)"):
+            one.frame_at(time.monotonic_ns())
 
 
 @pytest.mark.parametrize(
@@ -85,7 +103,7 @@ def test_a_camera_that_stops_is_said_in_one_line_that_does_not_name_it() -> None
     ],
 )
 def test_no_camera_is_refused_in_one_line(source: str, why: str) -> None:
-    with pytest.raises(DeviceError, match=why):
+    with pytest.raises(VideoError, match=why):
         Camera(source, time.monotonic_ns, 0.0)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.errors import DeviceError
+from study_app.errors import VideoError
 
 pytest.importorskip("av", reason="the optional extra video is not installed")
 
@@ -74,6 +74,16 @@ def test_a_rewound_footage_begins_with_its_first_frame(footage: Footage) -> None
     assert (again.number, number_in(pixels_of(again))) == (0, 0)
 
 
+def test_a_rewound_footage_shows_its_first_frame_before_anything_is_decoded_again(footage: Footage) -> None:
+    footage.begin(0)
+    shown(footage, 5 * PERIOD_NS + 1_000_000, 5)
+    with footage._changed:  # the decoder waits for this lock
+        footage.rewind()
+        first = footage.frame_at(7 * PERIOD_NS)
+    assert first is not None
+    assert (first.number, number_in(pixels_of(first))) == (0, 0)
+
+
 def test_frames_that_are_overdue_are_skipped_and_keep_their_numbers(footage: Footage) -> None:
     footage.rewind()
     footage.begin(0)
@@ -96,22 +106,38 @@ def test_a_file_that_fails_later_stops_without_its_name(clip: Path, monkeypatch:
 
     def once(source: str) -> Any:
         if opened:
-            raise DeviceError("it is gone")
+            raise VideoError("it is gone")
         opened.append(source)
         return decoding.open_video(source)
 
     monkeypatch.setattr("study_app.video.footage.open_video", once)
     footage = Footage(clip)
     footage.thread.join(10)
-    with pytest.raises(DeviceError, match=r"a video of the study stopped \(it is gone\)") as refused:
+    with pytest.raises(VideoError, match=r"a video of the study stopped \(it is gone\)") as refused:
         footage.frame_at(0)
     assert clip.name not in str(refused.value)
+
+
+def test_an_error_of_ffmpeg_that_is_no_system_error_stops_it_too(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from av.error import ExternalError
+
+    footage = Footage(clip)
+
+    def fail(_frame: Any) -> Any:
+        raise ExternalError(1, "generic error in an external library")
+
+    monkeypatch.setattr(footage._scaler, "pixels", fail)
+    footage.rewind()
+    footage.thread.join(10)
+    with pytest.raises(VideoError, match=r"stopped \(generic error in an external library\)"):
+        footage.frame_at(0)
+    footage.close()
 
 
 @pytest.mark.parametrize("content", [b"", b"no video at all" * 100])
 def test_a_file_that_is_no_video_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
     broken = tmp_path / "broken.mp4"
     broken.write_bytes(content)
-    with pytest.raises(DeviceError, match=r"broken\.mp4 cannot be shown: .+") as refused:
+    with pytest.raises(VideoError, match=r"broken\.mp4 cannot be shown: .+") as refused:
         Footage(broken)
     assert "\n" not in str(refused.value)

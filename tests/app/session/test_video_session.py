@@ -14,7 +14,7 @@ import pytest
 
 from study_app import app
 from study_app.app.session.bridge import SessionBridge
-from study_app.errors import DeviceError, SessionError
+from study_app.errors import SessionError, VideoError
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.recording_files import read_frames
@@ -123,4 +123,4 @@ def test_a_source_that_fails_in_a_trial_ends_in_zero_force(
 
 
 def _lost(*_: Any) -> Any:
-    raise DeviceError("the file is gone")
+    raise VideoError("the file is gone")
