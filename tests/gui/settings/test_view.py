@@ -12,7 +12,7 @@ from study_app.gui.settings import view as module
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.theme.theme import DARK, font
 from study_app.gui.theme.themed import wear
-from study_app.store.workstation import DEFAULTS, STATEMENT_X_HEIGHT_PX, DisplayOffset, MachineSettings
+from study_app.store.workstation import CAMERA_LENGTH, DEFAULTS, STATEMENT_X_HEIGHT_PX, DisplayOffset, MachineSettings
 
 ONE = ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0)
 TWO = ScreenShown(2, "DP-1", 1920, 1080, 144.0, 1.0, 527.0, 296.0)
@@ -227,3 +227,14 @@ def test_a_trigger_port_is_typed_and_what_is_none_is_refused(place, qtbot):
         type_into(qtbot, outlets.triggers, " ")
     assert changed.args == [{"triggers": ""}]
     assert outlets.below.text().startswith("One byte per event")
+
+
+def test_a_camera_is_typed_and_never_longer_than_can_be_kept(place, qtbot):
+    with qtbot.waitSignal(place.changed) as changed:
+        type_into(qtbot, place.sessions.camera, " tcp://127.0.0.1:5000 ")
+    assert changed.args == [{"camera": "tcp://127.0.0.1:5000"}]
+    place.sessions.camera.clear()
+    with qtbot.waitSignal(place.changed) as changed:
+        place.sessions.camera.insert("x" * 1000)
+        qtbot.keyClick(place.sessions.camera, Qt.Key.Key_Return)
+    assert MachineSettings.model_validate(changed.args[0]).camera == "x" * CAMERA_LENGTH
