@@ -48,7 +48,13 @@ def verify_folder(folder: Path, fingerprints: Path | None = None) -> Findings:
         )
     found = Gathered(folder)
     _between(merged, found)
-    each = {name: verify(merged.folder(name)) for name in merged.names if merged.folder(name).is_dir()}
+    each: dict[str, Findings] = {}
+    for name in merged.names:
+        if merged.folder(name).is_dir():  # `_between` says which are missing
+            try:
+                each[name] = verify(merged.folder(name))
+            except StoreError as error:
+                found.failure(merged.folder(name), error)
     placed = {name: _placed(name, one) for name, one in each.items()}
     return Findings(
         (*found.errors, *(error for one in placed.values() for error in one.errors)),

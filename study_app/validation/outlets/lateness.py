@@ -26,7 +26,7 @@ _DRAWS: Final = 2000
 class Ratio:
     """A percentile of the lateness with outlets, by that without them, and its 95 % interval.
 
-    Turns are resampled in pairs, with and without.
+    Segments of 0.25 s are resampled in pairs, with and without.
     """
 
     percentile: int
@@ -50,7 +50,7 @@ def compare(
     """Return the median lateness with and without outlets, and the 99th percentile.
 
     With outlets, a stream of samples and twenty markers a second go to a listener in another process. Without them its
-    thread rests. Each pair of turns begins with the other.
+    thread rests. Each pair of segments begins with the other.
 
     Parameters
     ----------
@@ -98,10 +98,10 @@ def compare(
 
 
 def ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int64]], percentile: int) -> Ratio:
-    """Return the ratio of a percentile of latenesses [ns] by turns (each (n,)), with and without outlets."""
+    """Return the ratio of a percentile of latenesses [ns] by segments (each (n,)), with and without outlets."""
     rng = np.random.default_rng(1)
-    own = np.array([np.percentile(turn, percentile) for turn in active])
-    other = np.array([np.percentile(turn, percentile) for turn in rest])
+    own = np.array([np.percentile(segment, percentile) for segment in active])
+    other = np.array([np.percentile(segment, percentile) for segment in rest])
     logs = np.log(own) - np.log(other)
     draws = [float(np.mean(logs[rng.integers(0, len(logs), len(logs))])) for _ in range(_DRAWS)]
     low, high = np.exp(np.percentile(draws, [2.5, 97.5]))

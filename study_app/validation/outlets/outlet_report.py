@@ -40,7 +40,7 @@ def _streams(found: Streamed) -> Iterator[str]:
 
 
 def _ratios(ratios: Sequence[Ratio]) -> Iterator[str]:
-    yield "lateness of the servo, with both streams and without, in turns of 0.25 s"
+    yield "lateness of the servo, with both streams and without, alternating every 0.25 s"
     for one in ratios:
         yield (
             f"  p{one.percentile}: {one.with_us:.0f} us with, {one.without_us:.0f} us without, ratio {one.ratio:.3f} "

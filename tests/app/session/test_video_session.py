@@ -104,11 +104,13 @@ def test_a_source_that_fails_in_a_trial_ends_in_zero_force(
 ) -> None:
     write_clip(study.parent / NAME, frames=20, size=(320, 180))
     forces: list[bool] = []
+    offers: list[bool] = []
     fail = SessionBridge.fail
 
     def failed(bridge: SessionBridge, error: BaseException) -> None:
         fail(bridge, error)
         forces.append(bridge.parts.servo.force_is_on)
+        offers.append(bridge.view().may_reconnect)
         bridge.leave_now()
 
     monkeypatch.setattr(SessionBridge, "fail", failed)
@@ -116,6 +118,7 @@ def test_a_source_that_fails_in_a_trial_ends_in_zero_force(
     with pytest.raises(Exception, match="the session was stopped: the file is gone"):
         run()
     assert forces[0] is False
+    assert offers == [False]  # to connect the haptic device again would not bring the video back
     assert "broke" in {event["event"] for event in events(results)}
     assert json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())["status"] == "unfinished"
     assert "the file is gone" in caplog.text

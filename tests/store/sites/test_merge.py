@@ -219,6 +219,11 @@ def test_verify_finds_what_was_changed_after_merging(labs: dict[str, Path], pool
     response = next((pooled / "sites/B").glob("data/sub-P001/ses-01/*responses*"))
     response.write_bytes(response.read_bytes() + b"x")
     assert any(str(one).startswith("sites/B/data/sub-P001/ses-01/") for one in verify_folder(pooled).errors)
+    (pooled / "sites/A/dataset_description.json").rename(pooled / "sites/A/aside.json")
+    found = list(map(str, verify_folder(pooled).errors))
+    assert any(one.startswith("sites/A: is not a study folder") for one in found)
+    assert any(one.startswith("sites/B/data/sub-P001/ses-01/") for one in found)  # the other sites are checked, too
+    (pooled / "sites/A/aside.json").rename(pooled / "sites/A/dataset_description.json")
     shutil.rmtree(pooled / "sites/A/data/sub-P001")
     assert "is missing, but fingerprints.txt lists it" in "\n".join(map(str, verify_folder(pooled).errors))
     shutil.rmtree(pooled / "sites/B")
