@@ -3,8 +3,8 @@
     sudo python packaging/try_in_empty_root.py [dist/liquid-study]
 
 Linux alone, as root. Copies into the root: the C library and its loader, the libraries below, one font, and the bundle.
-Then, each as one program: the version, a rehearsal on a fresh machine, its check, its report, the start of a session's
-windows, and a rehearsal with code compiled for another CPU. Prints how long each took.
+Then, each as one program: the version, the start of a session's windows on a fresh machine, the pages of Help, a
+rehearsal, its check and report, and a rehearsal with code compiled for another CPU. Prints how long each took.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ DESKTOP = """
     libX11.so.6 libX11-xcb.so.1 libxcb.so.1 libXau.so.6 libXdmcp.so.6 libbsd.so.0 libmd.so.0 libfontconfig.so.1
     libfreetype.so.6 libexpat.so.1 libpng16.so.16 libbrotlidec.so.1 libbrotlicommon.so.1 libdbus-1.so.3
     libsystemd.so.0 libcap.so.2 libgcrypt.so.20 libgpg-error.so.0 liblzma.so.5 liblz4.so.1 libzstd.so.1
-    libxkbcommon.so.0 libxkbcommon-x11.so.0 libxcb-cursor.so.0 libxcb-icccm.so.4 libxcb-image.so.0 libxcb-
-    keysyms.so.1 libxcb-randr.so.0 libxcb-render.so.0 libxcb-render-util.so.0 libxcb-shape.so.0 libxcb-shm.so.0
+    libxkbcommon.so.0 libxkbcommon-x11.so.0 libxcb-cursor.so.0 libxcb-icccm.so.4 libxcb-image.so.0
+    libxcb-keysyms.so.1 libxcb-randr.so.0 libxcb-render.so.0 libxcb-render-util.so.0 libxcb-shape.so.0 libxcb-shm.so.0
     libxcb-sync.so.1 libxcb-util.so.1 libxcb-xfixes.so.0 libxcb-xinerama.so.0 libxcb-xkb.so.1 libglib-2.0.so.0
     libgthread-2.0.so.0 libpcre2-8.so.0 libudev.so.1
 """
@@ -70,6 +70,18 @@ if live.error:
 sys.exit(live.code)
 """
 
+HELP = """
+from study_app.gui.application import application_here
+from study_app.gui.help.view import HelpPlace
+from study_app.viewmodels.help import entries
+application_here()
+place = HelpPlace()
+for entry in entries():
+    place.open_page(entry.page)
+    assert place.reader.toPlainText().strip(), entry.page
+print(f"    {len(entries())} pages")
+"""
+
 COMPILING = """
 import sys, time
 from pathlib import Path
@@ -88,6 +100,8 @@ def libraries() -> dict[str, Path]:
     """Return where this computer has the libraries of a desktop."""
     said = subprocess.run(["/sbin/ldconfig", "-p"], capture_output=True, text=True, check=True).stdout
     known = dict(re.findall(r"^\s*(\S+) \(libc6,x86-64[^)]*\) => (\S+)$", said, re.MULTILINE)[::-1])
+    if lacking := [name for name in DESKTOP.split() if name not in known]:
+        print(f"not on this computer, so not in the root: {' '.join(lacking)}", flush=True)
     return {name: Path(known[name]) for name in DESKTOP.split() if name in known}
 
 
@@ -140,6 +154,7 @@ def main() -> None:
         run(root, "version", "--version")
         run(root, "first session of a fresh machine", "-c", SESSION)
         run(root, "second session", "-c", SESSION.replace("P001", "P002"))
+        run(root, "pages of Help", "-c", HELP)
         run(root, "rehearsal", "rehearse", "demo", "--participants", "2", "--results", "/home/demo")
         run(root, "verify", "verify", "/home/demo")
         run(root, "unblind", "unblind", "/home/demo", "--by", "AB", "--reason", "a test of the bundle")

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import runpy
 import subprocess
 import sys
+import types
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from study_app import __version__
+from study_app import __version__, documentation
 
 pytestmark = pytest.mark.slow
 
@@ -75,6 +77,34 @@ def test_only_equal_copies_of_a_library_are_dropped(bundle: dict[str, Any], tmp_
     (tmp_path / "pyarrow" / "alone").write_bytes(b"z")
     assert bundle["drop_twins"](tmp_path) == 1
     assert sorted(path.name for path in (tmp_path / "pyarrow").iterdir()) == ["alone", "other"]
+
+
+def test_the_recipe_contains_the_pages_of_help(monkeypatch: pytest.MonkeyPatch) -> None:
+    hooks = types.ModuleType("PyInstaller.utils.hooks")
+    hooks.copy_metadata = lambda _name: []  # type: ignore[attr-defined]
+    for name in ("PyInstaller", "PyInstaller.utils"):
+        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+    monkeypatch.setitem(sys.modules, hooks.__name__, hooks)
+    asked: dict[str, Any] = {}
+
+    def analysis(_scripts: object, **words: Any) -> Any:
+        asked.update(words)
+        return types.SimpleNamespace(pure=[], scripts=[], binaries=[], datas=words["datas"])
+
+    makers = dict.fromkeys(("PYZ", "EXE", "COLLECT"), lambda *_words, **_options: None)
+    given = {"SPECPATH": str(PACKAGING), "Analysis": analysis} | makers
+    runpy.run_path(str(PACKAGING / "liquid-study.spec"), init_globals=given)
+    shipped = {(Path(to) / Path(source).name).as_posix() for source, to in asked["datas"]}
+    top = documentation.folder()
+    pages = {f"study_app/docs/{name}.md" for name in documentation.names()}
+    pictures = {f"study_app/docs/pictures/{path.name}" for path in (top / "pictures").iterdir()}
+    assert (pages | pictures) - shipped == set()
+
+
+def test_the_libraries_of_a_desktop_are_names_of_libraries() -> None:
+    """A name that is none would be left out of the empty root without a word."""
+    names = runpy.run_path(str(PACKAGING / "try_in_empty_root.py"))["DESKTOP"].split()
+    assert [name for name in names if not re.fullmatch(r"lib[\w+-]*\w\.so\.\d+", name)] == []
 
 
 def test_the_recipe_names_every_library_whose_version_a_receipt_or_a_report_states() -> None:
