@@ -124,6 +124,24 @@ def test_every_page_is_in_one_section() -> None:
     assert list(sections) == ["tutorials", "how-to", "explanation", "reference", "validation"]
 
 
+def test_every_page_but_decisions_is_in_the_list_of_a_section() -> None:
+    top = documentation.folder()
+    shown = {link.partition("#")[0] for section in documentation.sections() for link in links(top / f"{section}.md")}
+    here = {f"{page}.md" for page in documentation.names() if page not in documentation.sections()}
+    assert {page for page in here - shown if not page.startswith("decisions/")} == {"index.md"}
+
+
+def test_the_page_on_installation_has_every_extra_and_none_for_sessions_alone() -> None:
+    page = ROOT / "docs" / "install.md"
+    text = page.read_text(encoding="utf-8")
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        extras = tomllib.load(file)["project"]["optional-dependencies"]
+    rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", text, re.MULTILINE)
+    assert {extra for row in rows for extra in re.findall(r"\w+", row)} == set(extras)
+    alone = text.partition("## A computer that only runs sessions")[2]
+    assert re.findall(r"pip install (\S+)", alone)[0] == "."
+
+
 def test_every_picture_is_shown_on_a_page() -> None:
     shown = {Path(link).name for page in pages() for link in links(page) if "pictures/" in link}
     assert {path.name for path in (ROOT / "docs" / "pictures").iterdir()} == shown
