@@ -31,7 +31,7 @@ def workspace(folder: Path | None) -> None:
 @click.command()
 def studies() -> None:
     """List the known protocols and the studies in the workspace."""
-    from study_app.errors import ProtocolError
+    from study_app.errors import ProtocolError, StoreError
     from study_app.protocol.load import at_hand, is_scene_file, load
     from study_app.store.sites.merged import folders_of, sessions_in
     from study_app.store.workstation import recent_protocols
@@ -50,7 +50,11 @@ def studies() -> None:
             click.echo(f"  {name}  cannot be used: {error.problems[0]}")
     click.echo(f"Studies in {here.results.absolute()}")
     for folder in _studies(here.results):
-        places = folders_of(folder)
+        try:
+            places = folders_of(folder)
+        except StoreError as error:
+            click.echo(f"  {folder.name}  cannot be used: {error}")
+            continue
         count = len(sessions_in(places.values()))
         sites = "" if "" in places else f", sites {', '.join(prefix[:-1] for prefix in places)}"
         click.echo(f"  {folder.name}  {count} session{'' if count == 1 else 's'}{sites}")

@@ -18,6 +18,7 @@ from typing import Final
 from study_app.errors import StoreError
 from study_app.store import receipt
 from study_app.store.atomic import (
+    cannot_read,
     cannot_write,
     is_there,
     open_regular,
@@ -46,10 +47,12 @@ class _Source:
     """What is known of a folder that is, or is to be, a site of a merged study.
 
     ``protocol_hash`` is empty and ``pilot`` None where all participants withdrew; ``begun`` are the sessions' folders
-    by the SHA-256 of their journals' first lines.
+    by the SHA-256 of their journals' first lines. ``state`` is what changes when a file does, from before the reading.
     """
 
     name: str
+    path: Path
+    state: list[tuple[Path, int, int]]
     study: str
     protocol_hash: str
     pilot: bool | None
@@ -90,13 +93,13 @@ def merge(given: Mapping[str, Path], to: Path, *, now: datetime | None = None) -
     sites = tuple(Site(one.name, at, one.key.hash, len(one.begun)) for one in new)
     if merged is None:
         made = Merged(to, new[0].study, ran, sites)
-        _create(made, given)
+        _create(made, new)
     else:
         made = Merged(to, merged.study, merged.protocol_hash, (*merged.sites, *sites))
         with open_alone(to):
             if read_merged(to) != merged:
                 raise StoreError(f"{to} was changed by another program meanwhile: merge again")
-            _add(made, given)
+            _add(made, new)
     return made
 
 
@@ -140,6 +143,10 @@ def _source(name: str, path: Path) -> _Source:
             f"site {name}: {path} is not the results folder of a study (no {study.description.name}): name one such as "
             "results/rek2024"
         )
+    try:
+        state = _state(path)
+    except OSError as error:
+        raise cannot_read(path, error) from error
     refuse_if_open(path)
     sessions = [session for session in study.sessions() if not never_begun(session.path)]
     for session in sessions:
@@ -153,6 +160,8 @@ def _source(name: str, path: Path) -> _Source:
         )
     return _Source(
         name,
+        path,
+        state,
         described,
         next(iter(hashes), ""),
         any(one["pilot"] for one in receipts) if receipts else None,
@@ -192,7 +201,7 @@ def _check_sessions(sources: tuple[_Source, ...]) -> None:
             seen[begun] = path
 
 
-def _create(merged: Merged, given: Mapping[str, Path]) -> None:
+def _create(merged: Merged, sources: tuple[_Source, ...]) -> None:
     """Make the folder, whole or not at all."""
     target = merged.path.absolute()
     half = temporary_path(target)
@@ -201,8 +210,8 @@ def _create(merged: Merged, given: Mapping[str, Path]) -> None:
         _remove_killed(target)
         opening = create_opened(half)
         (half / FOLDER).mkdir()
-        for name, path in given.items():
-            _copy(path, half / FOLDER / name)
+        for source in sources:
+            _copy(source, half / FOLDER / source.name)
         write_file(half / merged.manifest.name, merged.content())
         sync_folder(half / FOLDER)
         if opening is not None:
@@ -225,19 +234,19 @@ def _remove_killed(target: Path) -> None:
             shutil.rmtree(path, ignore_errors=True)
 
 
-def _add(merged: Merged, given: Mapping[str, Path]) -> None:
+def _add(merged: Merged, sources: tuple[_Source, ...]) -> None:
     """Copy further sites into the folder; they count from the moment on at which they are listed."""
     place = merged.path / FOLDER
     sweep(place)
     copies: list[Path] = []
     try:
-        for name, path in given.items():
-            copy = merged.folder(name)
+        for source in sources:
+            copy = merged.folder(source.name)
             if is_there(copy):  # of a merge that was killed: it is not listed
                 shutil.rmtree(copy)
             half = temporary_path(copy)
             copies.append(half)
-            _copy(path, half)
+            _copy(source, half)
             half.rename(copy)
             copies[-1] = copy
         sync_folder(place)
@@ -248,21 +257,20 @@ def _add(merged: Merged, given: Mapping[str, Path]) -> None:
         raise error if isinstance(error, StoreError) else cannot_write(merged.path, error) from error
 
 
-def _copy(path: Path, to: Path) -> None:
+def _copy(source: _Source, to: Path) -> None:
     """Copy a results folder and flush it to the disk; links stay links, for `verify` to judge.
 
     Raises
     ------
     StoreError
-        A program began to write there meanwhile.
+        A program wrote there since it was read.
     """
-    before = _state(path)
-    shutil.copytree(path, to, symlinks=True, ignore=LEFT_BEHIND, copy_function=_copy_file)
+    shutil.copytree(source.path, to, symlinks=True, ignore=LEFT_BEHIND, copy_function=_copy_file)
     for place in (to, *(one for one in paths_in(to) if one.is_dir() and not one.is_symlink())):
         sync_folder(place)
-    refuse_if_open(path)
-    if _state(path) != before:
-        raise StoreError(f"{path} was changed while it was copied: merge when no program uses it")
+    refuse_if_open(source.path)
+    if _state(source.path) != source.state:
+        raise StoreError(f"{source.path} was changed while it was copied: merge when no program uses it")
 
 
 def _state(path: Path) -> list[tuple[Path, int, int]]:

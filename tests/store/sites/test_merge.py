@@ -182,6 +182,20 @@ def test_a_folder_that_changes_while_it_is_copied_is_refused(
     assert list(results.iterdir()) == []
 
 
+def test_a_session_that_begins_before_the_copy_is_refused(
+    labs: dict[str, Path], results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = Path(shutil.copytree(labs["A"], tmp_path / "lab"))
+
+    def begin_a_session(*_sources: object) -> None:
+        shutil.copytree(lab / "data/sub-P001", lab / "data/sub-P009")
+
+    monkeypatch.setattr("study_app.store.sites.merge._check_sessions", begin_a_session)
+    with pytest.raises(StoreError, match="was changed while it was copied"):
+        merge({"A": lab}, results / "pooled")
+    assert list(results.iterdir()) == []
+
+
 @pytest.mark.parametrize("exists", [False, True])
 def test_a_killed_merge_leaves_the_old_state_or_the_new_one(exists: bool, labs: dict[str, Path], results: Path) -> None:
     to, old, states = results / "killed", dict[str, bytes](), []
@@ -302,8 +316,12 @@ def test_a_participant_of_a_merged_study_withdraws_from_copy_and_site(
 
 
 def test_studies_and_sessions_list_a_merged_study(pooled: Path) -> None:
+    listed = (pooled / "sites.json").read_bytes()
     assert "  pooled  4 sessions, sites A, B" in run("studies").output
     names = [line.split()[0] for line in run("sessions", "pooled").output.splitlines()]
     assert names == ["pooled/A-P001/1", "pooled/A-P002/1", "pooled/B-P001/1", "pooled/B-P002/1"]
+    (pooled / "sites.json").write_text("{")
+    assert "pooled  cannot be used: " in run("studies").output
+    (pooled / "sites.json").write_bytes(listed)
     for name in names:
         assert "reproduced" in run("reproduce", name).output
