@@ -184,15 +184,16 @@ class Study:
 def load_study(folder: Path) -> Study:
     """Read the results of a study.
 
+    A merged study (see `store.sites.merged`) is sealed until the key of every site was opened.
+
     Raises
     ------
     AnalysisError
         The folder holds no sessions, a file in it is missing, damaged or of another study, or what is excluded is not
         there: says which, where in it, and what to do.
     StoreError
-        The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
-
-    A merged study (see `store.sites.merged`) is sealed until the key of every site was opened.
+        The key was opened, and is now missing or changed; ``exclusions.csv`` cannot be read; or the folder of a site
+        is missing.
 
     Examples
     --------
@@ -211,6 +212,8 @@ def load_study(folder: Path) -> Study:
 def _load_sites(merged: Merged) -> Study:
     """Read a merged study; a site from which all participants withdrew has nothing to read."""
     places = {name: StudyFolder(merged.folder(name)) for name in merged.names}
+    if missing := [place.path for place in places.values() if not place.path.is_dir()]:
+        raise StoreError(f"{missing[0]} is missing, but {merged.manifest.name} lists it: restore it from a copy")
     opened = all_opened(merged.path)
     sites = {name: _load(place.path, sealed=not opened) for name, place in places.items() if place.sessions()}
     if not sites:

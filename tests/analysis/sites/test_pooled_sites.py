@@ -20,6 +20,7 @@ from study_app.analysis.report.write_report import report
 from study_app.analysis.results.levels import LevelsFound, ThresholdFound
 from study_app.analysis.tables.group_means import group_counts, group_means
 from study_app.analysis.tables.study import Study, load_study, pooled
+from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude
@@ -91,6 +92,13 @@ def test_a_study_is_sealed_until_the_last_key_is_open(sealed: Path, tmp_path: Pa
     export(tmp_path / "pooled", tmp_path / "out")
     (table,) = (tmp_path / "out").glob("*trials*.csv")
     assert "force_mean_n" not in table.read_text().splitlines()[0]
+
+
+def test_a_site_whose_folder_is_missing_is_not_left_out(sealed: Path, tmp_path: Path) -> None:
+    merge(_copied(sealed, tmp_path), tmp_path / "pooled")
+    shutil.rmtree(tmp_path / "pooled/sites/B")
+    with pytest.raises(StoreError, match=r"sites/B is missing, but sites\.json lists it"):
+        load_study(tmp_path / "pooled")
 
 
 def test_answers_are_pooled_by_condition(opened: Path) -> None:
