@@ -45,7 +45,7 @@ class LiveEstimation:
     Parameters
     ----------
     executor : Executor, optional
-        Searches for the wake; by default `poll` does so itself.
+        Searches for the wake, and connects to streams; by default `poll` does so itself.
     """
 
     def __init__(self, executor: Executor | None = None) -> None:
@@ -75,7 +75,7 @@ class LiveEstimation:
         if chosen.source == "file" and chosen.path is not None:
             self._file = GrowingCsv(chosen.path)
         elif chosen.source == "lsl":
-            self._lsl = LslForce()
+            self._lsl = LslForce(executor=self._executor)
         self.chosen = chosen
 
     def close(self) -> None:

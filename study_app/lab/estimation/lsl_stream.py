@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import math
+from concurrent.futures import Executor, Future
 from typing import Any, Final
 
 import numpy as np
@@ -35,6 +36,8 @@ class LslForce:
     ----------
     name : str
         Of the stream; "" takes any.
+    executor : Executor, optional
+        Connects to streams, which may not answer for a second; by default `poll` does so itself.
 
     Raises
     ------
@@ -42,12 +45,14 @@ class LslForce:
         ``pylsl`` or its library is not installed.
     """
 
-    def __init__(self, name: str = "") -> None:
+    def __init__(self, name: str = "", executor: Executor | None = None) -> None:
         try:
             self._lsl: Any = importlib.import_module("pylsl")
         except (ImportError, RuntimeError, OSError) as error:  # without its library it raises RuntimeError
             raise StudyError(_INSTALL) from error
         self._resolver = self._lsl.ContinuousResolver(*(("name", name) if name else ()))
+        self._executor = executor
+        self._connecting: Future[tuple[Any, list[str]] | None] | None = None
         self._refused: set[str] = set()
         self._inlet: Any = None
         self._places: list[int] = []
@@ -62,7 +67,7 @@ class LslForce:
 
     def poll(self) -> Rows:
         """Return the rows that came since; none before a stream was found."""
-        if self._inlet is None and not self._connect():
+        if self._inlet is None and not self._connected_now():
             return no_rows()
         try:
             samples, stamps = self._inlet.pull_chunk(timeout=0.0, max_samples=4096)
@@ -88,8 +93,28 @@ class LslForce:
         if inlet is not None:
             inlet.close_stream()
 
-    def _connect(self) -> bool:
-        """Open the first stream with the labels; return whether there is one."""
+    def _connected_now(self) -> bool:
+        """Take over a stream that was opened meanwhile, or look for one; return whether there is one."""
+        if self._executor is None:
+            found = self._connect()
+        elif self._connecting is None:
+            self._connecting = self._executor.submit(self._connect)
+            return False
+        elif not self._connecting.done():
+            return False
+        else:
+            connecting, self._connecting = self._connecting, None
+            found = connecting.result()
+        if found is None:
+            return False
+        inlet, labels = found
+        self._has_velocities = set(VELOCITIES) <= set(labels)
+        self._places = [labels.index(it) for it in (*LABELS, *(VELOCITIES if self._has_velocities else ()))]
+        self._inlet = inlet
+        return True
+
+    def _connect(self) -> tuple[Any, list[str]] | None:
+        """Open the first stream with the labels; return its inlet and labels, None where there is none."""
         for found in self._resolver.results():
             if found.uid() in self._refused:
                 continue
@@ -102,11 +127,8 @@ class LslForce:
                 inlet.open_stream(timeout=_OPENS_S)
             except (RuntimeError, TimeoutError):  # it ended, or does not answer now
                 continue
-            self._has_velocities = set(VELOCITIES) <= set(labels)
-            self._places = [labels.index(it) for it in (*LABELS, *(VELOCITIES if self._has_velocities else ()))]
-            self._inlet = inlet
-            return True
-        return False
+            return inlet, labels
+        return None
 
 
 def _labels(info: Any) -> list[str]:
