@@ -177,6 +177,7 @@ class LabController(QObject):
             self._let_go()
         except StudyError as second:
             log.warning("the servo did not stop properly: %s", second)
+        self.estimation.close()
         traceback.clear_frames(error.__traceback__)
         known = isinstance(error, StudyError)
         said = f"{error}" if known else f"{type(error).__name__}: {error}; the force is off"

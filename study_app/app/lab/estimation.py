@@ -61,8 +61,7 @@ class LabEstimation(QObject):
         place.estimate_follow_asked.connect(self._follow)
 
     def fail(self, error: BaseException) -> None:
-        """End with zero force, and with the estimation."""
-        self.close()
+        """End with zero force; the lab ends the estimation, too."""
         self._lab.fail(error)
 
     def poll(self) -> None:
@@ -109,16 +108,18 @@ class LabEstimation(QObject):
         )
         if found.identified:
             share = 100 * found.rms_n / found.force_rms_n if found.force_rms_n > 0 else 0.0
-            message = f"Residual {found.rms_n:.3f} N, {share:.0f} % of the force; {found.seconds:.0f} s measured"
+            message = f"Residual {found.rms_n:.3f} N, {share:.0f} % of the force; {found.seconds:.0f} s measured."
         else:
-            message = f"{found.reason[:1].upper()}{found.reason[1:]}. Nothing is changed."
+            message = f"{found.reason[:1].upper()}{found.reason[1:]}."
         if not self.estimation.applies:
-            message = f"{message.removesuffix(' Nothing is changed.')}. Compared only: it is not applied."
+            message += " Compared only: it is not applied."
+        elif not found.identified:
+            message += " Nothing is changed."
         applies = self.estimation.applies and self._lab.live is not None
         return replace(
             shown,
             rows=rows,
-            message=f"{message.replace('..', '.')}{self._refused}",
+            message=f"{message}{self._refused}",
             sound=found.identified,
             may_apply=applies and found.identified,
             may_follow=applies,

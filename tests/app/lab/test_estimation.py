@@ -58,6 +58,21 @@ def test_it_follows_until_the_place_is_left(lab: LabController, qtbot: Any) -> N
     assert lab.view().estimate.source == "off"
 
 
+def test_an_exception_ends_the_force_and_what_is_applied(
+    lab: LabController, qtbot: Any, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
+    lab.place.estimate_source_chosen.emit("other", None)
+    qtbot.waitUntil(lambda: lab.view().estimate.may_follow, timeout=OPENS_MS)
+    lab.place.estimate_follow_asked.emit(True)
+    monkeypatch.setattr(type(lab), "_show", lambda _self: 1 / 0)
+    qtbot.waitUntil(lambda: lab.trouble != "", timeout=SOON_MS)
+    lab.frames.stop()
+    assert lab.live is None
+    assert lab.estimation.estimation is None
+    assert "ZeroDivisionError" in lab.trouble
+    caplog.clear()
+
+
 def test_a_file_that_cannot_be_read_is_said_in_the_card(lab: LabController, qtbot: Any, tmp_path: Path) -> None:
     lab.place.estimate_source_chosen.emit("file", tmp_path / "none.csv")
     qtbot.waitUntil(lambda: "none.csv" in lab.view().estimate.message, timeout=OPENS_MS)
