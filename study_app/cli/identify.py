@@ -135,10 +135,10 @@ def estimate(
     source = LslForce(stream or "") if measured is None else GrowingCsv(measured)
     prepare()
     rows, computing_s, shown_s, came_s = 0, 0.0, None, time.monotonic()
-    while time.monotonic() - came_s <= idle_s or rows == 0:
+    while True:
         found = source.poll()
         if len(found) == 0:
-            if time.monotonic() - came_s > max(idle_s, SHOWN_S):
+            if time.monotonic() - came_s > (idle_s if rows else max(idle_s, SHOWN_S)):
                 break
             time.sleep(POLL_S)
             continue
