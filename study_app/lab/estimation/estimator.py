@@ -119,7 +119,8 @@ class OnlineEstimator:
     def estimate(self) -> Estimate:
         """The estimate from all rows so far."""
         if self._pending is not None and self._pending.done():
-            self._finish(self._pending.result())
+            search, self._pending = self._pending, None
+            self._finish(search.result())
         return self._estimate
 
     def take(self, rows: Rows) -> None:
@@ -132,10 +133,12 @@ class OnlineEstimator:
         """
         if len(rows) == 0:
             return
-        gaps = np.flatnonzero(np.diff(rows.t_s, prepend=self._last_s) > GAP_S)
-        if len(gaps):
+        gaps_s = np.diff(rows.t_s, prepend=self._last_s)
+        if len(gaps := np.flatnonzero(gaps_s > GAP_S)):
             self.restart()
             rows = rows.part(int(gaps[-1]))
+            missing = f"no force was measured for {gaps_s[gaps[-1]]:.2g} s, at most {GAP_S:g} s are permitted"
+            self._estimate = replace(NOTHING, reason=f"{missing}: the estimation began again")
         self._last_s = float(rows.t_s[-1])
         if self._rate_hz is None:
             self._waiting = joined(self._waiting, rows)
@@ -196,7 +199,6 @@ class OnlineEstimator:
 
     def _finish(self, fit: WakeFit | None) -> None:
         """Take over what a search found."""
-        self._pending = None
         if fit is None:
             self._estimate, self._known = _waits(self._seconds), None
             return

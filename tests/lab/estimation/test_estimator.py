@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor, Future
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -165,6 +168,27 @@ def test_slow_streams_are_refused() -> None:
     slow = Rows(*(getattr(rows, it)[::40] for it in Rows.__slots__))
     with pytest.raises(StudyError, match="rows per second"):
         fed(OnlineEstimator(WATER), slow)
+
+
+def test_a_stream_of_gaps_is_said() -> None:
+    rows = measured(WATER, *stirring(4.0))
+    found = fed(OnlineEstimator(WATER), Rows(*(getattr(rows, it)[::100] for it in Rows.__slots__)))
+    assert not found.identified
+    assert found.reason.startswith("no force was measured for 0.1 s, at most 0.05 s are permitted")
+
+
+def test_a_search_that_fails_fails_once() -> None:
+    class Failing(Executor):
+        def submit(self, *_words: object, **_options: object) -> Any:
+            failed: Future[None] = Future()
+            failed.set_exception(MemoryError("too many rows"))
+            return failed
+
+    estimator = OnlineEstimator(WATER, NAMES, executor=Failing())
+    rows = measured(planted(), *stirring(2.0))
+    with pytest.raises(MemoryError):
+        fed(estimator, rows)
+    assert not estimator.estimate.identified
 
 
 def test_values_are_shown_with_their_interval() -> None:
