@@ -144,5 +144,5 @@ def test_the_extra_is_what_is_blocked_here_and_no_dependency() -> None:
     extra = {Requirement(line).name.lower() for line in project["optional-dependencies"]["analysis"]}
     assert extra == {library.lower() for library in ANALYSIS_LIBRARIES}
     assert not extra & {Requirement(line).name.lower() for line in project["dependencies"]}
-    for name in ("test", "cfd", "spss"):
+    for name in ("test", "cfd", "spss", "docs"):
         assert "liquid-study[analysis]" in project["optional-dependencies"][name]
