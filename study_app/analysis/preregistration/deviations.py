@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from study_app.analysis.preregistration.commitment import FILE, Commitment, read
@@ -10,7 +10,7 @@ from study_app.analysis.report.html_page import bullets, heading, paragraph
 from study_app.analysis.results.words import counted, listed
 from study_app.analysis.tables.study import Study
 from study_app.store.exclusions import named
-from study_app.store.sites.merged import folders_of
+from study_app.store.sites.merged import DASH, folders_of
 
 SHOWN = 20
 
@@ -35,19 +35,30 @@ def deviations(study: Study) -> Deviations | None:
     AnalysisError
         The preregistration cannot be read.
     """
-    committed = next(filter(None, map(read, folders_of(study.folder).values())), None)
+    sites = {prefix.removesuffix(DASH): read(place) for prefix, place in folders_of(study.folder).items()}
+    committed = next(filter(None, sites.values()), None)
     planned = (study.protocol.get("analysis") or {}).get("participants")
     if committed is None:
         return None if planned is None else Deviations(None, tuple(_participants(study, planned)))
     return Deviations(
         committed,
         (
+            *_sites(sites, committed),
             *_protocol(study, committed),
             *_participants(study, committed.participants),
             *_exclusions(study, committed),
             *_decisions(study),
         ),
     )
+
+
+def _sites(sites: Mapping[str, Commitment | None], committed: Commitment) -> Iterator[str]:
+    """Yield the sites of a merged study that have no preregistration, or another one than the one compared with."""
+    for site, own in sites.items():
+        if own is None:
+            yield f"site {site} has no {FILE}"
+        elif own != committed:
+            yield f"the preregistration of site {site} is another one than that of the first site, used here"
 
 
 def _protocol(study: Study, committed: Commitment) -> Iterator[str]:

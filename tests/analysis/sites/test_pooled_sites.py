@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.export import export
 from study_app.analysis.figures.plotting import plot
 from study_app.analysis.findings.factors.site_comparison import FINDING as SITES
+from study_app.analysis.preregistration.commitment import FILE, Commitment, written
+from study_app.analysis.preregistration.deviations import deviations
 from study_app.analysis.report.write_report import report
 from study_app.analysis.results.levels import LevelsFound, ThresholdFound
 from study_app.analysis.tables.group_means import group_counts, group_means
@@ -99,6 +102,25 @@ def test_a_site_whose_folder_is_missing_is_not_left_out(sealed: Path, tmp_path: 
     shutil.rmtree(tmp_path / "pooled/sites/B")
     with pytest.raises(StoreError, match=r"sites/B is missing, but sites\.json lists it"):
         load_study(tmp_path / "pooled")
+
+
+def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tmp_path: Path) -> None:
+    merge(_copied(sealed, tmp_path), tmp_path / "pooled")
+    found = load_study(tmp_path / "pooled")
+    one = Commitment(found.name, found.version, found.participants["protocol_hash"].iloc[0], found.n, None, ())
+
+    def said(**others: Commitment) -> tuple[str, ...]:
+        for site, own in others.items():
+            (tmp_path / "pooled/sites" / site / FILE).write_text(written(own), encoding="utf-8")
+        compared = deviations(found)
+        assert compared is not None
+        return compared.found
+
+    assert said(B=one) == (f"site A has no {FILE}",)
+    assert said(A=replace(one, precision=0.1)) == (
+        "the preregistration of site B is another one than that of the first site, used here",
+    )
+    assert said(A=one) == ()
 
 
 def test_answers_are_pooled_by_condition(opened: Path) -> None:
