@@ -17,8 +17,8 @@ from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.theme.theme import Theme
 from study_app.store.workstation import MachineSettings
-from study_app.viewmodels.device_bench import benches_shown
-from study_app.viewmodels.device_list import DeviceShown, device_named, devices_shown
+from study_app.viewmodels.devices.bench import benches_shown
+from study_app.viewmodels.devices.list_view import DeviceShown, device_named, devices_shown
 
 PATIENCE_S = 5.0
 HELD = (

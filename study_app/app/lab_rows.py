@@ -5,7 +5,7 @@ from __future__ import annotations
 from study_app.devices.registry import list_devices
 from study_app.evaluation.appraisal import Costs, Errors
 from study_app.haptics.model.effects import NAMED
-from study_app.viewmodels.device_list import device_label
+from study_app.viewmodels.devices.list_view import device_label
 from study_app.viewmodels.lab import CostRow, ErrorRow
 
 SMALLEST_N = 0.001

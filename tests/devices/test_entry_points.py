@@ -18,7 +18,7 @@ from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.viewmodels.device_list import devices_shown
+from study_app.viewmodels.devices.list_view import devices_shown
 from study_app.viewmodels.home import study_facts
 from tests.compiled import needs_servo
 

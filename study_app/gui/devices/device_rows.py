@@ -12,8 +12,8 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card, Chip, Rule
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.viewmodels.device_bench import BenchShown
-from study_app.viewmodels.device_list import DeviceShown
+from study_app.viewmodels.devices.bench import BenchShown
+from study_app.viewmodels.devices.list_view import DeviceShown
 
 LEAST_WORDS = 280  # narrower, wrapped words would ask for room that they do not need
 INSET = 30  # behind a radio's mark

@@ -21,8 +21,8 @@ from study_app.gui.widgets.cards import SHADOW, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
-from study_app.viewmodels.device_bench import BenchShown
-from study_app.viewmodels.device_list import DeviceShown, remembered_options
+from study_app.viewmodels.devices.bench import BenchShown
+from study_app.viewmodels.devices.list_view import DeviceShown, remembered_options
 
 STACKED_BELOW = 1000
 COLUMN_PX = 340

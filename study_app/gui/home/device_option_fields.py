@@ -12,7 +12,7 @@ from study_app.devices.descriptor import DeviceOption
 from study_app.devices.registry import descriptor_of
 from study_app.gui.home.form_fields import add_field, field_with_button, text_field
 from study_app.gui.widgets.controls import ActionButton
-from study_app.viewmodels.device_list import window_options
+from study_app.viewmodels.devices.list_view import window_options
 
 
 class DeviceOptionFields(QWidget):

@@ -13,7 +13,7 @@ from study_app.gui.theme.theme import RADIUS_CARD, TANK, font
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.viewmodels.device_list import DeviceShown
+from study_app.viewmodels.devices.list_view import DeviceShown
 
 PICTURE, INSET = 56, 8
 WAKE_POINTS = 48

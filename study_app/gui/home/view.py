@@ -31,7 +31,7 @@ from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
 from study_app.session.request import resumed
 from study_app.store.workstation import DEFAULTS, MachineSettings
-from study_app.viewmodels.device_list import DeviceShown, looking
+from study_app.viewmodels.devices.list_view import DeviceShown, looking
 from study_app.viewmodels.extent import extent_of
 from study_app.viewmodels.home import (
     BrokenFacts,

@@ -12,8 +12,8 @@ from study_app.devices.descriptor import NONE, NOT_AVAILABLE, READY, Backend
 from study_app.gui.devices.view import NO_FILE, DevicesPlace
 from study_app.gui.theme.theme import DARK
 from study_app.gui.theme.themed import wear
-from study_app.viewmodels.device_bench import BenchShown
-from study_app.viewmodels.device_list import devices_shown
+from study_app.viewmodels.devices.bench import BenchShown
+from study_app.viewmodels.devices.list_view import devices_shown
 
 FOUND = [
     Backend("mouse", "the window", READY, "seen, not felt"),

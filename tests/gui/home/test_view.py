@@ -18,7 +18,7 @@ from study_app.protocol.source.files import shipped_file
 from study_app.store.exclusions import exclude
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import MachineSettings
-from study_app.viewmodels.device_list import devices_shown
+from study_app.viewmodels.devices.list_view import devices_shown
 from study_app.viewmodels.home import study_facts
 
 pytestmark = pytest.mark.slow

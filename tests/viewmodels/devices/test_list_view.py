@@ -7,7 +7,7 @@ import pytest
 from study_app.devices.backends import backends
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
 from study_app.devices.registry import list_devices
-from study_app.viewmodels.device_list import device_named, devices_shown, looking
+from study_app.viewmodels.devices.list_view import device_named, devices_shown, looking
 
 MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
 SOCKET = Backend("falcon-socket:PATH", "a Unix socket", READY, "by command")

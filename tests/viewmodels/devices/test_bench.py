@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from study_app.store.workstation import DEFAULTS, DeviceBench
-from study_app.viewmodels.device_bench import benches_shown
+from study_app.viewmodels.devices.bench import benches_shown
 
 
 def bench(**fields: Any) -> DeviceBench:

@@ -1,0 +1,1 @@
+"""What windows show of haptic devices, as values without Qt."""
