@@ -119,7 +119,7 @@ class Footage:
                 self._failure = reason(error)
 
     def _decoded(self, container: Any, play: int) -> Iterator[VideoFrame]:
-        """Yield frame after frame from the beginning, again and again; those that are overdue are not scaled."""
+        """Yield frame after frame from the beginning, again and again; overdue ones but the first are not scaled."""
         number = offset_ns = 0
         while True:
             container.seek(0)
@@ -129,7 +129,7 @@ class Footage:
                 end_ns = media_ns + self._period_ns
                 if play != self._play or self._closed:
                     return
-                if offset_ns + end_ns >= self._media_ns:
+                if number == 0 or offset_ns + end_ns >= self._media_ns:
                     width, height, stride, pixels = self._scaler.pixels(frame)
                     yield VideoFrame(number, width, height, stride, pixels, offset_ns + media_ns, 0, self._period_ns)
                 number += 1
