@@ -118,7 +118,7 @@ def test_a_source_that_fails_in_a_trial_ends_in_zero_force(
     with pytest.raises(Exception, match="the session was stopped: the file is gone"):
         run()
     assert forces[0] is False
-    assert offers == [False]  # to connect the haptic device again would not bring the video back
+    assert offers[0] is False  # to connect the haptic device again would not bring the video back
     assert "broke" in {event["event"] for event in events(results)}
     assert json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())["status"] == "unfinished"
     assert "the file is gone" in caplog.text
