@@ -31,7 +31,14 @@ from tests.documented import (
 
 PROGRAM = "liquid-study"
 PAGES = [pytest.param(page, id=name(page)) for page in pages()]
-LONG = {"docs/export.md", "docs/own-study.md", "docs/preregistration.md", "docs/threshold.md", "results/README.md"}
+LONG = {
+    "docs/answers-to-report.md",
+    "docs/export.md",
+    "docs/own-study.md",
+    "docs/preregistration.md",
+    "docs/threshold.md",
+    "results/README.md",
+}
 """Pages whose commands take half a minute or more."""
 
 RUN = [
@@ -176,7 +183,7 @@ def test_the_commands_of_a_page_run_one_after_the_other(page: Path, tmp_path: Pa
             assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(
     not all(map(importlib.util.find_spec, ("sphinx", "myst_parser", "pydata_sphinx_theme"))), reason="needs extra docs"
 )
