@@ -34,12 +34,13 @@ PAGES = [pytest.param(page, id=name(page)) for page in pages()]
 LONG = {
     "docs/answers-to-report.md",
     "docs/export.md",
+    "docs/first-session.md",
     "docs/own-study.md",
     "docs/preregistration.md",
     "docs/threshold.md",
     "results/README.md",
 }
-"""Pages whose commands take half a minute or more."""
+"""Pages whose commands take ten seconds or more."""
 
 RUN = [
     pytest.param(page, id=name(page), marks=pytest.mark.nightly if name(page) in LONG else ())

@@ -110,7 +110,7 @@ def test_a_study_is_rehearsed_verified_and_replayed_without_them(environment: di
         assert "pip install 'liquid-study[analysis]'" in failed
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @needs_servo
 def test_a_session_opens_its_windows_without_them(environment: dict[str, str], tmp_path: Path) -> None:
     command = [sys.executable, "-c", SESSION, str(tmp_path / "results")]

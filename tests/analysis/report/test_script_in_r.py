@@ -63,6 +63,7 @@ def test_r_finds_a_number_that_was_changed(of_twelve: Path, tmp_path: Path) -> N
     assert done.stdout.rstrip().endswith("numbers that differ: 1")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("sessions", [2, 3])
 def test_r_compares_sessions(sessions: int, rek: Results, tmp_path: Path) -> None:
     for number in range(1, 9):

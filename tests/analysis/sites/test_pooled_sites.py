@@ -64,6 +64,7 @@ def _copied(merged: Path, to: Path) -> dict[str, Path]:
     return {site: Path(shutil.copytree(merged / "sites" / site, to / site)) for site in "AB"}
 
 
+@pytest.mark.nightly
 def test_codes_of_sealed_sites_are_never_pooled(sealed: Path, tmp_path: Path) -> None:
     found = load_study(sealed)
     assert not found.revealed
@@ -141,6 +142,7 @@ def test_answers_are_pooled_by_condition(opened: Path) -> None:
     assert not recorded & set(found.responses["code"])
 
 
+@pytest.mark.nightly
 def test_exported_tables_have_the_site(opened: Path, tmp_path: Path) -> None:
     export(opened, tmp_path, extras=["wide", "parquet", "sav", "psych-ds"], failed=pytest.fail)
     for name in ("responses", "trials", "wide"):

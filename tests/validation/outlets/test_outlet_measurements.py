@@ -37,6 +37,7 @@ def test_every_sample_and_marker_arrives_with_the_servos_time(seconds: int) -> N
     assert found.met
 
 
+@pytest.mark.nightly
 @needs_servo
 @slow
 def test_the_servo_is_compared_with_and_without_streams() -> None:
