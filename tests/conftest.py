@@ -12,6 +12,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+from study_app.validation.outlets.localhost import localhost_only
 from study_app.workers.executors import Workers
 
 # An example may compile on a fresh machine: how long one takes is no failure.
@@ -25,6 +26,8 @@ os.environ["LIQUID_STUDY_CONFIG"] = str(Path(tempfile.gettempdir(), f"liquid-stu
 os.environ["LIQUID_STUDY_CACHE"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "cache"))
 os.environ["LIQUID_STUDY_DATA"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "data"))
 os.environ["LIQUID_STUDY_WORKSPACE"] = "."
+# The library reads its settings once in a process: those of the first test that uses it hold for all after it.
+localhost_only()
 
 try:
     import PySide6.QtWidgets  # noqa: F401

@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent
-from PySide6.QtWidgets import QApplication
 
 from study_app.app.main_controller import MainController
 from study_app.viewmodels.computer_check import OF_THE_COMPUTER
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo]
-
-
-@pytest.fixture
-def visit(qapp: Any, tmp_path: Path) -> Any:
-    made = MainController(tmp_path / "results")
-    made.window.show()
-    yield made
-    made.window.close()
-    made.end()
-    made.window.deleteLater()
-    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 def test_the_machines_place_opens_it_and_it_measures_this_computer(visit: MainController, qtbot: Any) -> None:

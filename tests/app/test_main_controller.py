@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent, Qt
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import Qt
 
 from study_app.app.main_controller import MainController
 from study_app.app.session import live_session
@@ -35,17 +34,6 @@ class Machine:
         self.stopped = True
         if self._lost:
             raise DeviceLost("the device 'falcon' is gone")
-
-
-@pytest.fixture
-def visit(qapp: Any, tmp_path: Path) -> Any:
-    made = MainController(tmp_path / "results")
-    made.window.show()
-    yield made
-    made.window.close()
-    made.end()
-    made.window.deleteLater()
-    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 @pytest.mark.slow

@@ -17,10 +17,8 @@ from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLEW, SAMPLE
 from study_app.outlets.sample_stream import CHANNELS, SampleStream, channels_of
 from study_app.outlets.session_outlets import Outlets, open_sink
 from study_app.outlets.sink import SinkKind, SinkThread
-from study_app.validation.outlets.localhost import localhost_only
 from tests.outlets.sinks import marker
 
-localhost_only()
 pylsl = pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
 slow = pytest.mark.slow
 

@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 
 from study_app.haptics.model.layout import SAMPLE
+from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
+from study_app.session.preflight import Facts, Screen
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
@@ -16,6 +19,21 @@ from study_app.session.transitions.table import advance, open_session
 # Numbers that occur nowhere by chance, so that a leak can be searched for.
 ODD_DELAY_MS = 137.0
 ODD_DENSITY = 1013.7
+
+WELL = Facts(
+    device="mouse",
+    fresh_share=1.0,
+    timing=Timing(2000, 1000.0, 1e-4, 2e-3, 0),
+    sample_age_s=0.001,
+    screen=Screen(60.0, 1.0),
+    probe_s=0.002,
+    probe_fault="",
+    free_bytes=10**10,
+    participant="P007",
+    recordings=True,
+    grant=Grant("real-time", "SCHED_FIFO 60", locked=True),
+)
+"""What the pre-flight finds on a computer on which everything is well."""
 
 SCALE = [f"point {number}" for number in range(1, 8)]
 

@@ -24,28 +24,14 @@ from study_app.session.preflight_measurements import measure
 from tests.compiled import needs_servo
 from tests.session import small
 
-WELL = Facts(
-    device="mouse",
-    fresh_share=1.0,
-    timing=Timing(2000, 1000.0, 1e-4, 2e-3, 0),
-    sample_age_s=0.001,
-    screen=Screen(60.0, 1.0),
-    probe_s=0.002,
-    probe_fault="",
-    free_bytes=10**10,
-    participant="P007",
-    recordings=True,
-    grant=Grant("real-time", "SCHED_FIFO 60", locked=True),
-)
-
 
 def verdicts(study: Protocol | None = None, **changed: Any) -> dict[str, str]:
-    return {check.name: check.verdict for check in checks(replace(WELL, **changed), study or small.protocol())}
+    return {check.name: check.verdict for check in checks(replace(small.WELL, **changed), study or small.protocol())}
 
 
 def test_where_all_is_well_nothing_is_said_but_so() -> None:
     assert set(verdicts().values()) == {"ok"}
-    assert refused(checks(WELL, small.protocol())) == ""
+    assert refused(checks(small.WELL, small.protocol())) == ""
 
 
 @pytest.mark.parametrize(
@@ -61,7 +47,7 @@ def test_where_all_is_well_nothing_is_said_but_so() -> None:
     ],
 )
 def test_who_listens_is_said_and_nothing_of_it_refuses_a_session(status: OutletStatus, verdict: str, said: str) -> None:
-    found = checks(replace(WELL, outlets=(status,)), small.protocol())
+    found = checks(replace(small.WELL, outlets=(status,)), small.protocol())
     (check,) = [one for one in found if one.name == status.title]
     assert check.verdict == verdict
     assert check.said.startswith(said)
@@ -93,7 +79,7 @@ def test_who_listens_is_said_and_nothing_of_it_refuses_a_session(status: OutletS
 )
 def test_each_fact_has_its_limit(changed: dict[str, Any], name: str, verdict: str) -> None:
     assert verdicts(**changed)[name] == verdict
-    reason = refused(checks(replace(WELL, **changed), small.protocol()))
+    reason = refused(checks(replace(small.WELL, **changed), small.protocol()))
     assert (name.lower() in reason) == (verdict == "failure")
 
 
@@ -101,7 +87,7 @@ def test_each_fact_has_its_limit(changed: dict[str, Any], name: str, verdict: st
 def test_the_share_withheld_is_told_by_liquid_where_the_operator_may_know_them(blinding: Any) -> None:
     study = small.protocol()
     study = study.model_copy(update={"study": study.study.model_copy(update={"blinding": blinding})})
-    facts = replace(WELL, withheld={"thin": 0.001, "thick": 0.032})
+    facts = replace(small.WELL, withheld={"thin": 0.001, "thick": 0.032})
     (found,) = [check for check in checks(facts, study) if check.name == "Force withheld"]
     assert (found.value, found.share) == ("at most 3.2 %", pytest.approx(0.64))
     liquids = "" if blinding == "double" else ": thick 3.2 %, thin 0.1 %"
@@ -110,7 +96,7 @@ def test_the_share_withheld_is_told_by_liquid_where_the_operator_may_know_them(b
 
 @pytest.mark.parametrize(("delay_s", "said"), [(None, "assumed"), (0.00093, "0.93 ms, measured by the device")])
 def test_the_delay_of_the_loop_is_told_with_where_it_comes_from(delay_s: float | None, said: str) -> None:
-    facts = replace(WELL, dynamics=Dynamics(delay_s))
+    facts = replace(small.WELL, dynamics=Dynamics(delay_s))
     (found,) = [check for check in checks(facts, small.protocol()) if check.name == "Loop delay"]
     assert found.value == "1 tick"
     assert said in found.about
@@ -118,16 +104,16 @@ def test_the_delay_of_the_loop_is_told_with_where_it_comes_from(delay_s: float |
 
 def test_what_was_not_granted_is_told_with_how_to_grant_it() -> None:
     grant = Grant("raised", "nice -15", advice=("do this",)).with_memory(locked=False, advice="do that")
-    said = {check.name: check.said for check in checks(replace(WELL, grant=grant), small.protocol())}["Priority"]
+    said = {check.name: check.said for check in checks(replace(small.WELL, grant=grant), small.protocol())}["Priority"]
     assert said == "raised; nice -15, memory not locked; Do this."
 
 
 def test_a_servo_below_500_hz_is_refused_whatever_it_achieves() -> None:
     slow = small.protocol().model_copy(update={"device": small.protocol().device.model_copy(update={"rate_hz": 400.0})})
-    found = checks(replace(WELL, timing=Timing(800, 400.0, 1e-4, 2e-3, 0)), slow)
+    found = checks(replace(small.WELL, timing=Timing(800, 400.0, 1e-4, 2e-3, 0)), slow)
     assert "servo rate: the servo runs at 400 Hz" in refused(found)
     enough = slow.model_copy(update={"device": slow.device.model_copy(update={"rate_hz": 500.0})})
-    assert refused(checks(replace(WELL, timing=Timing(1000, 500.0, 1e-4, 2e-3, 0)), enough)) == ""
+    assert refused(checks(replace(small.WELL, timing=Timing(1000, 500.0, 1e-4, 2e-3, 0)), enough)) == ""
 
 
 def test_less_room_is_enough_without_recordings() -> None:
@@ -207,9 +193,9 @@ method = "constant"
 
 def test_levels_beyond_the_limit_of_the_measured_delay_are_refused_with_the_highest_that_is_not() -> None:
     study = parse(DAMPERS.encode(), "dampers.toml")
-    (one,) = [check for check in checks(WELL, study) if check.name == "Levels"]
+    (one,) = [check for check in checks(small.WELL, study) if check.name == "Levels"]
     assert (one.verdict, one.value, one.about) == ("ok", "up to 25.6 N·s/m", "with a delay of 1 tick")
-    facts = replace(WELL, delay_ticks=2, dynamics=Dynamics(delay_s=1.6e-3))
+    facts = replace(small.WELL, delay_ticks=2, dynamics=Dynamics(delay_s=1.6e-3))
     (two,) = [check for check in checks(facts, study) if check.name == "Levels"]
     assert (two.verdict, two.value, two.about) == ("failure", "up to 25.6 N·s/m", "with a delay of 2 ticks")
     assert refused(checks(facts, study)) == (

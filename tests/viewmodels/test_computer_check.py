@@ -10,24 +10,10 @@ import pytest
 
 from study_app.devices.descriptor import NOT_AVAILABLE, READY, Backend
 from study_app.haptics.runtime.clocks.grants import Grant
-from study_app.haptics.runtime.telemetry import Timing
-from study_app.session.preflight import Check, Facts, Screen
+from study_app.session.preflight import Check, Screen
 from study_app.viewmodels.computer_check import OF_THE_COMPUTER, computer_checks
 from tests.session import small
 
-WELL = Facts(
-    device="scripted",
-    fresh_share=1.0,
-    timing=Timing(2000, 1000.0, 1e-4, 2e-3, 0),
-    sample_age_s=0.001,
-    screen=Screen(60.0, 1.0),
-    probe_s=0.002,
-    probe_fault="",
-    free_bytes=10**10,
-    participant="P001",
-    recordings=True,
-    grant=Grant("real-time", "SCHED_FIFO 60", locked=True),
-)
 FALCON = Backend("falcon", "libusb", "connected: 1", "force")
 NO_LIBRARY = Backend("force-dimension", "libdrd", NOT_AVAILABLE, "force", "install it")
 
@@ -35,7 +21,7 @@ NO_LIBRARY = Backend("force-dimension", "libdrd", NOT_AVAILABLE, "force", "insta
 def looked(
     devices: list[Backend], cache: Path | None = Path("c"), compiled: int = 0, **changed: Any
 ) -> dict[str, Check]:
-    found = computer_checks(replace(WELL, **changed), small.protocol(), devices, cache=cache, compiled=compiled)
+    found = computer_checks(replace(small.WELL, **changed), small.protocol(), devices, cache=cache, compiled=compiled)
     return {check.name: check for check in found}
 
 

@@ -15,13 +15,18 @@ from study_app.viewmodels.designer.requests import SetValue
 LEFT = Qt.MouseButton.LeftButton
 
 
+def type_id(qtbot: Any, designer: Any, path: tuple[str, str], name: str) -> None:
+    """Select an element and type another id, without leaving the field."""
+    designer.editing.select(path)
+    field = designer.place.form.head.id
+    qtbot.mouseClick(field, LEFT)
+    field.selectAll()
+    qtbot.keyClicks(field, name)
+
+
 def test_a_list_that_is_clicked_after_an_id_was_typed_stays_open(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.editing.select(("conditions", "thick"))
-    name = designer.place.form.head.id
-    qtbot.mouseClick(name, LEFT)
-    name.selectAll()
-    qtbot.keyClicks(name, "honey")
+    type_id(qtbot, designer, ("conditions", "thick"), "honey")
     liquids = designer.row("conditions", "thick", "liquid").field.list
     qtbot.mouseClick(liquids, LEFT)
     qtbot.wait(100)
@@ -83,11 +88,7 @@ def test_arrow_keys_walk_the_outline_after_a_number_was_typed(qtbot: Any, design
 
 def test_a_field_that_is_clicked_after_an_id_was_typed_keeps_the_keyboard(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.editing.select(("liquids", "thick"))
-    name = designer.place.form.head.id
-    qtbot.mouseClick(name, LEFT)
-    name.selectAll()
-    qtbot.keyClicks(name, "honey")
+    type_id(qtbot, designer, ("liquids", "thick"), "honey")
     (density,) = designer.row("liquids", "thick", "density_kg_m3").findChildren(QLineEdit)
     qtbot.mouseClick(density, LEFT)
     qtbot.waitUntil(lambda: "[liquids.honey]" in designer.text)
@@ -100,11 +101,7 @@ def test_a_field_that_is_clicked_after_an_id_was_typed_keeps_the_keyboard(qtbot:
 
 def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_typed(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
-    designer.editing.select(("liquids", "thick"))
-    name = designer.place.form.head.id
-    qtbot.mouseClick(name, LEFT)
-    name.selectAll()
-    qtbot.keyClicks(name, "honey")
+    type_id(qtbot, designer, ("liquids", "thick"), "honey")
     (density,) = designer.row("liquids", "thick", "density_kg_m3").findChildren(QLineEdit)
     at = density.mapTo(designer.window, density.rect().center())
     QTest.mouseClick(designer.window.windowHandle(), LEFT, pos=at)

@@ -308,30 +308,6 @@ def test_the_id_of_a_question_with_answers_is_locked_until_it_is_said_what_break
     assert head.id.isReadOnly()
 
 
-def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(designer: Any, qtbot: Any) -> None:
-    text = designer.file.read_text()
-    designer.file.write_text(f"{text}# The pages thanks and thanks_2 are short.\n")
-    designer.controller.open("kitchen")
-    designer.editing.select(("pages", "thanks"))
-    head = designer.place.form.head
-    head.edit_id()
-    qtbot.keyClicks(head.id, "goodbye")
-    qtbot.keyClick(head.id, Qt.Key.Key_Return)
-    assert "[pages.goodbye]" in designer.text
-    assert designer.place.prompt is None  # what is typed next must not go to a card
-    assert head.comments.text() == "1 comment mentions “thanks”"
-    click(qtbot, head.comments)
-    card = designer.place.prompt
-    lines = [line.accessibleName() for line in card.lines]
-    count = len(designer.text.splitlines())
-    assert lines == [f"Go to line {count}: # The pages thanks and thanks_2 are short."]
-    click(qtbot, card.lines[0])
-    assert designer.place.file.editor.textCursor().blockNumber() == count - 1
-    assert designer.text.endswith("# The pages thanks and thanks_2 are short.\n")
-    designer.editing.select(("pages", "welcome"))
-    assert not head.comments.isVisible()
-
-
 def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_path: Path) -> None:
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()

@@ -14,11 +14,9 @@ from study_app.outlets.marker import CODES
 from study_app.store import workstation
 from study_app.store.verification.verify_study import verify
 from study_app.store.workstation import MachineSettings
-from study_app.validation.outlets.localhost import localhost_only
 from tests.app.people import Person, events, receipt_of, window
 from tests.compiled import needs_servo
 
-localhost_only()
 pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
 pytest.importorskip("serial", reason="pyserial is not installed: pip install 'liquid-study[triggers]'")
 

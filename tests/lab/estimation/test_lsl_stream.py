@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -35,10 +34,7 @@ def made(labels: tuple[str, ...], name: str) -> Any:
 
 
 @pytest.fixture
-def outlet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    settings = tmp_path / "lsl_api.cfg"
-    settings.write_text("[multicast]\nResolveScope = machine\n[lab]\nKnownPeers = {127.0.0.1}\n", encoding="utf-8")
-    monkeypatch.setenv("LSLAPICFG", str(settings))
+def outlet() -> Iterator[Any]:
     found = made((*LABELS, "vx_mps", "vy_mps", "vz_mps"), NAME)
     yield found
     del found

@@ -11,13 +11,11 @@ import pytest
 from study_app.errors import OutletError
 from study_app.validation.outlets import lateness, trigger_delays
 from study_app.validation.outlets.lateness import Ratio, ratio_of
-from study_app.validation.outlets.localhost import localhost_only
 from study_app.validation.outlets.outlet_report import stream_text, trigger_text
 from study_app.validation.outlets.streams import Streamed, stream
 from study_app.validation.outlets.trigger_delays import VIRTUAL, TriggerDelays
 from tests.compiled import needs_servo
 
-localhost_only()
 pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
 pytest.importorskip("serial", reason="pyserial is not installed: pip install 'liquid-study[triggers]'")
 slow = pytest.mark.slow

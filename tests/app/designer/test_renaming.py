@@ -1,0 +1,31 @@
+"""Renames in the window: the comments that mention the old name."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtCore import Qt
+
+
+def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(designer: Any, qtbot: Any) -> None:
+    text = designer.file.read_text()
+    designer.file.write_text(f"{text}# The pages thanks and thanks_2 are short.\n")
+    designer.controller.open("kitchen")
+    designer.editing.select(("pages", "thanks"))
+    head = designer.place.form.head
+    head.edit_id()
+    qtbot.keyClicks(head.id, "goodbye")
+    qtbot.keyClick(head.id, Qt.Key.Key_Return)
+    assert "[pages.goodbye]" in designer.text
+    assert designer.place.prompt is None  # what is typed next must not go to a card
+    assert head.comments.text() == "1 comment mentions “thanks”"
+    qtbot.mouseClick(head.comments, Qt.MouseButton.LeftButton)
+    card = designer.place.prompt
+    lines = [line.accessibleName() for line in card.lines]
+    count = len(designer.text.splitlines())
+    assert lines == [f"Go to line {count}: # The pages thanks and thanks_2 are short."]
+    qtbot.mouseClick(card.lines[0], Qt.MouseButton.LeftButton)
+    assert designer.place.file.editor.textCursor().blockNumber() == count - 1
+    assert designer.text.endswith("# The pages thanks and thanks_2 are short.\n")
+    designer.editing.select(("pages", "welcome"))
+    assert not head.comments.isVisible()
