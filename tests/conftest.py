@@ -65,6 +65,13 @@ def pytest_runtest_teardown() -> None:
             gc.freeze()
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say why a test ran again."""
+    for report in terminalreporter.stats.get("rerun", []):
+        terminalreporter.section(f"ran again: {report.nodeid} ({report.when})", sep="-")
+        terminalreporter.line(report.longreprtext)
+
+
 _settings = itertools.count()
 
 
