@@ -47,9 +47,9 @@ class Person(QObject):
         self._timer.start(20)
 
     def look(self):
-        participant = window(ParticipantWindow)
-        if participant is None or participant.page is None:
-            return
+        participant, operator = window(ParticipantWindow), window(OperatorWindow)
+        if participant is None or participant.page is None or operator is None:
+            return  # on a busy computer one opens, or closes, before the other
         if self.once is not None:
             act, self.once = self.once, None
             act(participant)
@@ -65,9 +65,8 @@ class Person(QObject):
         elif isinstance(page, PausePage):  # the machine stood still
             QTest.keyClick(participant.widget, Qt.Key.Key_Return)
         elif isinstance(page, TroublePage):
-            window(OperatorWindow).end_asked.emit("aborted", "cable")
+            operator.end_asked.emit("aborted", "cable")
         elif isinstance(page, EndPage):
-            operator = window(OperatorWindow)
             QTest.mouseClick(operator.buttons.close_session, Qt.MouseButton.LeftButton)
 
 
