@@ -19,7 +19,7 @@ from study_app.errors import StoreError
 from study_app.store.clock import SessionClock
 from study_app.store.journals.journal import plain, read, scan
 from study_app.store.journals.journal_writer import Journal
-from tests.store.journals.texts import AWKWARD
+from tests.store.journals.awkward_text import AWKWARD
 
 
 def three_answers(path: Path) -> Path:

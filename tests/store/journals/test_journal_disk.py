@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.store.journals.journal import read, scan
 from study_app.store.journals.journal_writer import Journal
-from tests.store.journals.texts import AWKWARD
+from tests.store.journals.awkward_text import AWKWARD
 
 
 @pytest.mark.parametrize("mended", [True, False], ids=["taken back at once", "taken back before the next line"])
