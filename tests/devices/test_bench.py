@@ -210,7 +210,7 @@ def test_position_that_is_not_finite_is_passed_over():
     from study_app.devices.bench.excitation import BenchDriver, Excitation
     from study_app.haptics.runtime.clocks.clock import VirtualClock
     from study_app.haptics.runtime.servo import Servo
-    from tests.haptics.probe import Probe
+    from tests.haptics.recording_device import Probe
 
     probe = Probe(velocity_mps=(0.0, 0.0, 0.0))
     probe.state.bad_at_read = 300

@@ -19,7 +19,7 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.live import Live, open_live
 from study_app.lab.programmed_paths import REACHED, TITLES, led_to, programme
-from tests.haptics.probe import Probe
+from tests.haptics.recording_device import Probe
 from tests.lab.benches import SCENES, bench, live_with, run, scripted
 
 

@@ -19,7 +19,7 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.recompute import take_sample
 from study_app.haptics.runtime.servo import Servo
-from tests.haptics.probe import Probe
+from tests.haptics.recording_device import Probe
 from tests.haptics.running import felt, force_n, is_zero, wait_until
 from tests.haptics.scenes import HONEY, WATER
 

@@ -4,7 +4,7 @@ import pytest
 
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
-from tests.haptics.probe import Probe
+from tests.haptics.recording_device import Probe
 
 
 @pytest.fixture

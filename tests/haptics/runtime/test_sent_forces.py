@@ -16,7 +16,7 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from study_app.haptics.runtime.servo import Servo
-from tests.haptics.probe import Probe
+from tests.haptics.recording_device import Probe
 from tests.haptics.scenes import HONEY
 
 

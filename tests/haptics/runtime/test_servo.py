@@ -18,7 +18,7 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import HISTORY, timing
 from tests.compiled import needs_servo
-from tests.haptics.probe import Probe
+from tests.haptics.recording_device import Probe
 from tests.haptics.running import is_zero
 from tests.haptics.scenes import HONEY, WATER
 

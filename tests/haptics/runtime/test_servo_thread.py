@@ -13,7 +13,7 @@ from study_app.errors import DeviceLost, StudyError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.compiled import needs_servo
-from tests.haptics.probe import PROBE, Probe
+from tests.haptics.recording_device import PROBE, Probe
 from tests.haptics.running import force_n, is_zero, scene_of, wait_until
 from tests.haptics.scenes import HONEY, WATER
 
@@ -109,7 +109,7 @@ SCRIPT = """
 import os, signal, sys, threading
 import numpy as np
 from study_app.haptics.runtime.servo import Servo
-from tests.haptics.probe import PROBE, Probe
+from tests.haptics.recording_device import PROBE, Probe
 from tests.haptics.running import force_n, wait_until
 from tests.haptics.scenes import HONEY
 

@@ -14,7 +14,7 @@ if sys.platform == "win32":
     pytest.skip("signals of POSIX", allow_module_level=True)
 
 from study_app.haptics.runtime.suspension import SUSPENDING, allow_suspension, refuse_suspension
-from tests.haptics.probe import PROBE
+from tests.haptics.recording_device import PROBE
 
 NUMBERS = [getattr(signal, name) for name in SUSPENDING]
 
@@ -22,7 +22,7 @@ SCRIPT = """
 import os, signal, sys
 import numpy as np
 from study_app.haptics.runtime.servo import Servo
-from tests.haptics.probe import PROBE, Probe
+from tests.haptics.recording_device import PROBE, Probe
 from tests.haptics.running import force_n, wait_until
 from tests.haptics.scenes import HONEY
 

@@ -17,7 +17,7 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.validation.soak import faulty_device as faulty
 from study_app.validation.soak.faulty_device import KINDS, FaultyDevice
 from study_app.validation.soak.restless_hand import REACH_M, RestlessHand
-from tests.haptics.probe import Probe
+from tests.haptics.recording_device import Probe
 
 
 def turned(kind, readings, *, seed=1, ticks=2000, gap=(20, 60)):
