@@ -23,7 +23,7 @@ from study_app.analysis.tables.tracks import tracks
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from tests.analysis.levels.test_sensitivities import block
-from tests.analysis.report.pages import numbers, run_in_r
+from tests.analysis.report.read_report import numbers, run_in_r
 
 LEVELS = (0.5, 2.0, 8.0)
 

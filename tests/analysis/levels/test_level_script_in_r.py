@@ -22,7 +22,7 @@ from study_app.analysis.tables.study import Study
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from tests.analysis.levels.test_sensitivities import ONE, ROVING, block
-from tests.analysis.report.pages import numbers, run_in_r
+from tests.analysis.report.read_report import numbers, run_in_r
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo]

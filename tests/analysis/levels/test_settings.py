@@ -31,7 +31,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.tables.column import header
 from study_app.store.tables.level_columns import SETTINGS
-from tests.analysis.report.pages import numbers, run_in_r
+from tests.analysis.report.read_report import numbers, run_in_r
 from tests.compiled import needs_servo
 from tests.protocol.trials.matching import text_of
 

@@ -12,7 +12,7 @@ from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse, source_bytes
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, make_results, twelve
-from tests.analysis.report.pages import numbers, read, rows, run_in_r
+from tests.analysis.report.read_report import numbers, read, rows, run_in_r
 
 pytestmark = pytest.mark.slow
 

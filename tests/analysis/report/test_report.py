@@ -17,7 +17,7 @@ from study_app.analysis.tables.study import load_study
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve
-from tests.analysis.report.pages import answered_by_two, numbers, read, rows
+from tests.analysis.report.read_report import answered_by_two, numbers, read, rows
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ import pytest
 
 from study_app.analysis.report.write_report import report
 from tests.analysis.conftest import Results
-from tests.analysis.report.pages import numbers, run_in_r
+from tests.analysis.report.read_report import numbers, run_in_r
 
 pytestmark = pytest.mark.slow
 
