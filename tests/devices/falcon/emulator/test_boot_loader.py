@@ -9,7 +9,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("emulators are C functions", allow_module_level=True)
 
 from study_app.devices.falcon.wire import constants
-from tests.devices.falcon.support.emulated import exchanged, still, stripped
+from tests.devices.falcon.support.emulated_falcon import exchanged, still, stripped
 
 
 def words(*values):

@@ -8,7 +8,16 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.falcon.emulator.faults import CHANCES, SWITCHES
 from study_app.errors import DeviceError
-from tests.devices.falcon.support.emulated import HOMING, at_work, counts_in, exchanged, home, packet, still, stripped
+from tests.devices.falcon.support.emulated_falcon import (
+    HOMING,
+    at_work,
+    counts_in,
+    exchanged,
+    home,
+    packet,
+    still,
+    stripped,
+)
 
 
 def replies_to(emulator, ticks):

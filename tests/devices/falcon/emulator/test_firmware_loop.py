@@ -11,7 +11,7 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.falcon.wire import constants
 from tests.devices.falcon.emulator.test_arm import closed_form
-from tests.devices.falcon.support.emulated import HOMING, at_work, counts_in, exchanged, home, packet, status_in
+from tests.devices.falcon.support.emulated_falcon import HOMING, at_work, counts_in, exchanged, home, packet, status_in
 
 pytestmark = pytest.mark.slow
 

@@ -9,7 +9,7 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.falcon.emulator.ftdi_bridge import byte_ns
 from study_app.devices.falcon.wire import constants
-from tests.devices.falcon.support.emulated import MS, at_work, exchanged, packet, still, stripped
+from tests.devices.falcon.support.emulated_falcon import MS, at_work, exchanged, packet, still, stripped
 
 STATUS = b"\x01\x60"
 QUIET = packet()

@@ -22,7 +22,7 @@ from study_app.cli.devices import state_of
 from study_app.devices.falcon.emulator.socket_server import EmulatorServer
 from study_app.devices.falcon.wire import constants
 from study_app.errors import DeviceError
-from tests.devices.falcon.support.emulated import HOMING, packet, still
+from tests.devices.falcon.support.emulated_falcon import HOMING, packet, still
 
 pytestmark = pytest.mark.slow
 

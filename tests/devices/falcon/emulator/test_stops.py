@@ -12,7 +12,7 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.falcon.emulator.emulator import STOPS_M
 from study_app.devices.falcon.mechanics.geometry import GEOMETRIES, WORKSPACE_M
 from tests.devices.falcon.emulator.test_arm import closed_form
-from tests.devices.falcon.support.emulated import at_work, exchanged, home
+from tests.devices.falcon.support.emulated_falcon import at_work, exchanged, home
 
 STRONGEST = [(4095, 4095, 4095), (-4095, 4095, -4095), (-4095, -4095, -4095)]
 

@@ -12,7 +12,7 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
 from study_app.devices.falcon.wire import constants
-from tests.devices.falcon.support.emulated import packet, still, stripped
+from tests.devices.falcon.support.emulated_falcon import packet, still, stripped
 
 
 def plugged(*emulators):
