@@ -23,7 +23,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.verification.leaks import Telltales, find_leaks, telltales
 from tests.compiled import needs_servo
 from tests.faults.support import short
-from tests.faults.support.windows import Person, traces_of, words_of
+from tests.faults.support.watched_program import Person, traces_of, words_of
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
 

@@ -25,7 +25,7 @@ from study_app.store.progress import progress_of
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults.support import short
-from tests.faults.support.windows import Person
+from tests.faults.support.watched_program import Person
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
 

@@ -25,7 +25,7 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
-from tests.faults.support.windows import Person
+from tests.faults.support.watched_program import Person
 
 COLUMNS = (
     "participant",

@@ -25,7 +25,7 @@ from study_app.session import start
 from study_app.session.pages import PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.trial import RunningTrial
 from tests.faults.support import short
-from tests.faults.support.windows import Person
+from tests.faults.support.watched_program import Person
 
 LONGEST_S = "2"
 WINDOW_S = 5.0

@@ -30,7 +30,7 @@ from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.store import recording_writer
 from tests.faults.support import short
-from tests.faults.support.windows import Person
+from tests.faults.support.watched_program import Person
 
 LEFT = Qt.MouseButton.LeftButton
 
