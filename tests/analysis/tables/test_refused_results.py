@@ -11,7 +11,7 @@ from study_app.store.tables.column import header
 from study_app.store.tables.columns import RESPONSES, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, read_table
 from tests.analysis.conftest import Results, make_results
-from tests.analysis.tables.results import by_condition, refusal
+from tests.analysis.tables.differing_answers import by_condition, refusal
 from tests.store.earlier import TRIALS_HEADER
 
 pytestmark = pytest.mark.slow

@@ -7,7 +7,7 @@ from study_app.analysis.tables.study import Study, load_study
 from study_app.errors import StoreError
 from study_app.protocol.load import parse, source_bytes
 from tests.analysis.conftest import CANNOT_JUDGE, Results, make_results
-from tests.analysis.tables.results import by_condition, refusal
+from tests.analysis.tables.differing_answers import by_condition, refusal
 
 pytestmark = pytest.mark.slow
 
