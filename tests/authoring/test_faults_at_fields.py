@@ -8,7 +8,7 @@ from study_app.authoring.study import Study, read
 from study_app.protocol.source.problems import Fault
 from study_app.viewmodels.designer.form_rows import Form, form
 from study_app.viewmodels.designer.problem_rows import element_of
-from tests.protocol.cases import CASES, Case
+from tests.protocol.faulty_protocols import CASES, Case
 
 OF_THE_ELEMENT = {
     "name of a table", "wake called for but missing", "block left out", "page left out", "page named like a block",

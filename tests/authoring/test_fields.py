@@ -15,7 +15,7 @@ from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.problems import shown
 from tests.authoring.grown import PROTOCOLS
-from tests.protocol.cases import CASES, Case
+from tests.protocol.faulty_protocols import CASES, Case
 
 DEFS = schema()["$defs"]
 STUDIES = {name: read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS).document for name in shipped()}

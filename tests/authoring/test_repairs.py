@@ -6,7 +6,7 @@ from study_app.authoring.additions import additions_for
 from study_app.authoring.repairs import repairs
 from study_app.authoring.study import Study, read
 from tests.authoring.grown import PROTOCOLS
-from tests.protocol.cases import CASES, Case
+from tests.protocol.faulty_protocols import CASES, Case
 
 
 def study_of(name: str, *changes: tuple[str, str]) -> Study:

@@ -11,7 +11,7 @@ from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse, protocol_hash, shipped, source_bytes
 from study_app.protocol.orders import constrained
 from study_app.protocol.orders.schedule import build_schedule
-from tests.protocol.cases import BROKEN, CASES, Case
+from tests.protocol.faulty_protocols import BROKEN, CASES, Case
 from tests.protocol.sound import EVERY_ORDER, ORDER, SOUND
 
 

@@ -12,7 +12,7 @@ import pytest
 from study_app.protocol.load import SceneFile
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.trials.kinds import DESIGN_KINDS
-from tests.protocol.cases import case
+from tests.protocol.faulty_protocols import case
 from tests.protocol.forms.mixed import MIXED
 from tests.protocol.sound import SOUND
 from tests.protocol.trials.studies import BLOCK, HEAD

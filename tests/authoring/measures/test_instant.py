@@ -16,7 +16,7 @@ from study_app.haptics.model.limits import slope_limit
 from study_app.protocol.load import load, shipped
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.source.files import shipped_file
-from tests.protocol.cases import CASES
+from tests.protocol.faulty_protocols import CASES
 
 
 def study_of(name: str) -> Study:

@@ -11,7 +11,7 @@ from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.protocol.instruments.instrument import instrument, instruments
 from study_app.protocol.load import load, parse
 from study_app.protocol.orders.block_orders import orders_of
-from tests.protocol.cases import SOUND
+from tests.protocol.faulty_protocols import SOUND
 from tests.protocol.forms.mixed import MIXED, mixed_file
 
 
