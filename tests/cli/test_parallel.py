@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.workers.cases import draw
+from tests.workers.worker_cases import draw
 
 pytestmark = [
     pytest.mark.slow,
@@ -24,7 +24,7 @@ COMMAND = f"""
     import signal, sys
     from study_app.cli.parallel import executor_for
     from study_app.workers.executors import Workers
-    from tests.workers.cases import draw_or_wait
+    from tests.workers.worker_cases import draw_or_wait
     if __name__ == "__main__":
         signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
         try:

@@ -18,8 +18,8 @@ from study_app.workers import cluster as clusters
 from study_app.workers.cluster import ADDRESS
 from study_app.workers.environment import environment
 from study_app.workers.executors import Workers, open_executor
-from tests.workers.cases import draw, killed_once, refuse
 from tests.workers.local_cluster import INSTALLED, MISSING, local_cluster
+from tests.workers.worker_cases import draw, killed_once, refuse
 
 pytestmark = pytest.mark.slow
 needs_distributed = pytest.mark.skipif(not INSTALLED, reason=MISSING)

@@ -19,7 +19,7 @@ import pytest
 from study_app.errors import Problem, ProtocolError, StudyError, WorkerError
 from study_app.workers.executors import Workers, open_executor
 from study_app.workers.spawning import CONTEXT
-from tests.workers.cases import die, draw, killed_once, loaded, refuse, refuse_file
+from tests.workers.worker_cases import die, draw, killed_once, loaded, refuse, refuse_file
 
 pytestmark = pytest.mark.slow
 
@@ -123,7 +123,7 @@ def test_nothing_can_be_submitted_after_the_end() -> None:
 ENDLESS = """
     import os, signal, sys, time
     from study_app.workers.executors import Workers, open_executor
-    from tests.workers.cases import report_and_wait
+    from tests.workers.worker_cases import report_and_wait
     if __name__ == "__main__":
         signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
         try:

@@ -18,7 +18,7 @@ import pytest
 from study_app.workers import kept_cases
 from study_app.workers.kept_cases import OLD_S, KeptCases
 from study_app.workers.processes import CancellingExecutor
-from tests.workers.cases import counted_draw, draw
+from tests.workers.worker_cases import counted_draw, draw
 
 pytestmark = pytest.mark.slow
 
