@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from study_app.authoring.study import Study, read
+from tests.app.designer.support.made_studies import STUDIES
 from tests.app.designer.support.program import USERS, environment
-from tests.app.designer.support.studies import STUDIES
 from tests.compiled import needs_servo
 from tests.real_windows import needs_display, virtual_display
 

@@ -26,8 +26,8 @@ from study_app.gui.designer.versions.change_list import ChangeLine
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import shipped_file
 from tests.app.designer.support.key_user import KeyUser
+from tests.app.designer.support.made_studies import begin, participant, save
 from tests.app.designer.support.program import USERS, environment, use
-from tests.app.designer.support.studies import begin, participant, save
 from tests.app.designer.support.users import User, name_of, wait_until
 from tests.real_windows import virtual_display
 
