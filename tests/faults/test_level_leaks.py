@@ -21,7 +21,7 @@ from study_app.store.journals import journal
 from study_app.store.verification.leaks import find_leaks, presented_numbers, recorded_numbers, telltales
 from tests.compiled import needs_servo
 from tests.faults.support.watched_program import Person, traces_of, words_of
-from tests.protocol.trials.studies import BLOCK, HEAD
+from tests.protocol.trials.level_studies import BLOCK, HEAD
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
 

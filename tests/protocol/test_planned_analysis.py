@@ -15,7 +15,7 @@ from study_app.protocol.streams import stream
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.blinded.whole_protocol import whole_protocol
 from study_app.store.receipt import without_conditions
-from tests.protocol.trials.studies import study, text_of
+from tests.protocol.trials.level_studies import study, text_of
 
 PLANNED = """
 [analysis]

@@ -15,7 +15,7 @@ from study_app.protocol.trials.kinds import DESIGN_KINDS
 from tests.protocol.faulty_protocols import case
 from tests.protocol.forms.mixed import MIXED
 from tests.protocol.sound import SOUND
-from tests.protocol.trials.studies import BLOCK, HEAD
+from tests.protocol.trials.level_studies import BLOCK, HEAD
 
 SCHEMA = schema()
 PROTOCOLS = Path(__file__).parents[2] / "protocols"

@@ -11,7 +11,7 @@ from study_app.session.transitions.commands import Finish, Write
 from study_app.session.transitions.events import Begin, Chosen, Continue, Submitted, TaskDone, TimeUp
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
-from tests.protocol.trials.studies import BLOCK, HEAD, SECRET, key_of, study
+from tests.protocol.trials.level_studies import BLOCK, HEAD, SECRET, key_of, study
 
 PRACTICE = """
 [pages.rest]

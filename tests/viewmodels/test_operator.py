@@ -14,7 +14,7 @@ from study_app.store.tables.columns import TRIALS
 from study_app.viewmodels.number_words import duration_words, grouped, minutes
 from study_app.viewmodels.operator import MEASURES
 from study_app.viewmodels.session.stages import stages
-from tests.protocol.trials.studies import study
+from tests.protocol.trials.level_studies import study
 
 SECRETS = ("thin", "thick", "prompt", "200")
 

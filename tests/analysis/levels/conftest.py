@@ -10,7 +10,7 @@ import pytest
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
-from tests.protocol.trials.studies import FIVE_POINTS, SHORT, text_of, text_of_damper
+from tests.protocol.trials.level_studies import FIVE_POINTS, SHORT, text_of, text_of_damper
 
 MORE = """
 [stimuli.around]

@@ -33,7 +33,7 @@ from study_app.store.withdrawals.withdraw import withdraw
 from tests.analysis.levels.conftest import ADAPTIVE
 from tests.analysis.made_up import delays, everybody, liquids, study
 from tests.analysis.report.read_report import numbers, read, run_in_r
-from tests.protocol.trials.studies import text_of_damper
+from tests.protocol.trials.level_studies import text_of_damper
 from tests.studies import made_up
 
 pytestmark = pytest.mark.slow

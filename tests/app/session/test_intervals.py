@@ -16,7 +16,7 @@ from study_app.session.pages import ChoicePage, EndPage, FeedbackPage, TaskPage
 from study_app.store.verification.reproduction import reproduced
 from tests.app.people import Person, events, rows, window
 from tests.compiled import needs_servo
-from tests.protocol.trials.studies import BLOCK, HEAD
+from tests.protocol.trials.level_studies import BLOCK, HEAD
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp", "nobody_stays", "quick_preflight")]
 

@@ -19,7 +19,7 @@ from study_app.analysis.tables.study import load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
-from tests.protocol.trials.studies import text_of_damper
+from tests.protocol.trials.level_studies import text_of_damper
 
 BLOCK = """
 [methods.quest]

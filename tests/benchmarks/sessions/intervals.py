@@ -23,7 +23,7 @@ from study_app.session.transitions.commands import Command, ShowPage
 from study_app.session.transitions.events import Begin
 from study_app.session.transitions.state import FINAL, Phase
 from study_app.session.transitions.table import advance
-from tests.protocol.trials.studies import study
+from tests.protocol.trials.level_studies import study
 from tests.session import pairs
 
 TRIALS = 40

@@ -11,7 +11,7 @@ from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
 from tests.protocol.forms.mixed import MIXED
 from tests.protocol.groups.grouped import GROUPS, STUDY
-from tests.protocol.trials.studies import BLOCK, HEAD
+from tests.protocol.trials.level_studies import BLOCK, HEAD
 
 pytestmark = pytest.mark.slow
 

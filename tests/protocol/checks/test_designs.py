@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from study_app.errors import ProtocolError
-from tests.protocol.trials.studies import study
+from tests.protocol.trials.level_studies import study
 
 STIMULUS = 'stimulus = "viscosity"'
 DRAG = 'effects = ["drag"]\ndrag = { law = "haider-levenspiel" }'

@@ -18,7 +18,7 @@ from study_app.protocol.trials.due import next_level
 from study_app.protocol.trials.method import Heard, TrackSetting
 from study_app.protocol.trials.methods.updown import UpDown
 from study_app.protocol.trials.tracks import design_of, tracks_of
-from tests.protocol.trials.studies import answered, key_of, study
+from tests.protocol.trials.level_studies import answered, key_of, study
 
 CONSTANT = 'kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 8'
 PRACTICE = """

@@ -13,8 +13,8 @@ from study_app.protocol.trials.methods.adjustment import START_SHARE, Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.task import lasting
 from study_app.protocol.trials.tracks import adjusting_of, method_of
+from tests.protocol.trials.level_studies import key_of, run
 from tests.protocol.trials.matching import ALONE, DELAY, matching
-from tests.protocol.trials.studies import key_of, run
 
 LOW, HIGH = math.log10(2), math.log10(18)
 WIDE = (HIGH - LOW) * START_SHARE

@@ -15,7 +15,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.due import next_level
 from study_app.protocol.trials.method import Heard
 from study_app.protocol.trials.tracks import design_of, tracks_of
-from tests.protocol.trials.studies import answered, key_of, study
+from tests.protocol.trials.level_studies import answered, key_of, study
 
 CATCH = ("task =", "catch = { share = 0.1 }\ntask =")
 LONG = ("repetitions = 8", "repetitions = 20")

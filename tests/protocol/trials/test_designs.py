@@ -7,7 +7,7 @@ import pytest
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.designs.rating_of_interval import Rated
 from study_app.protocol.trials.kinds import DESIGN_KINDS, METHOD_KINDS, default_design
-from tests.protocol.trials.studies import key_of, run, study
+from tests.protocol.trials.level_studies import key_of, run, study
 
 
 def design(kind: str) -> Design:

@@ -13,7 +13,7 @@ from study_app.protocol.trials.keyed import Key
 from study_app.protocol.trials.presentation import arrangement_text, longest_delay_s
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tracks import design_of
-from tests.protocol.trials.studies import SECRET, answered, key_of, run, study
+from tests.protocol.trials.level_studies import SECRET, answered, key_of, run, study
 
 UNTIL = "until = { right = 4, of = 5 }\n"
 
@@ -163,7 +163,7 @@ def test_what_comes_does_not_depend_on_the_order_of_answers_or_on_later_ones():
 
 
 PROGRAM = """
-from tests.protocol.trials.studies import key_of, run, study
+from tests.protocol.trials.level_studies import key_of, run, study
 protocol = study()
 print([(due.level, due.arrangement) for due in run(protocol, key_of(protocol))])
 """

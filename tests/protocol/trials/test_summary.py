@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
-from tests.protocol.trials.studies import study
+from tests.protocol.trials.level_studies import study
 from tests.protocol.trials.test_due import CONDITIONS
 
 

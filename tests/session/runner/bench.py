@@ -15,7 +15,7 @@ from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.transitions.events import Begin
 from study_app.session.transitions.state import Phase
-from tests.protocol.trials.studies import key_of
+from tests.protocol.trials.level_studies import key_of
 from tests.session.fakes import FakeJournal
 
 TO_AND_FRO_M = 0.03

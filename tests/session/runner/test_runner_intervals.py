@@ -22,7 +22,7 @@ from study_app.session.transitions.events import (
 )
 from study_app.session.transitions.state import Phase
 from tests.compiled import needs_servo
-from tests.protocol.trials.studies import study
+from tests.protocol.trials.level_studies import study
 from tests.session.runner.bench import Bench
 
 pytestmark = [needs_servo, pytest.mark.slow]

@@ -30,7 +30,7 @@ from study_app.viewmodels.servo_health import Vitals
 from study_app.viewmodels.session.stages import stages
 from tests.compiled import needs_servo
 from tests.outlets.collector import collecting
-from tests.protocol.trials.studies import FIVE_POINTS, SHORT, text_of
+from tests.protocol.trials.level_studies import FIVE_POINTS, SHORT, text_of
 from tests.session.sealed.numbers_written import Trials, every_number, told
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow, needs_servo]

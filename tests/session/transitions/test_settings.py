@@ -25,8 +25,8 @@ from study_app.session.transitions.events import (
 )
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
+from tests.protocol.trials.level_studies import key_of
 from tests.protocol.trials.matching import ALONE, DELAY, matching
-from tests.protocol.trials.studies import key_of
 from tests.session.transitions.states import shown, written
 
 DONE = TaskDone(30.0, "complete", {"duration_s": 20.0})

@@ -21,7 +21,7 @@ from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
-from tests.protocol.trials.studies import SHORT, text_of
+from tests.protocol.trials.level_studies import SHORT, text_of
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 

@@ -16,7 +16,7 @@ from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.protocol.model import Protocol
 from study_app.store.blinded.resolved_model import as_recorded, sealed_model
 from study_app.store.sessions.open_session import SessionStore
-from tests.protocol.trials import studies
+from tests.protocol.trials import level_studies
 from tests.store.sessions.conftest import Again
 
 MUD = {"density_kg_m3": 1313.7, "viscosity_pa_s": 2.0, "effects": "auto"}
@@ -114,7 +114,7 @@ def test_a_liquid_whose_delay_is_varied_keeps_its_effects(
         ('vary = "viscosity_pa_s"\nstandards = [1, 2]\nlevels = [0.1, 0.8]', 'vary = "delay_ms"\nlevels = [50, 200]'),
         ("\nlevels = [0.2, 0.4, 0.8]", "\nlevels = [60, 100]"),
     ]
-    protocol = studies.study(*late)
+    protocol = level_studies.study(*late)
     (chosen,) = resolve(protocol.scene_of("thin")).liquids
     with start(protocol=protocol) as store:
         leave_all_out(monkeypatch)

@@ -15,7 +15,7 @@ from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.leaks import Telltales, certain_telltales, find_leaks, presented_numbers, telltales
-from tests.protocol.trials.studies import study as levels_study
+from tests.protocol.trials.level_studies import study as levels_study
 
 
 def found(folder: Path, protocol: Protocol) -> list[tuple[str, str]]:

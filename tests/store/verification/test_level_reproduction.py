@@ -22,7 +22,7 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
-from tests.protocol.trials.studies import BLOCK, HEAD
+from tests.protocol.trials.level_studies import BLOCK, HEAD
 from tests.session.pairs import short_text
 from tests.store.forging import Lines, change, cut, nothing
 

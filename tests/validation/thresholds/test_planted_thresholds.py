@@ -19,7 +19,7 @@ from study_app.validation.thresholds.planted import SHIPPED, Planted, planted
 from study_app.validation.thresholds.verdicts import Verdict, markdown, spread, table, verdicts
 from study_app.validation.thresholds.whole_pipeline import judged, rehearsed
 from tests.compiled import needs_servo
-from tests.protocol.trials.studies import text_of_damper
+from tests.protocol.trials.level_studies import text_of_damper
 
 pytestmark = pytest.mark.slow
 

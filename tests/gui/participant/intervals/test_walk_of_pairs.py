@@ -35,7 +35,7 @@ from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
 from tests.compiled import needs_servo
 from tests.gui.small import ManualClock
-from tests.protocol.trials.studies import key_of
+from tests.protocol.trials.level_studies import key_of
 from tests.real_windows import Program, needs_display, virtual_display
 from tests.walking import laid_out, place_in
 
