@@ -14,5 +14,5 @@ AnalysisClient: TypeAlias = WorkerClient[Order, Answer]
 
 
 def start_analysis_worker() -> AnalysisClient:
-    """Start a worker process for orders about studies (see `study_app.analysis.worker.carry_out`)."""
-    return WorkerClient("study_app.analysis.worker:carry_out", name="analysis")
+    """Start a worker process for orders about studies (see `study_app.analysis.study_worker.carry_out`)."""
+    return WorkerClient("study_app.analysis.study_worker:carry_out", name="analysis")

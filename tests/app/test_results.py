@@ -13,7 +13,7 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from study_app.analysis.worker import carry_out
+from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_client import start_analysis_worker
 from study_app.analysis.worker_messages import Answer, Order
 from study_app.app.results import ResultsController
