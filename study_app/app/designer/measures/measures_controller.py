@@ -8,10 +8,10 @@ from typing import Any, Final
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.app.designer.editing import Editing
+from study_app.app.designer.measures.measures_worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
 from study_app.app.designer.measures.page_fit import PageFit
 from study_app.app.designer.measures.slow_numbers import SlowNumbers
 from study_app.app.designer.measures.wanted import LAPSES, participants_of, precision_of, threshold_of, wanted_of
-from study_app.app.designer.measures.worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.authoring.facts import facts
 from study_app.authoring.measures.observers import Measurable, Observed

@@ -9,7 +9,7 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from study_app.app.designer.measures.worker import (
+from study_app.app.designer.measures.measures_worker import (
     Found,
     MeasureClient,
     MeasureOrder,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any, Final
 
-from study_app.app.designer.measures.worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
+from study_app.app.designer.measures.measures_worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
 from study_app.authoring.measures.texts import text_keys
 from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
 from study_app.protocol.model import Protocol

@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit
 
-from study_app.app.designer.measures.worker import (
+from study_app.app.designer.measures.measures_worker import (
     Advising,
     Detecting,
     Grouping,

@@ -96,7 +96,7 @@ MeasureClient: TypeAlias = WorkerClient[MeasureOrder, tuple[Wanted, Found] | Non
 
 def start_measure_worker() -> MeasureClient:
     """Start the worker process, at the lowest priority."""
-    return WorkerClient("study_app.app.designer.measures.worker:carry_out", name="measures", background=True)
+    return WorkerClient("study_app.app.designer.measures.measures_worker:carry_out", name="measures", background=True)
 
 
 def carry_out(order: MeasureOrder, tell: Tell, stop: Stop) -> None:

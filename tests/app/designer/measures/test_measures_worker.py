@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from study_app.analysis.power.threshold_studies import plans, sweep
-from study_app.app.designer.measures.wanted import wanted_of
-from study_app.app.designer.measures.worker import (
+from study_app.app.designer.measures.measures_worker import (
     THRESHOLD_STUDIES,
     Advising,
     Detecting,
@@ -17,6 +16,7 @@ from study_app.app.designer.measures.worker import (
     MeasureOrder,
     carry_out,
 )
+from study_app.app.designer.measures.wanted import wanted_of
 from study_app.authoring.new_study import template
 from study_app.authoring.study import read
 from study_app.authoring.writer.edits import Set
