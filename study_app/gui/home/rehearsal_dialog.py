@@ -11,7 +11,7 @@ from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import wear
 from study_app.gui.widgets.controls import ActionButton, Number
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.session.simulated.worker import TASK, RehearsalClient, RehearsalOrder
+from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
 from study_app.store.folders import rehearsal_folder
 from study_app.viewmodels.home import StudyFacts
 from study_app.workers.client import WorkerClient

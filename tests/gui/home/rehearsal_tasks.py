@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 
 from study_app.errors import StudyError
-from study_app.session.simulated.worker import RehearsalOrder
+from study_app.session.simulated.rehearsal_worker import RehearsalOrder
 from study_app.workers.server import Stop, Tell
 
 

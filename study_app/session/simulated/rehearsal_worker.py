@@ -9,7 +9,7 @@ from typing import Final, TypeAlias
 from study_app.workers.client import WorkerClient
 from study_app.workers.server import Stop, Tell
 
-TASK: Final = "study_app.session.simulated.worker:carry_out"
+TASK: Final = "study_app.session.simulated.rehearsal_worker:carry_out"
 
 
 @dataclass(frozen=True, slots=True)
