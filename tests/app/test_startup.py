@@ -62,7 +62,7 @@ application = application_here()
 beside = threading.Thread(target=load_windows)
 beside.start()
 beside.join()
-windows = {"study_app.app.session.preflight_controller", "study_app.app.session.windows"}
+windows = {"study_app.app.session.preflight_controller", "study_app.app.session.session_windows"}
 assert windows | {"pyarrow.parquet"} <= set(sys.modules)
 objects = [one for one in gc.get_objects() if isinstance(one, QObject)]
 assert application in objects

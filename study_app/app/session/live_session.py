@@ -74,7 +74,7 @@ def run_session(chosen: NewSession, tell: Callable[[str], object] | None) -> int
 def load_windows() -> None:
     """Load the modules of a session's windows while the note is shown: a third of a second; no object is made."""
     import study_app.app.session.preflight_controller  # noqa: PLC0415
-    import study_app.app.session.windows  # noqa: PLC0415
+    import study_app.app.session.session_windows  # noqa: PLC0415
     import study_app.store.recording_writer  # noqa: F401, PLC0415 - and pyarrow, which the recorder is made with
 
 
@@ -229,7 +229,7 @@ class LiveSession(QObject):
         """Go on with what the thread made ready, or raise what it met."""
         if not isinstance(made, Ready):
             raise made if isinstance(made, Exception) else TypeError(made)
-        from study_app.app.session.windows import open_windows  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.app.session.session_windows import open_windows  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         chosen, rig = self.chosen, made.rig
         source = chosen.read_source()
