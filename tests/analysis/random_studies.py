@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.report import number_files, summary
+from study_app.analysis.report import findings_summary, number_files
 from study_app.analysis.report.block_section import block
 from study_app.analysis.report.first_page.page import first_page
 from study_app.analysis.report.json_values import plain
@@ -49,12 +49,12 @@ def check(number: int) -> None:
     results = evaluate(made, planning=False)
     assert results.failures == (), number
     json.dumps(plain(results), allow_nan=False)
-    summary.findings(results)
+    findings_summary.findings(results)
     methods(made, results)
     r_script(made, results)
     number_files.tests_csv(results)
     failures = Failures()
-    page = first_page(results, summary.limits(made, results), failures)
+    page = first_page(results, findings_summary.limits(made, results), failures)
     assert failures.found == [], number
     assert not re.search(r"\bnan\b|\bNone\b|\binf\b", re.sub(r'src="[^"]*"', "", page)), number
     for found in results.blocks:

@@ -9,9 +9,9 @@ import pytest
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.contrast_with_control import FINDING as CONTRASTS
 from study_app.analysis.report.block_section import block
+from study_app.analysis.report.findings_summary import findings
 from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.r_script import r_script
-from study_app.analysis.report.summary import findings
 from study_app.analysis.results.words import all_of, percent
 from study_app.analysis.tables.study import Study
 from tests.analysis.made_up import DECIDED, delays, everybody, liquids, study

@@ -18,7 +18,7 @@ from study_app.analysis.figures.picture import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.report_figures import pictures
 from study_app.analysis.preregistration.deviations import section as preregistration_section
-from study_app.analysis.report import block_section, conduct_section, number_files, summary
+from study_app.analysis.report import block_section, conduct_section, findings_summary, number_files
 from study_app.analysis.report.answers import question_section
 from study_app.analysis.report.first_page.page import first_page
 from study_app.analysis.report.html_page import box, bullets, heading, not_there, page, paragraph, render, table
@@ -112,8 +112,8 @@ def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: F
     texts = {
         what: _or_why(failures, f"texts: {what}", make, one_line=what == "methods")
         for what, make in (
-            ("findings", lambda: summary.findings(results)),
-            ("limits", lambda: summary.limits(study, results)),
+            ("findings", lambda: findings_summary.findings(results)),
+            ("limits", lambda: findings_summary.limits(study, results)),
             ("methods", lambda: methods(study, results)),
         )
     }
@@ -213,7 +213,7 @@ def _short(texts: Mapping[str, Any], results: Results) -> Iterator[str]:
         return
     yield heading(2, "In short: every finding in a sentence")
     found = texts["findings"]
-    yield bullets(found) if found else paragraph(summary.none_found(results))
+    yield bullets(found) if found else paragraph(findings_summary.none_found(results))
 
 
 def _again(study: Study, results: Results) -> Iterator[str]:

@@ -11,7 +11,7 @@ from study_app.analysis.findings.contrast_with_control import ContrastWithContro
 from study_app.analysis.findings.delay_meaning import by_delay, meaning, tempting_ms
 from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
 from study_app.analysis.findings.lowest_delay import Lowest
-from study_app.analysis.report.summary import findings, limits
+from study_app.analysis.report.findings_summary import findings, limits
 from study_app.analysis.results.block_results import BlockFound
 from study_app.analysis.results.block_results import Results as Found
 from study_app.analysis.statistics.equivalence.tost import tost

@@ -8,12 +8,12 @@ from typing import Any, Final
 
 from markupsafe import Markup
 
+from study_app.analysis.report.findings_summary import none_found, of_levels
 from study_app.analysis.report.first_page import pictures
 from study_app.analysis.report.first_page.answer import Answer
 from study_app.analysis.report.first_page.claims import answers, questions
 from study_app.analysis.report.html_page import render
 from study_app.analysis.report.measured import empty_studies
-from study_app.analysis.report.summary import none_found, of_levels
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.section_failures import Failure, Failures
 
