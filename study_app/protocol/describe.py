@@ -12,8 +12,8 @@ from study_app.protocol.checks.delay_warnings import delay_warnings
 from study_app.protocol.checks.level_warnings import level_warnings
 from study_app.protocol.groups.own_protocol import Variant, variants
 from study_app.protocol.groups.steps import sessions_differ
-from study_app.protocol.instruments.summary import sources
-from study_app.protocol.instruments.summary import warnings as from_memory
+from study_app.protocol.instruments.instrument_summary import sources
+from study_app.protocol.instruments.instrument_summary import warnings as from_memory
 from study_app.protocol.model import Block, Condition, Protocol, Questionnaire, Reach
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import block_duration_s, expected_duration_s
