@@ -19,7 +19,7 @@ MODULES = (
     "study_app.devices.descriptor",
     "study_app.store.folders",
     "study_app.store.verification.verify_study",
-    "study_app.analysis.tables.study",
+    "study_app.analysis.tables.study_tables",
     "study_app.analysis.statistics.friedman",
     "study_app.analysis.statistics.trend",
     "study_app.psychophysics.families",

@@ -18,7 +18,7 @@ from study_app.analysis.results.not_tested import NotTested
 from study_app.analysis.results.section_failures import Ended, Failure, Failures, Progress, silent
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.performance import Performance, performance
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 SEED: Final = 1
 """Of all random rearrangements and resamples: the same results give the same numbers."""
@@ -36,7 +36,7 @@ def evaluate(study: Study, *, progress: Progress = silent, planning: bool = True
     --------
     >>> from pathlib import Path
     >>> from study_app.analysis.findings.settings_differ import FINDING
-    >>> from study_app.analysis.tables.study import load_study
+    >>> from study_app.analysis.tables.study_tables import load_study
     >>> results = evaluate(load_study(Path("results/sample-rek2024")), planning=False)
     >>> [(block.id, block.n, block.revealed) for block in results.blocks]
     [('liquids', 12, False), ('delays', 12, False)]

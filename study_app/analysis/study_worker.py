@@ -37,7 +37,7 @@ from study_app.workers.messages import Stopped
 
 if TYPE_CHECKING:
     from study_app.analysis.tables.compared_blocks import Block
-    from study_app.analysis.tables.study import Study
+    from study_app.analysis.tables.study_tables import Study
 
 # The libraries of an evaluation are loaded where they are needed: sessions are listed before.
 
@@ -103,7 +103,7 @@ def _changed(path: Path) -> float:
 
 def _read(folder: Path, tell: Tell, stop: Callable[[], bool]) -> None:
     """Tell of the sessions, then of the study, then draw; once the key is open, evaluate and draw the rest."""
-    from study_app.analysis.tables.study import load_study  # noqa: PLC0415
+    from study_app.analysis.tables.study_tables import load_study  # noqa: PLC0415
 
     tell(Progress("reading sessions", 0.0))
     opened = reveals_of(folder) if all_opened(folder) else ()

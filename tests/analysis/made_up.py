@@ -11,7 +11,7 @@ import pandas as pd
 
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting
 from study_app.analysis.tables.planned_analysis import NOTHING, Decided
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.store.tables.column import Column
 from study_app.store.tables.columns import RESPONSES, TRIALS
 

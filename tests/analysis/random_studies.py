@@ -16,7 +16,7 @@ from study_app.analysis.report.json_values import plain
 from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.r_script import r_script
 from study_app.analysis.results.section_failures import Failures
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study
 
 

@@ -35,7 +35,7 @@ from study_app.analysis.statistics.multiple_comparisons import false_discovery, 
 from study_app.analysis.statistics.paired import paired
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting
 from study_app.analysis.tables.planned_analysis import Decided
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from study_app.protocol.load import load, parse, source_bytes
 from tests.analysis.conftest import Answer, make_results, twelve

@@ -19,7 +19,7 @@ from study_app.analysis.report.block_section import block
 from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.words import said_of_presentations
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from tests.analysis.made_up import ITEMS, delays, everybody, liquids, study
 
 pytestmark = pytest.mark.slow

@@ -15,7 +15,7 @@ from study_app import figure_style as style
 from study_app.analysis.export.export import export
 from study_app.analysis.figures import captions
 from study_app.analysis.study_worker import carry_out
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.worker_client import AnalysisClient, start_analysis_worker
 from study_app.analysis.worker_messages import (
     Answer,

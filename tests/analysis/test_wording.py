@@ -13,7 +13,7 @@ from study_app.analysis.report.findings_summary import findings
 from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.r_script import r_script
 from study_app.analysis.results.words import all_of, percent
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from tests.analysis.made_up import DECIDED, delays, everybody, liquids, study
 
 pytestmark = pytest.mark.slow

@@ -10,7 +10,7 @@ import pytest
 from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.report.answers.withheld_section import withheld
 from study_app.analysis.tables.compared_blocks import setting_name
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.evaluation import replay as replay_module
 from study_app.evaluation.replay import replay

@@ -17,7 +17,7 @@ from study_app.analysis.statistics.outcome import DRAWS, Outcome, draws_for
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.measures import Array, medians, presentations
 from study_app.analysis.tables.planned_analysis import Decided
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 T = TypeVar("T")
 U = TypeVar("U")

@@ -33,7 +33,7 @@ from study_app.analysis.statistics.student_interval import student_interval
 from study_app.analysis.tables.compared_blocks import setting_name
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import number_or_none, quartiles_or_none
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.analysis.tables.tracks import answers_timed, tracks
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.trials.design import Reply

@@ -13,7 +13,7 @@ from study_app.analysis.measures.measure import Measure
 from study_app.analysis.results.question_answers import GroupAnswers, QuestionFound, ScoreFound
 from study_app.analysis.tables.asked_questions import AskedIn, AskedQuestion, AskedScore
 from study_app.analysis.tables.compared_blocks import setting_name
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.discovery import modules_of
 from study_app.protocol.instruments.instrument import instrument, instruments
 from study_app.protocol.instruments.scores import score

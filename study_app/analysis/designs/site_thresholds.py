@@ -9,7 +9,7 @@ import numpy as np
 from study_app.analysis.results.levels import LevelsFound
 from study_app.analysis.results.site_thresholds import SiteThresholds
 from study_app.analysis.statistics.independent_groups import groups_differ
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 
 def site_thresholds(study: Study, levels: Sequence[LevelsFound], seed: int) -> Iterator[SiteThresholds]:

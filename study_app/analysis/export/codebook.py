@@ -12,7 +12,7 @@ from study_app.analysis.export.level_tables import names_of_sealed
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import AGREEMENT, LEVELS, QUARTILES
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.store.sites.unblind_sites import reveals_of
 from study_app.store.tables.column import MISSING, Column
 from study_app.store.tables.columns import SEALED

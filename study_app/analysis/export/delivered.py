@@ -7,7 +7,7 @@ from typing import Final
 
 import pandas as pd
 
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.store.tables.column import Column, header, optional
 from study_app.store.tables.columns import PARTICIPANTS
 

@@ -11,7 +11,7 @@ from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name
 from study_app.analysis.export.typed_tables import deliver
 from study_app.analysis.export.wide_table import wide
 from study_app.analysis.results.section_failures import Failure, Progress, silent
-from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.store.withdrawals.output_log import write_output
 
 

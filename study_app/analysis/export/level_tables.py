@@ -11,7 +11,7 @@ import pandas as pd
 from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.export.delivered import JUDGED, Delivered, delivered
 from study_app.analysis.results.levels import LevelsFound, SettingFound
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.analysis.tables.tracks import OF_INTERVALS, tracks
 from study_app.store.tables.column import Column, header, unsealed
 from study_app.store.tables.columns import INTERVALS, TRIALS_2, tables_of

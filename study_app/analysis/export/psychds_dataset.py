@@ -10,7 +10,7 @@ from typing import Any, Final
 from study_app import __version__
 from study_app.analysis.export.codebook import codebook_bytes
 from study_app.analysis.tables.compared_blocks import spoken
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.errors import ProtocolError
 from study_app.protocol.source.files import at_hand, find, protocol_hash, source_bytes
 from study_app.protocol.source.liquid_files import unbundled

@@ -21,7 +21,7 @@ from study_app.analysis.export.delivered import Delivered
 from study_app.analysis.export.wide_table import Cells, QuestionCells
 from study_app.analysis.tables.asked_questions import AskedScore
 from study_app.analysis.tables.measures import LEVELS
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.errors import AnalysisError
 from study_app.store.tables.column import Column
 

@@ -11,7 +11,7 @@ from study_app.analysis.export.codebook import codebook_bytes
 from study_app.analysis.export.delivered import Delivered
 from study_app.analysis.export.frame_csv import table_bytes
 from study_app.analysis.export.wide_table import Cells, QuestionCells
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
 OPENED: Final = ("tracks", "thresholds", "settings")

@@ -16,7 +16,7 @@ from study_app.analysis.export.delivered import JUDGED, Delivered, delivered, wi
 from study_app.analysis.export.level_tables import level_tables
 from study_app.analysis.tables.compared_blocks import Setting
 from study_app.analysis.tables.measures import AGREEMENT, LEVELS, QUARTILES
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.store.tables.column import Column, header, optional, unsealed
 from study_app.store.tables.columns import RESPONSES, TRIALS_2, tables_of
 

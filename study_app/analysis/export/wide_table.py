@@ -13,7 +13,7 @@ from study_app.analysis.export.delivered import Delivered, with_site
 from study_app.analysis.tables.asked_questions import AskedQuestion, AskedScore
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting, setting_name
 from study_app.analysis.tables.measures import Array, by_participant
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.store.tables.column import Column, Kind, optional
 from study_app.store.tables.columns import RESPONSES
 

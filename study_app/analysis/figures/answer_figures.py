@@ -13,7 +13,7 @@ from study_app.analysis.figures import captions, diverging_bars, small_multiples
 from study_app.analysis.figures.page_layout import Mark
 from study_app.analysis.tables.compared_blocks import Block, Kind
 from study_app.analysis.tables.measures import by_participant
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.errors import AnalysisError
 
 KINDS: Final[tuple[Kind, ...]] = ("liquids", "delays")

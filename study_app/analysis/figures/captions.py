@@ -10,7 +10,7 @@ import pandas as pd
 from study_app.analysis.figures.small_multiples import line_words
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.measures import QUARTILES
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 REASONS: Final = 5
 REASON_SIGNS: Final = 80

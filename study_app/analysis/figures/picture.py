@@ -15,7 +15,7 @@ from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.section_failures import Failure, Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.compared_blocks import Block
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 
 @dataclass(frozen=True, slots=True)

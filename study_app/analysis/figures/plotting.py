@@ -15,7 +15,7 @@ from study_app.analysis.figures.levels.level_pictures import level_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.results.section_failures import Failures
-from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.errors import AnalysisError
 from study_app.store.withdrawals.output_log import write_output
 

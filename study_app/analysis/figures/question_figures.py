@@ -14,7 +14,7 @@ from study_app.analysis.results.question_answers import QuestionFound
 from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.asked_questions import AskedQuestion
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.discovery import modules_of
 
 FIGURES: Final[dict[str, QuestionFigure]] = {

@@ -13,7 +13,7 @@ from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.lowest_delay import FINDING as LOWEST
 from study_app.analysis.results.block_results import Results
 from study_app.analysis.results.section_failures import Failure, Failures
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 
 def pictures(

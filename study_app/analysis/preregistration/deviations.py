@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from study_app.analysis.preregistration.commitment import FILE, Commitment, read
 from study_app.analysis.report.html_page import bullets, heading, paragraph
 from study_app.analysis.results.words import counted, listed
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.store.exclusions import named
 from study_app.store.sites.merged import DASH, folders_of
 

@@ -25,7 +25,7 @@ from study_app.analysis.tables.group_means import By, group_counts, group_means
 from study_app.analysis.tables.performance import DEFINITIONS as TRIAL_DEFINITIONS
 from study_app.analysis.tables.performance import OF_REACHES, OF_TRIALS, Performance
 from study_app.analysis.tables.reaches import DEFINITIONS as REACH_DEFINITIONS
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.exclusions import named
 

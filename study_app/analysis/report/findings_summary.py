@@ -11,7 +11,7 @@ from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.item_test import Tested
 from study_app.analysis.results.words import counted, lead, listed, missing, name, short
 from study_app.analysis.statistics.outcome import FEW
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 
 def findings(results: Results) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from study_app.analysis.report.answers.level_methods import level_methods
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.words import counted, listed, said_of_presentations, settings_noun
 from study_app.analysis.tables.measures import QUARTILES
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 
 def methods(study: Study, results: Results) -> str:

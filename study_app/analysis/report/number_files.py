@@ -20,7 +20,7 @@ from study_app.analysis.report.test_rows import TESTS
 from study_app.analysis.results.block_results import Results
 from study_app.analysis.results.section_failures import Failure, Failures
 from study_app.analysis.results.words import name
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
 from study_app.store.sites.merged import MANIFEST, folders_of

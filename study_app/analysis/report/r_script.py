@@ -11,7 +11,7 @@ from study_app.analysis.report.number_files import tests
 from study_app.analysis.report.r_syntax import r_number, r_text, r_vector
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.statistics.trend import EXACT_UP_TO
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 START: Final = """\
 # Computes the main numbers of report.html again, in base R (4.0 or newer, no packages), from the tables next to this

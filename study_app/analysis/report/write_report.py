@@ -28,7 +28,7 @@ from study_app.analysis.report.typeface import font_faces
 from study_app.analysis.results.block_results import Results
 from study_app.analysis.results.section_failures import Failure, Failures, Progress, silent
 from study_app.analysis.results.words import counted
-from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.errors import AnalysisError
 from study_app.store.sites.unblind_sites import reveals_of
 from study_app.store.withdrawals.output_log import write_output

@@ -8,7 +8,7 @@ import pandas as pd
 
 from study_app.analysis.results.delivered_delay import Delivered
 from study_app.analysis.tables.compared_blocks import Block
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.protocol.orders.balance import Evenness, evenness
 
 

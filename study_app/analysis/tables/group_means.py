@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 
 import pandas as pd
 
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 By: TypeAlias = Literal["group", "site"]
 

@@ -17,7 +17,7 @@ import pandas as pd
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.measures import Array, quartiles
 from study_app.analysis.tables.reaches import Reach, Targets, reaches, targets_of
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.store.recording_files import read_samples

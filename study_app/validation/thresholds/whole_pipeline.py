@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from study_app.analysis.designs.estimated_exponents import estimated_exponents
 from study_app.analysis.designs.thresholds import thresholds
-from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.evaluation.replay import replay
 from study_app.session.simulated.rehearsal import rehearse

@@ -6,7 +6,7 @@ import pytest
 
 from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures, captions, diverging_bars
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, twelve
 from tests.analysis.figures.drawn import by_person, gids, panel, segments, shown, words

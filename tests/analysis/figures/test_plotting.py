@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from study_app.analysis.figures import answer_figures, captions, plotting
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve
 from tests.analysis.figures.drawn import by_person, gids, panel, segments, words

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures, movement_plots, recognition_matrix, small_multiples
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from tests.analysis.conftest import Results, twelve
 
 pytestmark = pytest.mark.slow

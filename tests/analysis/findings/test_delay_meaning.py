@@ -19,7 +19,7 @@ from study_app.analysis.statistics.multiple_comparisons import holm
 from study_app.analysis.statistics.trend import step_down
 from study_app.analysis.tables.compared_blocks import Item, Setting
 from study_app.analysis.tables.planned_analysis import NOTHING, Direction
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from tests.analysis.conftest import Results
 
 CALM = [1, 1, 0, 0, -1] * 6

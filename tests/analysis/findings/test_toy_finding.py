@@ -17,7 +17,7 @@ from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings import all_findings
 from study_app.analysis.report.write_report import report
 from study_app.analysis.study_worker import carry_out
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
 from study_app.store.blinded.unblinding import unblind
 

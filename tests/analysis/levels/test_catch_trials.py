@@ -16,7 +16,7 @@ from study_app.analysis.designs.track_courses import courses
 from study_app.analysis.figures.levels.level_pictures import level_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.results.levels import LevelsFound
-from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.analysis.tables.tracks import TRACK, answers_of, tracks
 from study_app.psychophysics.families import success
 

@@ -18,7 +18,7 @@ from study_app.analysis.report.answers import level_section
 from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_methods import level_methods
 from study_app.analysis.report.write_report import report
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind

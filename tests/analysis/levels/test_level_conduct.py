@@ -12,7 +12,7 @@ from study_app.analysis.designs.level_conduct import catch_answers, level_conduc
 from study_app.analysis.designs.levels import levels_found
 from study_app.analysis.report.answers import level_conduct_section
 from study_app.analysis.results.levels import CatchAnswers, LevelConduct, LevelsFound
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks
 from tests.analysis.levels.test_thresholds import block
 

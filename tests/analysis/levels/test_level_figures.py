@@ -17,7 +17,7 @@ from study_app.analysis.figures.levels.weber_figure import published_fractions, 
 from study_app.analysis.figures.plotting import plot
 from study_app.analysis.results.levels import LevelsFound, PublishedValue, ThresholdFound
 from study_app.analysis.statistics.psychometrics.posterior import fitted, narrowing
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.psychometric import analysis_grid, assumed_for

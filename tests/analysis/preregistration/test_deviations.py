@@ -10,7 +10,7 @@ import pytest
 from study_app.analysis.preregistration.commitment import CATCH, FILE, Commitment, written
 from study_app.analysis.preregistration.deviations import Deviations, deviations, section
 from study_app.analysis.report.write_report import report
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
 from study_app.store.folders import StudyFolder

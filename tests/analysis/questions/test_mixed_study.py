@@ -14,7 +14,7 @@ from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.export import export
 from study_app.analysis.report.write_report import report
 from study_app.analysis.study_worker import carry_out
-from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
 from study_app.protocol.forms.simulated_observer import Felt
 from study_app.protocol.load import load

@@ -8,7 +8,7 @@ import pytest
 
 from study_app.analysis.report.write_report import report
 from study_app.analysis.tables.group_means import group_counts, group_means
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.protocol.forms.simulated_observer import NOTHING_FELT
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind

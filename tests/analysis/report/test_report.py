@@ -13,7 +13,7 @@ from fontTools.ttLib import TTFont
 
 from study_app.analysis.report.write_report import report
 from study_app.analysis.results.words import counted, listed, number, p_equals, p_value
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.over_all_statements import FINDING as OVERALL
 from study_app.analysis.report.json_values import plain
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
 from study_app.protocol.load import load
 from tests.analysis.conftest import Results, make_results, twelve

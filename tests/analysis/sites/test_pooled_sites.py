@@ -22,7 +22,7 @@ from study_app.analysis.preregistration.deviations import deviations
 from study_app.analysis.report.write_report import report
 from study_app.analysis.results.levels import LevelsFound, ThresholdFound
 from study_app.analysis.tables.group_means import group_counts, group_means
-from study_app.analysis.tables.study import Study, load_study, pooled
+from study_app.analysis.tables.study_tables import Study, load_study, pooled
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from study_app.analysis.tables import planned_analysis
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import Results, twelve
 

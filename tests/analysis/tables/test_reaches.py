@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from study_app.analysis.tables.performance import performance
 from study_app.analysis.tables.reaches import Targets, path_length_m, reaches, submovements
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder

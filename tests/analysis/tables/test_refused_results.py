@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis.tables import typed_files
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError, StoreError
 from study_app.store.tables.column import header
 from study_app.store.tables.columns import RESPONSES, TRIALS

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from study_app.analysis.designs.levels import levels_found
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind

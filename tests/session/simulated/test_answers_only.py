@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from study_app.analysis.export.export import export
 from study_app.analysis.figures.plotting import plot
-from study_app.analysis.tables.study import load_study
+from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.protocol.forms.simulated_observer import Felt

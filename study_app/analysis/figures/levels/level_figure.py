@@ -18,7 +18,7 @@ from study_app.analysis.figures.picture import Picture, files_of, sample_words
 from study_app.analysis.results.levels import LevelAnswers, LevelsFound, ThresholdFound
 from study_app.analysis.results.words import counted
 from study_app.analysis.statistics.outcome import Array
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.analysis.tables.tracks import tracks
 from study_app.psychophysics.families import Family, success
 

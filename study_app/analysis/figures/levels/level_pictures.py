@@ -11,7 +11,7 @@ from study_app.analysis.figures.levels import level_figure, settings_figure, tra
 from study_app.analysis.figures.picture import Picture, attempted
 from study_app.analysis.results.levels import LevelsFound
 from study_app.analysis.results.section_failures import Failures
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 Draw: TypeAlias = Callable[[Study, LevelsFound, Sequence[str], str], Picture]
 

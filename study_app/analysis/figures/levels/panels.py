@@ -13,7 +13,7 @@ from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
 from study_app.analysis.results.levels import LevelsFound
 from study_app.analysis.results.words import counted
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 COLUMNS: Final = 4
 PANEL_PT: Final = 84.0

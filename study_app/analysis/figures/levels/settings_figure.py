@@ -17,7 +17,7 @@ from study_app.analysis.figures.page_layout import Sheet
 from study_app.analysis.figures.picture import Picture, files_of, sample_words
 from study_app.analysis.results.levels import LevelsFound, SettingFound
 from study_app.analysis.results.words import counted
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 MARGIN: Final = 0.08
 """Of the axis beyond the lowest and the highest setting, as a share of the span."""

@@ -18,7 +18,7 @@ from study_app.analysis.figures.picture import Picture, files_of, sample_words
 from study_app.analysis.results.levels import LevelsFound
 from study_app.analysis.results.words import counted
 from study_app.analysis.statistics.outcome import Array
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.analysis.tables.tracks import tracks
 
 MOST_PANELS: Final = 24

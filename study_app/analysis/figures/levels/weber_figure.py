@@ -14,7 +14,7 @@ from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
 from study_app.analysis.figures.picture import Picture, files_of, sample_words
 from study_app.analysis.results.levels import LevelsFound
 from study_app.analysis.results.words import counted
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 LEFT_PT: Final = 34.0
 RIGHT_PT: Final = 10.0

@@ -14,7 +14,7 @@ from study_app.analysis.results.levels import (
     ThresholdFound,
 )
 from study_app.analysis.tables.level_blocks import LevelBlock
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 from study_app.protocol.trials.methods.updown import UpDown
 
 START: Final = """

@@ -11,7 +11,7 @@ from study_app.analysis.report.html_page import bullets, heading, paragraph, pic
 from study_app.analysis.results.block_results import Results
 from study_app.analysis.results.question_answers import QuestionFound, ScoreFound
 from study_app.analysis.results.words import number
-from study_app.analysis.tables.study import Study
+from study_app.analysis.tables.study_tables import Study
 
 
 def places(results: Results) -> dict[str, str]:

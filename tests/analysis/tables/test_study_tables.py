@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.tables.study import Study, load_study
+from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.errors import StoreError
 from study_app.protocol.load import parse, source_bytes
 from tests.analysis.conftest import CANNOT_JUDGE, Results, make_results
