@@ -8,7 +8,7 @@ import pytest
 
 from study_app import errors
 from study_app.app.designer.play.playable import NotPlayableError
-from study_app.authoring.study import Refused
+from study_app.authoring.edited_study import Refused
 from study_app.authoring.versions.contents import ChangedOutsideError
 from study_app.devices.failure_table import DeviceFailure, DeviceFailureNotFound
 from study_app.devices.falcon.boot import BootFailure

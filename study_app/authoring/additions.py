@@ -8,10 +8,10 @@ from contextlib import suppress
 from typing import Any, Final
 
 from study_app.authoring.changes.initial_values import LETTER, initial, singular
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at, rows
 from study_app.authoring.names import check_id, free_name, sections_at
 from study_app.authoring.repairs import Repair, is_unknown_name, removes, repairs
-from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Duplicate, Edit, Insert, Set
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path, entries, names, value_at

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from study_app.authoring.changes.initial_values import initial
+from study_app.authoring.edited_study import Study
 from study_app.authoring.schema_nodes import node_at, table_of, tags
-from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path, has

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
-from study_app.authoring.study import Study
+from study_app.authoring.edited_study import Study
 from study_app.authoring.writer.edits import Edit
 from study_app.authoring.writer.splices import Splices, reverted
 from study_app.protocol.source.document import Path

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.authoring.changes.languages import languages_of, with_language, without_language
-from study_app.authoring.study import Study, read
+from study_app.authoring.edited_study import Study, read
 from study_app.authoring.templates import FOLDER, templates
 from study_app.authoring.versions.contents import save
 from study_app.authoring.writer.edits import Set

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from study_app.authoring.changes.initial_values import initial
+from study_app.authoring.edited_study import Study
 from study_app.authoring.names import choices_at
-from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Insert, Rename, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.checks.pace import paced

@@ -4,9 +4,9 @@ import pytest
 
 from study_app.authoring.additions import added, duplicated
 from study_app.authoring.changes.initial_values import initial
+from study_app.authoring.edited_study import read
 from study_app.authoring.fields import row_at
 from study_app.authoring.new_study import template
-from study_app.authoring.study import read
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path
 from tests.authoring.grown import PROTOCOLS

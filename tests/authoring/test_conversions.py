@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from study_app.authoring.conversions import left_by, switched
-from study_app.authoring.study import Study, read
+from study_app.authoring.edited_study import Study, read
 from study_app.authoring.writer.refused import Refused
 from tests.authoring.grown import PROTOCOLS
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.authoring.study import Study, read
+from study_app.authoring.edited_study import Study, read
 from study_app.protocol.source.problems import Fault
 from study_app.viewmodels.designer.form_rows import Form, form
 from study_app.viewmodels.designer.problem_rows import element_of

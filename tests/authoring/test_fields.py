@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from study_app.authoring.edited_study import read
 from study_app.authoring.fields import UNITS, Row, label_of, row_at, rows, unit_of
-from study_app.authoring.study import read
 from study_app.protocol.load import shipped
 from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.json_schema import schema

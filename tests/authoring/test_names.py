@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from study_app.authoring.edited_study import Study, read
 from study_app.authoring.names import (
     check_id,
     choices_at,
@@ -17,7 +18,6 @@ from study_app.authoring.names import (
     replaced,
     with_references,
 )
-from study_app.authoring.study import Study, read
 from study_app.authoring.writer.refused import Refused
 from study_app.haptics.model.liquid import MAX_ID
 from study_app.protocol.orders.schedule import build_schedule

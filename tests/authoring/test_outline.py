@@ -1,7 +1,7 @@
 from __future__ import annotations
 
+from study_app.authoring.edited_study import read
 from study_app.authoring.outline import found, outline, title_of
-from study_app.authoring.study import read
 from tests.authoring.grown import PROTOCOLS
 
 TEXT = (PROTOCOLS / "rek2024.toml").read_text(encoding="utf-8")

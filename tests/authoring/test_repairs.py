@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from study_app.authoring.additions import additions_for
+from study_app.authoring.edited_study import Study, read
 from study_app.authoring.repairs import repairs
-from study_app.authoring.study import Study, read
 from tests.authoring.grown import PROTOCOLS
 from tests.protocol.faulty_protocols import CASES, Case
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from study_app.authoring.edited_study import read
 from study_app.authoring.fields import row_at
 from study_app.authoring.known_answers import known_answers, simulated
 from study_app.authoring.new_study import Answers, answered, copy_of, template
-from study_app.authoring.study import read
 from study_app.authoring.templates import FOLDER, QUESTIONS, templates
 from study_app.authoring.writer.refused import Refused
 from study_app.cli import commands

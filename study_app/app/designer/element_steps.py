@@ -11,10 +11,10 @@ from study_app.authoring.changes.fragments import pasted
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import filled_in, languages_of, with_language, without_language
 from study_app.authoring.changes.moves import moved
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.names import deletions, free_name, named_at, references_to, replaced, with_references
 from study_app.authoring.outline import title_of
-from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Insert, Move, Set
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.instruments.instrument import instrument

@@ -7,8 +7,8 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.authoring.additions import additions_for
+from study_app.authoring.edited_study import Study
 from study_app.authoring.repairs import Repair, repairs
-from study_app.authoring.study import Study
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 REST_MS: Final = 500

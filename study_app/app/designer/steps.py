@@ -21,9 +21,9 @@ from study_app.app.designer.element_steps import (
 from study_app.authoring.additions import added
 from study_app.authoring.changes.initial_values import initial, singular
 from study_app.authoring.conversions import left_by, switched
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at, rows
 from study_app.authoring.names import renamed
-from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Insert, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path, entries, value_at

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from study_app.authoring.additions import added
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.names import free_name, references_to, renamed
-from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Rename, Set, WriterError, apply, same
 from study_app.authoring.writer.keys import insert_block
 from study_app.authoring.writer.refused import Refused

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from study_app.authoring.study import Study
+from study_app.authoring.edited_study import Study
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.checks.cross_references import TEXTS

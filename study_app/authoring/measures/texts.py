@@ -8,10 +8,10 @@ from functools import cache
 from typing import Any, Final
 
 from study_app.authoring.changes.languages import languages_of, texts_of
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import is_localised, label_of
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import alternatives
-from study_app.authoring.study import Study
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.json_schema import schema

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path as Folder
 from typing import Any, Final, Literal, TypeAlias
 
-from study_app.authoring.study import Study
+from study_app.authoring.edited_study import Study
 from study_app.authoring.writer.edits import Edit, Insert, Move, Set, Unset
 from study_app.protocol.differences import Difference, differences, document_differences
 from study_app.protocol.model import Protocol

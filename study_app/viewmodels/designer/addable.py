@@ -8,10 +8,10 @@ from functools import cache
 
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import languages_of
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at, rows
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import node_at, tags
-from study_app.authoring.study import Study
 from study_app.protocol.formats import TABLES, is_second
 from study_app.protocol.instruments.instrument import instrument, instruments
 from study_app.protocol.source.document import Path

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.authoring.study import Study
+from study_app.authoring.edited_study import Study
 from study_app.authoring.writer.spans import spans_of
 from study_app.protocol.source.document import Path
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
 from study_app.authoring.measures.texts import missing_texts
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
-from study_app.authoring.study import Study
 from study_app.protocol.groups.group import sequences_in
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.line_numbers import Places, places_of

@@ -8,12 +8,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import row_at, unit_of
 from study_app.authoring.known_answers import KnownAnswer, known_answers
 from study_app.authoring.names import Document
 from study_app.authoring.new_study import NAME_LENGTH, Answers
 from study_app.authoring.outline import title_of
-from study_app.authoring.study import Study
 from study_app.authoring.templates import QUESTIONS
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of

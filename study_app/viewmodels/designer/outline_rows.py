@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.edited_study import Study
 from study_app.authoring.outline import Element, found, outline
-from study_app.authoring.study import Study
 from study_app.protocol.source.document import Path, names
 from study_app.viewmodels.number_words import minutes
 

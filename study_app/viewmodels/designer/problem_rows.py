@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.outline import title_of
-from study_app.authoring.study import Study
 from study_app.protocol.source.document import Path, has
 from study_app.protocol.source.line_numbers import places_of
 from study_app.protocol.source.problems import Fault

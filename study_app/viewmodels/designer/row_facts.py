@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row
-from study_app.authoring.study import Study
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.authoring.study import Study, read
+from study_app.authoring.edited_study import Study, read
 from tests.app.designer.support.made_studies import STUDIES
 from tests.app.designer.support.program import USERS, environment
 from tests.compiled import needs_servo

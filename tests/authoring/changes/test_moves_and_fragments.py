@@ -8,7 +8,7 @@ import pytest
 
 from study_app.authoring.changes.fragments import copied, pasted
 from study_app.authoring.changes.moves import moved
-from study_app.authoring.study import Study
+from study_app.authoring.edited_study import Study
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.groups.group import sequences_in
 from study_app.protocol.source.document import Path, entries

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.study import Study
+from study_app.authoring.edited_study import Study
 from study_app.authoring.versions.changes import UNKNOWN_CONDITIONS, changes, changes_from_receipt
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import shipped

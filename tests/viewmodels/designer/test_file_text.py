@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.authoring.study import read
+from study_app.authoring.edited_study import read
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.file_text import file_text, retyped, shown
 

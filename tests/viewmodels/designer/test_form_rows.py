@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from study_app.authoring.edited_study import Study, read
 from study_app.authoring.new_study import template
 from study_app.authoring.outline import outline
-from study_app.authoring.study import Study, read
 from study_app.authoring.templates import FOLDER, templates
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.protocol.source.document import value_at

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from study_app.authoring.document_values import with_value, without_value
-from study_app.authoring.study import Study
+from study_app.authoring.edited_study import Study
 from study_app.errors import ProtocolError
 from study_app.protocol.load import examined, read_document
 from study_app.protocol.model import Protocol

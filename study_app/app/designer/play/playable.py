@@ -13,8 +13,8 @@ from typing import Any, Final
 
 from study_app.app.designer.participant.shown_step import StepPosition, step_name
 from study_app.app.designer.play.first_step import first_step, graph_of, reached
+from study_app.authoring.edited_study import Study
 from study_app.authoring.names import named_at
-from study_app.authoring.study import Study
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.errors import Problem, StudyError

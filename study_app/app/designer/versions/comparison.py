@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from study_app.app.designer.open_study import OpenStudy
-from study_app.authoring.study import Study
+from study_app.authoring.edited_study import Study
 from study_app.authoring.versions.changes import NOTATION, changes, changes_from_receipt
 from study_app.authoring.versions.contents import content_hash, kept_content
 from study_app.authoring.versions.runs import Run, source_of

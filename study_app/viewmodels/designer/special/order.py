@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row
-from study_app.authoring.study import Study
 from study_app.protocol.orders.latin_squares import borders_even, row_count
 from study_app.protocol.source.document import value_at
 from study_app.viewmodels.designer.row_facts import RowFacts

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row, label_of
-from study_app.authoring.study import Study
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.wording.languages import language_name
 from study_app.viewmodels.designer.row_facts import RowFacts

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row, row_at
-from study_app.authoring.study import Study
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.row_facts import RowFacts
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row
-from study_app.authoring.study import Study
 from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
 from study_app.protocol.trials.design import ORDINALS
 from study_app.protocol.trials.methods.adjustment import Adjustment

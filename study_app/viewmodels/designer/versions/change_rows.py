@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
+from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of
 from study_app.authoring.outline import title_of
-from study_app.authoring.study import Study
 from study_app.authoring.versions.changes import Change, Effect
 from study_app.viewmodels.designer.problem_rows import element_of
 from study_app.viewmodels.tones import Tone

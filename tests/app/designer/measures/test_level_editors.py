@@ -8,9 +8,9 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
+from study_app.authoring.edited_study import read
 from study_app.authoring.fields import row_at
 from study_app.authoring.new_study import template
-from study_app.authoring.study import read
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.load import load
 from study_app.protocol.orders.block_orders import order_of

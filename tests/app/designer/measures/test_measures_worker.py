@@ -17,8 +17,8 @@ from study_app.app.designer.measures.measures_worker import (
     carry_out,
 )
 from study_app.app.designer.measures.wanted import wanted_of
+from study_app.authoring.edited_study import read
 from study_app.authoring.new_study import template
-from study_app.authoring.study import read
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.source.files import shipped_file

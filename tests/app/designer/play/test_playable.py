@@ -6,7 +6,7 @@ import pytest
 
 from study_app.app.designer.participant.shown_step import StepPosition
 from study_app.app.designer.play.playable import NotPlayableError, playable
-from study_app.authoring.study import Study
+from study_app.authoring.edited_study import Study
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.orders.schedule import Trial
