@@ -10,9 +10,9 @@ from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 
+from study_app.app.designer.edit_steps import Steps
 from study_app.app.designer.element_steps import Step
 from study_app.app.designer.open_study import OpenStudy
-from study_app.app.designer.steps import Steps
 from study_app.app.designer.studies import there
 from study_app.authoring.edited_study import Study
 from study_app.authoring.history import History

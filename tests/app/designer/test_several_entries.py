@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.designer.steps import Steps
+from study_app.app.designer.edit_steps import Steps
 from study_app.authoring.edited_study import Study
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.requests import DuplicateEntries, MoveEntries
