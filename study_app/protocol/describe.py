@@ -11,7 +11,7 @@ from study_app.protocol import liquid_summary
 from study_app.protocol.checks.delay_warnings import delay_warnings
 from study_app.protocol.checks.level_warnings import level_warnings
 from study_app.protocol.groups.own_protocol import Variant, variants
-from study_app.protocol.groups.steps import sessions_differ
+from study_app.protocol.groups.session_steps import sessions_differ
 from study_app.protocol.instruments.instrument_summary import sources
 from study_app.protocol.instruments.instrument_summary import warnings as from_memory
 from study_app.protocol.model import Block, Condition, Protocol, Questionnaire, Reach

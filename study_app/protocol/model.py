@@ -39,7 +39,7 @@ from study_app.protocol.credits import Credits
 from study_app.protocol.forms.questionnaire import Questionnaire
 from study_app.protocol.forms.scale import Scale
 from study_app.protocol.groups.group import Group, Sequences, Steps
-from study_app.protocol.groups.steps import every_step
+from study_app.protocol.groups.session_steps import every_step
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Body as PageBody
 from study_app.protocol.texts import Description, Id, Language, Localised, text_in

@@ -13,7 +13,7 @@ from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.forms.scale import POINTS
 from study_app.protocol.forms.simulated_observer import OPINIONS, Felt
-from study_app.protocol.groups.steps import groups_with
+from study_app.protocol.groups.session_steps import groups_with
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions.question import Question
 from study_app.protocol.texts import text_in

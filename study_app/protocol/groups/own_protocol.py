@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from study_app.protocol.groups.steps import numbered_parts, session_count, sessions_differ, steps_of
+from study_app.protocol.groups.session_steps import numbered_parts, session_count, sessions_differ, steps_of
 from study_app.protocol.model import Protocol
 
 

@@ -18,7 +18,7 @@ from study_app.authoring.names import named_at
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.errors import Problem, StudyError
-from study_app.protocol.groups.steps import numbered_parts
+from study_app.protocol.groups.session_steps import numbered_parts
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.source.document import Path, entries, value_at

@@ -9,7 +9,7 @@ import pytest
 from study_app.errors import ProtocolError, StudyError
 from study_app.protocol.describe import describe
 from study_app.protocol.groups.own_protocol import own_protocol, variants
-from study_app.protocol.groups.steps import every_step, refuse_beyond_last, steps_of
+from study_app.protocol.groups.session_steps import every_step, refuse_beyond_last, steps_of
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import balances, numbered
