@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from study_app.app.designer.feeling import LabLiquids
     from study_app.app.lab.controller import LabController
     from study_app.app.lab.initial_settings import InitialSettings
-    from study_app.app.results import ResultsController
+    from study_app.app.results_controller import ResultsController
     from study_app.gui.designer.view import DesignerPlace
     from study_app.gui.help.view import HelpPlace
     from study_app.gui.lab.view import LabPlace
@@ -204,7 +204,7 @@ class MainController(QObject):
         self.window.go("results")
 
     def _results(self) -> ResultsPlace:
-        from study_app.app.results import ResultsController  # noqa: PLC0415 - only once it is needed
+        from study_app.app.results_controller import ResultsController  # noqa: PLC0415 - only once it is needed
 
         self.desk = ResultsController(self.results)
         self.desk.place.version_asked.connect(self.show_version)
