@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QEventLoop, QObject, QTimer
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 
-from study_app.app.devices import DevicesController
+from study_app.app.devices_controller import DevicesController
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.session.termination import BY_SIGNAL_S, Patience, ended_from_outside

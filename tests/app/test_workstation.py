@@ -13,7 +13,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QMainWindow
 
-from study_app.app.devices import DevicesController
+from study_app.app.devices_controller import DevicesController
 from study_app.app.main_controller import MainController
 from study_app.app.session.live_session import LiveSession
 from study_app.app.workstation import WorkstationController, described, settings_here, text_scale_on
@@ -241,7 +241,7 @@ def test_a_diagnosis_ends_when_the_place_is_left(visit, qtbot, monkeypatch):
         def close(self):
             self.closed = True
 
-    monkeypatch.setattr("study_app.app.devices.DiagnosisDialog", _with(Examined))
+    monkeypatch.setattr("study_app.app.devices_controller.DiagnosisDialog", _with(Examined))
     visit.machine.change({"device": "falcon:FT1", "firmware": "/there/firmware.bin"})
     visit.devices.backends = lambda: [MOUSE, FALCON]
     visit.window.show()

@@ -19,7 +19,7 @@ from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.crash_trace import CrashTrace
-from study_app.app.devices import diagnosis
+from study_app.app.devices_controller import diagnosis
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.termination import BY_SIGNAL_S, ended_from_outside
 from study_app.app.workstation import described, screen_number, settings_here, text_scale_on
