@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.app.workstation import WorkstationController
+from study_app.app.workstation_controller import WorkstationController
 from study_app.devices.backends import backends
 from study_app.devices.descriptor import Backend
 from study_app.devices.registry import descriptor_of

@@ -22,7 +22,7 @@ from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices_controller import diagnosis
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.termination import BY_SIGNAL_S, ended_from_outside
-from study_app.app.workstation import described, screen_number, settings_here, text_scale_on
+from study_app.app.workstation_controller import described, screen_number, settings_here, text_scale_on
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.errors import SessionError, StudyError

@@ -20,7 +20,7 @@ from study_app.app.designer.participant.shown_step import (
     step_name,
 )
 from study_app.app.designer.participant.sound_part import sound_part
-from study_app.app.workstation import screen_number, settings_here, text_scale_on
+from study_app.app.workstation_controller import screen_number, settings_here, text_scale_on
 from study_app.authoring.edited_study import Study
 from study_app.authoring.outline import title_of
 from study_app.gui.designer.pane.right_pane import PanePage
