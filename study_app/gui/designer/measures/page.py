@@ -17,7 +17,7 @@ from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.designer.measures.number_cards import ANEW, ForcesPlot, MeasuresView, NumberCard
 
 if TYPE_CHECKING:
-    from study_app.gui.designer.measures.plots import ForcesView, FunctionView, TrackView
+    from study_app.gui.designer.measures.block_plots import ForcesView, FunctionView, TrackView
 
 NUMBERS, ONE_ROW_FROM = 4, 600
 PLOT_PX, HIGHEST_PX, FORCES_PX = 300, 470, 216
@@ -219,7 +219,7 @@ class MeasuresPage(Themed, QWidget):
             card.show_heading(words, anew=anew)
 
     def _make_plots(self) -> None:
-        from study_app.gui.designer.measures.plots import (  # noqa: PLC0415 - pyqtgraph, once there is a plot
+        from study_app.gui.designer.measures.block_plots import (  # noqa: PLC0415 - pyqtgraph, once there is a plot
             ForcesView,
             FunctionView,
             TrackView,
