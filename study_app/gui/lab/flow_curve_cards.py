@@ -10,7 +10,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from study_app.gui.lab.plots import DASH, LIMIT, A, B, CurvePlot, PlotCard
+from study_app.gui.lab.lab_plots import DASH, LIMIT, A, B, CurvePlot, PlotCard
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.widgets.labels import Elided
 from study_app.gui.widgets.plots import Plot, draw_quickly, number

@@ -12,7 +12,7 @@ import pytest
 from PySide6.QtCore import QRectF
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.lab.plots import POINTS, A, B, CurvePlot, thinned
+from study_app.gui.lab.lab_plots import POINTS, A, B, CurvePlot, thinned
 from study_app.haptics.model.effects import EFFECTS
 from study_app.viewmodels.lab import CostRow, LabView
 

@@ -8,8 +8,8 @@ from PySide6.QtGui import QAccessible
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QWidget
 
-from study_app.gui.lab.plots import ForceCard as LabForceCard
-from study_app.gui.lab.plots import SpeedCard
+from study_app.gui.lab.lab_plots import ForceCard as LabForceCard
+from study_app.gui.lab.lab_plots import SpeedCard
 from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.operator.plot_cards import LatenessCard, PositionCard
 from study_app.gui.participant.pages import screen_reader
