@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from study_app.gui.lab.lab_plots import DASH, LIMIT, A, B, CurvePlot, PlotCard
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.widgets.labels import Elided
-from study_app.gui.widgets.plots import Plot, draw_quickly, number
+from study_app.gui.widgets.live_plots import Plot, draw_quickly, number
 from study_app.haptics.model.scene import Scene
 from study_app.lab.steady_curves import RATES_PER_S, SPEEDS_MPS, SteadyCurves, has_flow_curve, steady_curves
 from study_app.viewmodels.lab import Floats, LabView

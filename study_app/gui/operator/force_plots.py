@@ -10,7 +10,7 @@ from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.plots import (
+from study_app.gui.widgets.live_plots import (
     LINE_PX,
     NAME_MARGIN,
     NAMES,

@@ -8,8 +8,8 @@ from study_app.gui.operator.force_plots import FIELD
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.cards import Card, Chip
 from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot
 from study_app.gui.widgets.masked_panel import MaskedPanel
-from study_app.gui.widgets.plots import LatenessPlot, TracePlot
 from study_app.viewmodels.servo_health import TRACE_WINDOW_S, ServoHealth
 
 

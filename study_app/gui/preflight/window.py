@@ -14,7 +14,7 @@ from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.cards import Card, Chip, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
-from study_app.gui.widgets.plots import LatenessPlot
+from study_app.gui.widgets.live_plots import LatenessPlot
 from study_app.viewmodels.preflight import WAITING, PreflightView, histogram
 
 FULL, LEAST = QSize(1200, 800), QSize(1024, 640)

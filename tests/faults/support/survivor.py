@@ -25,7 +25,7 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.steps_card import StepLine
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.widgets.dialogs import Notice
-from study_app.gui.widgets.plots import TracePlot
+from study_app.gui.widgets.live_plots import TracePlot
 from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.store import recording_writer

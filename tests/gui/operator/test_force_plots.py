@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication, QLabel
 from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import dress
-from study_app.gui.widgets.plots import STROKE, apart, step_for
+from study_app.gui.widgets.live_plots import STROKE, apart, step_for
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.viewmodels.force_traces import Forces
 

@@ -17,7 +17,7 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.sessions.motion_plots import MotionPlot
 from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.plots import Plot
+from study_app.gui.widgets.live_plots import Plot
 from study_app.protocol.wording.languages import words
 from tests.gui.small import ManualClock, questionnaire, text_page
 

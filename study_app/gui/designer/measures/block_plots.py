@@ -11,7 +11,7 @@ from PySide6.QtGui import QBrush, QColor, QPen
 
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.widgets.accessible import describe_plot
-from study_app.gui.widgets.plots import Plot, pen
+from study_app.gui.widgets.live_plots import Plot, pen
 from study_app.viewmodels.designer.measures.number_cards import ForcesPlot, FunctionPlot, TrackPlot
 
 BARS = 0.14  # of the height, for how often each level is asked

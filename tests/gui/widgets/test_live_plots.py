@@ -11,7 +11,7 @@ from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.widgets.plots import LatenessPlot, TracePlot
+from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot
 
 LIMIT_US = 2000.0
 
