@@ -11,7 +11,7 @@ import numpy as np
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.report import findings_summary, number_files
 from study_app.analysis.report.block_section import block
-from study_app.analysis.report.first_page.page import first_page
+from study_app.analysis.report.first_page.first_page import first_page
 from study_app.analysis.report.json_values import plain
 from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.r_script import r_script

@@ -20,7 +20,7 @@ from study_app.analysis.figures.report_figures import pictures
 from study_app.analysis.preregistration.deviations import section as preregistration_section
 from study_app.analysis.report import block_section, conduct_section, findings_summary, number_files
 from study_app.analysis.report.answers import question_section
-from study_app.analysis.report.first_page.page import first_page
+from study_app.analysis.report.first_page.first_page import first_page
 from study_app.analysis.report.html_page import box, bullets, heading, not_there, page, paragraph, render, table
 from study_app.analysis.report.methods_paragraph import methods, version_words
 from study_app.analysis.report.r_script import r_script

@@ -21,7 +21,7 @@ from study_app.analysis.findings.pair_comparison import FINDING as PAIRS
 from study_app.analysis.findings.unchanged_delay import common_ms
 from study_app.analysis.report.first_page.answer import Answer
 from study_app.analysis.report.first_page.claims import answers
-from study_app.analysis.report.first_page.page import first_page
+from study_app.analysis.report.first_page.first_page import first_page
 from study_app.analysis.report.measured import CLAIMS, STUDIES, empty_studies
 from study_app.analysis.results.block_results import Results
 from study_app.analysis.results.section_failures import Failures
