@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from study_app.gui.designer.new_study.page import NewStudyPage, NoStudyCard
+from study_app.gui.designer.new_study.new_study_page import NewStudyPage, NoStudyCard
 
 __all__ = ["NewStudyPage", "NoStudyCard"]
