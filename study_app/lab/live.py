@@ -18,8 +18,8 @@ from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, RigSettings, open_rig
 from study_app.devices.simulated.hand_commands import hand_of
 from study_app.haptics.model.layout import SAMPLE, records
-from study_app.haptics.model.limits import slew_limit_n
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import slew_limit_n
 from study_app.lab.ab_comparison import Side, Workbench, other
 from study_app.lab.limiters import Limiter, LimiterCounts
 from study_app.lab.programmed_paths import led_to, programme

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, UNKNOWN, Dynamics
-from study_app.haptics.model.limits import refuses
+from study_app.haptics.model.slope_limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.checks.pace import beyond_slope_limit, highest_damping

@@ -6,8 +6,8 @@ import pytest
 
 from study_app.haptics.model.effects.drag import resistance_n
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.scene import Ewma, Kalman
+from study_app.haptics.model.slope_limits import slope_limit
 from study_app.protocol.describe import describe
 from study_app.protocol.liquid_summary import effects, warnings
 from study_app.protocol.load import load, load_scene, load_scenes, parse

@@ -47,7 +47,7 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.vector import clear, copy
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import COMMAND, READING, records
-from study_app.haptics.model.limits import SLEW_S, slew_limit_n
+from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n
 
 LEAST_MASS_KG: Final = 0.1
 """The least mass at the grip in any direction [kg]: arms and platform of a device of this size weigh about as much.

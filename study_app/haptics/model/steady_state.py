@@ -10,8 +10,8 @@ from study_app.haptics.model.effects.drag import resistance_n
 from study_app.haptics.model.effects.non_newtonian import VISCOUS_SHARE, steady_n
 from study_app.haptics.model.effects.unsteady_drag import LATE_SHARE, even_n
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import slope_limit
 
 HAND_MPS: Final = 0.1
 """A hand that explores a liquid [m/s]."""

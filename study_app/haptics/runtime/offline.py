@@ -19,9 +19,9 @@ from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.estimators.device import CODE as DEVICE
 from study_app.haptics.model.estimators.given import CODE as GIVEN
 from study_app.haptics.model.layout import SAMPLE, Record, records
-from study_app.haptics.model.limits import damping_limits
 from study_app.haptics.model.motion import Floats, Motion, read
 from study_app.haptics.model.scene import Given, Scene
+from study_app.haptics.model.slope_limits import damping_limits
 from study_app.haptics.runtime.pack import pack
 
 Table: TypeAlias = "np.recarray[Any, Any]"

@@ -16,7 +16,8 @@ from study_app.haptics.model.estimators import NAMED as ESTIMATORS
 from study_app.haptics.model.estimators.device import MOST_LAG_TICKS, DeviceVelocity
 from study_app.haptics.model.force_link import FORCES
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.limits import (
+from study_app.haptics.model.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Given, Kalman, Scene
+from study_app.haptics.model.slope_limits import (
     CUT_INERTIA_SHARE,
     LIGHTER,
     MEASURED_KG,
@@ -24,7 +25,6 @@ from study_app.haptics.model.limits import (
     damping_limits,
     slew_limit_n,
 )
-from study_app.haptics.model.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Given, Kalman, Scene
 from study_app.haptics.runtime.scene_records import (
     KINDS,
     EffectRows,

@@ -12,8 +12,8 @@ import math
 from typing import Final
 
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
-from study_app.haptics.model.limits import LIGHTER, MEASURED_KG, slope_limit
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import LIGHTER, MEASURED_KG, slope_limit
 from study_app.lab.estimation.estimator import Estimate
 from study_app.lab.estimation.liquid_model import DRAG, LENGTH, SCALING, values_of
 

@@ -11,9 +11,9 @@ from itertools import product
 from typing import Final
 
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
-from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.estimator_response import fastest_hz, passed_share

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from itertools import product
 
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
-from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.overrides import override
+from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import precision_rows

@@ -26,9 +26,9 @@ from study_app.haptics.kernels.vector import norm, subtract
 from study_app.haptics.model.effects.drag import resistance_n
 from study_app.haptics.model.estimators.given import CODE as GIVEN
 from study_app.haptics.model.layout import SAMPLE, Record, records
-from study_app.haptics.model.limits import DampingLimits
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Given, Scene
+from study_app.haptics.model.slope_limits import DampingLimits
 from study_app.haptics.runtime.pack import Model, pack
 from study_app.validation.accuracy.naive_wake import NumpyTail, PlainTail, list_follow, list_wake, new_list
 

@@ -26,9 +26,9 @@ import psutil
 from study_app.errors import DeviceLost, ServoFault, StudyError
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.layout import SAMPLE, records
-from study_app.haptics.model.limits import slew_limit_n
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import slew_limit_n
 from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo

@@ -18,8 +18,8 @@ from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.estimators import NAMED as ESTIMATORS
 from study_app.haptics.model.estimators import lead
 from study_app.haptics.model.layout import SAMPLE, records
-from study_app.haptics.model.limits import INERTIA_SHARE, DampingLimits, Entry
 from study_app.haptics.model.scene import Body, Ewma, Foaw, Kalman, Knee, Lead, Line, Liquid, Scene, Velocity
+from study_app.haptics.model.slope_limits import INERTIA_SHARE, DampingLimits, Entry
 from study_app.haptics.runtime.pack import pack
 from study_app.validation.stability.closed_loop import LOOP, STROKE, TRACE, begin, run
 

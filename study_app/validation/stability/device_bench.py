@@ -11,8 +11,8 @@ from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick_schedule import new_schedule
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import SAMPLE, records
-from study_app.haptics.model.limits import DampingLimits
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import DampingLimits
 from study_app.haptics.runtime.pack import Model, pack
 from study_app.validation.stability.arm_plant import ARMS, new_arm
 from study_app.validation.stability.closed_loop import LOOP, TRACE, begin, run

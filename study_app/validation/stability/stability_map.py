@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from study_app import figure_style as style
-from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.scene import Ewma
+from study_app.haptics.model.slope_limits import slope_limit
 from study_app.validation.stability.damping_boundary import (
     DELAYS,
     FREE_HANDLE_KG,

@@ -34,7 +34,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.model.layout import LIMITER_NAMES
-from study_app.haptics.model.limits import DampingLimits
+from study_app.haptics.model.slope_limits import DampingLimits
 from study_app.validation.stability.closed_loop import begin, play
 from study_app.validation.stability.device_bench import FORCE_LIMIT_N, MOVING_S, Bench, lasts_s, new_bench, new_trace
 from study_app.validation.stability.stability_cases import LETS_GO, THROWN, Case

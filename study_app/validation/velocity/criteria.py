@@ -6,8 +6,8 @@ import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.scene import Ewma, Kalman, Lead, Velocity
+from study_app.haptics.model.slope_limits import slope_limit
 from study_app.validation.stability.damping_boundary import boundary_nspm
 from study_app.validation.stability.stability_cases import GRIPS
 from study_app.validation.velocity import held_handle as held

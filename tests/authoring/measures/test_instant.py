@@ -12,7 +12,7 @@ from study_app.authoring.measures.forces import level_limits
 from study_app.authoring.measures.texts import revealing, text_keys, texts_by_language
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.writer.edits import Set, Unset
-from study_app.haptics.model.limits import slope_limit
+from study_app.haptics.model.slope_limits import slope_limit
 from study_app.protocol.load import load, shipped
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.source.files import shipped_file

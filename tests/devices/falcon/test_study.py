@@ -16,7 +16,7 @@ from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.errors import SessionError
 from study_app.haptics.model.layout import STATUS_OK
-from study_app.haptics.model.limits import slew_limit_n
+from study_app.haptics.model.slope_limits import slew_limit_n
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load

@@ -17,7 +17,9 @@ from study_app.haptics.model.layout import (
     LIMITER_STOP,
     STATUS_NON_FINITE,
 )
-from study_app.haptics.model.limits import (
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Box, Ewma, Foaw, Given, Kalman, Line, Raw
+from study_app.haptics.model.slope_limits import (
     KALMAN_SLEW,
     LIGHTER,
     SLEW_N,
@@ -27,8 +29,6 @@ from study_app.haptics.model.limits import (
     slope_limit,
     table,
 )
-from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, Ewma, Foaw, Given, Kalman, Line, Raw
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack, pack_into
 from study_app.validation.stability.damping_boundary import measured_estimators

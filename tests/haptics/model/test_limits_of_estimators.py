@@ -4,8 +4,8 @@ import pytest
 
 from study_app.haptics.model.estimators import ESTIMATORS, NAMED
 from study_app.haptics.model.estimators.device import MOST_LAG_TICKS, DeviceVelocity
-from study_app.haptics.model.limits import damping_limits, table
 from study_app.haptics.model.scene import Ewma, Foaw, Given, Lead, Line, Raw
+from study_app.haptics.model.slope_limits import damping_limits, table
 
 
 @pytest.mark.parametrize("kind", [it for it in ESTIMATORS if it.of_device], ids=lambda it: it.name)

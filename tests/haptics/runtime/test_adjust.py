@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.model.layout import LIMITER_FADE
-from study_app.haptics.model.limits import SLEW_N
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.paths import path
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import SLEW_N
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import built_alike
 from study_app.haptics.runtime.servo import Servo

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.layout import LIMITER_SLEW
-from study_app.haptics.model.limits import SLEW_N
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.paths import circle, line, path, reach, reverse, zigzag
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import SLEW_N
 from study_app.haptics.runtime.offline import COLUMNS, simulate
 from study_app.store.tables.csv_files import write_columns
 from tests.haptics.scenes import HONEY, WATER, WATER_FACTOR, moving, scene, vectors

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.estimators import NAMED
-from study_app.haptics.model.limits import damping_limits, table
 from study_app.haptics.model.scene import Ewma, Kalman, Lead, Line
+from study_app.haptics.model.slope_limits import damping_limits, table
 from study_app.validation.stability.damping_boundary import boundary_nspm, measure_limits, passive_nspm
 from tests.haptics.scenes import COMPILED
 

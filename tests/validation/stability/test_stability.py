@@ -330,7 +330,7 @@ def test_a_line_that_is_none_is_refused():
 
 @compiled
 def test_the_table_of_limits_is_written_as_it_ships(monkeypatch, tmp_path):
-    from study_app.haptics.model.limits import table
+    from study_app.haptics.model.slope_limits import table
 
     monkeypatch.setattr(stability, "measure_limits", lambda **_: iter(table()))
     ran = command("--table", str(tmp_path / "limits.csv"))

@@ -13,7 +13,7 @@ from study_app.devices.falcon.wire.constants import ENDPOINT_IN, ERROR_TIMEOUT, 
 from study_app.devices.falcon.wire.packets import FLAGS_AT, NIBBLES, number, pack
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading
-from study_app.haptics.model.limits import SLEW_S, slew_limit_n
+from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n
 
 MS = 1_000_000
 GEOMETRY = GEOMETRIES["libnifalcon"]

@@ -6,8 +6,8 @@ from pydantic import ValidationError
 
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.laws.drag import LAWS, drag_n
-from study_app.haptics.model.limits import slope_limit
 from study_app.haptics.model.scene import Body, Given
+from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import UNBENT, WATER_FACTOR, examples, liquid, moving, scene, vectors
 

@@ -10,9 +10,9 @@ from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import ewma
 from study_app.haptics.model.layout import LIMITER_ESTIMATOR, records
-from study_app.haptics.model.limits import damping_limits, table
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Kalman, Scene
+from study_app.haptics.model.slope_limits import damping_limits, table
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import built_alike, pack
 from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
