@@ -20,8 +20,8 @@ from study_app.protocol.orders.durations import block_duration_s, expected_durat
 from study_app.protocol.orders.latin_squares import row_count
 from study_app.protocol.questions.question import Context, Question
 from study_app.protocol.trials.block_summary import design_rows
-from study_app.protocol.trials.limits import Limits
 from study_app.protocol.trials.presentation import link_words
+from study_app.protocol.trials.trial_limits import Limits
 
 BLINDINGS = {
     "double": "double-blind: the operator sees no force",

@@ -45,13 +45,13 @@ from study_app.protocol.texts import Body as PageBody
 from study_app.protocol.texts import Description, Id, Language, Localised, text_in
 from study_app.protocol.trials.asked import asked
 from study_app.protocol.trials.kinds import AnyDesign, AnyMethod, default_design
-from study_app.protocol.trials.limits import Limits
 from study_app.protocol.trials.stimuli import Condition, Stimulus
 from study_app.protocol.trials.task import Task
 from study_app.protocol.trials.tasks.explore import Explore
 from study_app.protocol.trials.tasks.follow import Follow
 from study_app.protocol.trials.tasks.reach import Reach
 from study_app.protocol.trials.tasks.stroke import Seconds
+from study_app.protocol.trials.trial_limits import Limits
 
 __all__ = [
     "Analysis",
