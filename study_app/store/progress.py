@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import StoreError
+from study_app.store.broken_limits import Broken, beyond_limits
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
-from study_app.store.limits import Broken, beyond_limits
 
 UNDELIVERED: Final = "invalid"
 """The outcome of a trial of which an interval was not delivered as requested."""

@@ -8,7 +8,7 @@ import pytest
 
 from study_app.protocol.model import Limits
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.store.limits import beyond_limits
+from study_app.store.broken_limits import beyond_limits
 from study_app.store.tables.column import header
 from study_app.store.tables.columns import TRIALS
 from study_app.viewmodels.number_words import duration_words, grouped, minutes

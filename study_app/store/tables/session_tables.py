@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from study_app.errors import StoreError
+from study_app.store.broken_limits import within_limits
 from study_app.store.journals.journal import Line
-from study_app.store.limits import within_limits
 from study_app.store.progress import is_of_intervals, progress_of
 from study_app.store.tables.column import Column, header, unsealed
 from study_app.store.tables.columns import DELIVERED, TRIALS, VIDEO, tables_of

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from study_app.devices.registry import discover
 from study_app.errors import StoreError
 from study_app.store.blinded.sealing import opened, opened_key
+from study_app.store.broken_limits import beyond_limits
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import SessionFolder, locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Line
-from study_app.store.limits import beyond_limits
 from study_app.store.progress import Given, progress_of
 from study_app.store.tables import session_tables
 from study_app.store.tables.participants import row_of
