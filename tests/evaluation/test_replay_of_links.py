@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.report.answers.withheld_section import withheld
 from study_app.analysis.tables.compared_blocks import setting_name
 from study_app.analysis.tables.study_tables import load_study

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import pandas as pd
 
-from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.export.delivered import JUDGED, Delivered, delivered
 from study_app.analysis.results.levels import LevelsFound, SettingFound
 from study_app.analysis.tables.study_tables import Study

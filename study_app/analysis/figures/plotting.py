@@ -7,7 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 from study_app import figure_style as style
-from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.designs.questions import questions_found
 from study_app.analysis.figures import captions
 from study_app.analysis.figures.answer_figures import KINDS, render

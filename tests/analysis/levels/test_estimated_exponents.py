@@ -13,7 +13,7 @@ import pytest
 from scipy import stats
 
 from study_app.analysis.designs.estimated_exponents import estimate_slope, estimated_exponents
-from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.report.answers import level_section
 from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_methods import level_methods

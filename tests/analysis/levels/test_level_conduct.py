@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.designs.level_conduct import catch_answers, level_conduct
-from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.report.answers import level_conduct_section
 from study_app.analysis.results.levels import CatchAnswers, LevelConduct, LevelsFound
 from study_app.analysis.tables.study_tables import load_study

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.designs.track_courses import courses
 from study_app.analysis.figures.levels.weber_figure import published_fractions, weber_fractions

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, ttest_1samp
 
-from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.figures.plotting import plot
 from study_app.analysis.report.write_report import report
 from study_app.analysis.results.levels import LevelsFound

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.report.answers.level_methods import level_methods

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from study_app.analysis.designs.levels import levels_found
+from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.session.simulated.answers_only import rehearse_answers
