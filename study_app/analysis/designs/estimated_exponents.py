@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from study_app.analysis.results.levels import ExponentFound
+from study_app.analysis.results.level_results import ExponentFound
 from study_app.analysis.statistics.student_interval import student_interval
 from study_app.analysis.tables.level_blocks import LevelBlock
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from study_app.analysis.results.levels import CatchAnswers, LevelConduct
+from study_app.analysis.results.level_results import CatchAnswers, LevelConduct
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import number_or_none
 

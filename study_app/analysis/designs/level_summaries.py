@@ -17,7 +17,7 @@ from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.designs.settings import settings
 from study_app.analysis.designs.thresholds import thresholds
 from study_app.analysis.designs.weber_exponents import weber_exponents
-from study_app.analysis.results.levels import (
+from study_app.analysis.results.level_results import (
     ExponentFound,
     LevelAnswers,
     LevelsFound,

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.results.levels import SensitivityFound
+from study_app.analysis.results.level_results import SensitivityFound
 from study_app.analysis.statistics.student_interval import student_interval
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import number_or_none

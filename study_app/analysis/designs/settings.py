@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.results.levels import SettingFound
+from study_app.analysis.results.level_results import SettingFound
 from study_app.analysis.statistics.psychometrics.settings import setting_statistics
 from study_app.analysis.statistics.student_interval import student_interval
 from study_app.analysis.tables.level_blocks import LevelBlock

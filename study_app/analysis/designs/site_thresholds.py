@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.results.site_thresholds import SiteThresholds
 from study_app.analysis.statistics.independent_groups import groups_differ
 from study_app.analysis.tables.study_tables import Study

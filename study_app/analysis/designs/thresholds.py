@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from study_app.analysis.results.levels import ThresholdFound
+from study_app.analysis.results.level_results import ThresholdFound
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.psychometrics.goodness import drift, p_of_fit
 from study_app.analysis.statistics.psychometrics.posterior import fitted

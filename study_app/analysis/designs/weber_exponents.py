@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from study_app.analysis.designs.estimated_exponents import mean_exponent
-from study_app.analysis.results.levels import ExponentFound, ThresholdFound
+from study_app.analysis.results.level_results import ExponentFound, ThresholdFound
 
 
 def jnd_slope(standards: ArrayLike, jnds: ArrayLike) -> float:

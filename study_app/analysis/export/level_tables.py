@@ -10,7 +10,7 @@ import pandas as pd
 
 from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.export.delivered import JUDGED, Delivered, delivered
-from study_app.analysis.results.levels import LevelsFound, SettingFound
+from study_app.analysis.results.level_results import LevelsFound, SettingFound
 from study_app.analysis.tables.study_tables import Study
 from study_app.analysis.tables.tracks import OF_INTERVALS, tracks
 from study_app.store.tables.column import Column, header, unsealed

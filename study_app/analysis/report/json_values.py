@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from study_app.analysis.findings import all_findings
 from study_app.analysis.results.block_results import BlockFound, Results
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.tables.compared_blocks import Setting
 from study_app.errors import AnalysisError
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from study_app.analysis.results.delivered_delay import Delivered
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.results.not_tested import NotTested
 from study_app.analysis.results.question_answers import QuestionFound, ScoreFound
 from study_app.analysis.results.section_failures import Failure

@@ -13,7 +13,7 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.results.levels import OwnDynamics
+from study_app.analysis.results.level_results import OwnDynamics
 from study_app.analysis.tables.asked_questions import AskedIn, AskedQuestion, AskedQuestions, AskedScore
 from study_app.analysis.tables.compared_blocks import Block, Setting
 from study_app.analysis.tables.level_blocks import LevelBlock

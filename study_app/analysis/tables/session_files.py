@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.results.levels import OwnDynamics
+from study_app.analysis.results.level_results import OwnDynamics
 from study_app.analysis.tables import typed_files
 from study_app.analysis.tables.asked_questions import NOTHING_ELSE, AskedQuestions, asked_questions
 from study_app.analysis.tables.compared_blocks import Block, main_blocks, spoken

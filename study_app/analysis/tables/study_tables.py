@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import pandas as pd
 
-from study_app.analysis.results.levels import OwnDynamics
+from study_app.analysis.results.level_results import OwnDynamics
 from study_app.analysis.tables import measures
 from study_app.analysis.tables import planned_analysis as decided
 from study_app.analysis.tables import pooled_sites as pools

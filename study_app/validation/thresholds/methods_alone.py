@@ -15,7 +15,7 @@ import pandas as pd
 
 from study_app.analysis.designs.thresholds import thresholds
 from study_app.analysis.designs.weber_exponents import jnd_slope
-from study_app.analysis.results.levels import ThresholdFound
+from study_app.analysis.results.level_results import ThresholdFound
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.orders.schedule import build_schedule, draw_key
 from study_app.protocol.streams import stream

@@ -15,7 +15,7 @@ from study_app.analysis.designs.psychometric_bands import psychometric_bands
 from study_app.analysis.designs.track_courses import courses
 from study_app.analysis.figures.levels.level_pictures import level_pictures
 from study_app.analysis.figures.picture import Picture
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.analysis.tables.tracks import TRACK, answers_of, tracks
 from study_app.psychophysics.families import success

@@ -11,7 +11,7 @@ import pytest
 from study_app.analysis.designs.level_conduct import catch_answers, level_conduct
 from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.report.answers import level_conduct_section
-from study_app.analysis.results.levels import CatchAnswers, LevelConduct, LevelsFound
+from study_app.analysis.results.level_results import CatchAnswers, LevelConduct, LevelsFound
 from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks
 from tests.analysis.levels.test_thresholds import block

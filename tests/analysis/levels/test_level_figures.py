@@ -15,7 +15,7 @@ from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.designs.track_courses import courses
 from study_app.analysis.figures.levels.weber_figure import published_fractions, weber_fractions
 from study_app.analysis.figures.plotting import plot
-from study_app.analysis.results.levels import LevelsFound, PublishedValue, ThresholdFound
+from study_app.analysis.results.level_results import LevelsFound, PublishedValue, ThresholdFound
 from study_app.analysis.statistics.psychometrics.posterior import fitted, narrowing
 from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks

@@ -16,7 +16,7 @@ from scipy.stats import binomtest, ttest_1samp
 from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.figures.plotting import plot
 from study_app.analysis.report.write_report import report
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.tables.study_tables import load_study
 from study_app.protocol.load import load
 from study_app.store.blinded.blinding import read_key

@@ -17,7 +17,7 @@ from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.report.answers.level_r_script import level_lines
 from study_app.analysis.report.r_script import START
 from study_app.analysis.report.write_report import report
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.tables.study_tables import Study
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.presentation import arrangement_text

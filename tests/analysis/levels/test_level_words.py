@@ -12,7 +12,13 @@ from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.report.answers.level_methods import level_methods
 from study_app.analysis.report.answers.threshold_section import section
-from study_app.analysis.results.levels import ExponentFound, LevelAnswers, LevelsFound, OwnDynamics, ThresholdFound
+from study_app.analysis.results.level_results import (
+    ExponentFound,
+    LevelAnswers,
+    LevelsFound,
+    OwnDynamics,
+    ThresholdFound,
+)
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.study_tables import load_study
 from study_app.protocol.trials.kinds import DESIGN_KINDS, default_design

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import norm, ttest_1samp
 
 from study_app.analysis.designs.sensitivities import sensitivities
-from study_app.analysis.results.levels import SensitivityFound
+from study_app.analysis.results.level_results import SensitivityFound
 from study_app.analysis.tables.compared_blocks import Setting
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.trials.design import Design

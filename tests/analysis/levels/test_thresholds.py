@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.designs.thresholds import counts_of, thresholds
-from study_app.analysis.results.levels import ThresholdFound
+from study_app.analysis.results.level_results import ThresholdFound
 from study_app.analysis.statistics.psychometrics.goodness import p_of_fit
 from study_app.analysis.statistics.psychometrics.posterior import band, fitted
 from study_app.analysis.tables.level_blocks import LevelBlock

@@ -10,7 +10,7 @@ from scipy import stats
 
 from study_app.analysis.designs.weber_exponents import jnd_slope, weber_exponents
 from study_app.analysis.report.answers import threshold_section
-from study_app.analysis.results.levels import LevelsFound, PublishedValue, ThresholdFound
+from study_app.analysis.results.level_results import LevelsFound, PublishedValue, ThresholdFound
 
 STANDARDS = (4.0, 8.0, 16.0, 32.0)
 

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from study_app.analysis.report.answers.withheld_section import withheld
-from study_app.analysis.results.levels import LevelsFound, WithheldForce
+from study_app.analysis.results.level_results import LevelsFound, WithheldForce
 
 
 def page(*rows: tuple[float | None, float, float]) -> str:

@@ -20,7 +20,7 @@ from study_app.analysis.findings.factors.site_comparison import FINDING as SITES
 from study_app.analysis.preregistration.commitment import FILE, Commitment, written
 from study_app.analysis.preregistration.deviations import deviations
 from study_app.analysis.report.write_report import report
-from study_app.analysis.results.levels import LevelsFound, ThresholdFound
+from study_app.analysis.results.level_results import LevelsFound, ThresholdFound
 from study_app.analysis.tables.group_means import group_counts, group_means
 from study_app.analysis.tables.study_tables import Study, load_study, pooled
 from study_app.errors import StoreError

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from study_app.analysis.results.levels import OwnDynamics
+from study_app.analysis.results.level_results import OwnDynamics
 from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from study_app.store.folders import StudyFolder

@@ -15,7 +15,7 @@ from study_app.analysis.designs.psychometric_bands import psychometric_bands
 from study_app.analysis.figures.levels.panels import draw_panels, sheet_of_panels
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
 from study_app.analysis.figures.picture import Picture, files_of, sample_words
-from study_app.analysis.results.levels import LevelAnswers, LevelsFound, ThresholdFound
+from study_app.analysis.results.level_results import LevelAnswers, LevelsFound, ThresholdFound
 from study_app.analysis.results.words import counted
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.tables.study_tables import Study

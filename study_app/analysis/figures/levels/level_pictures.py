@@ -9,7 +9,7 @@ from typing import Final, TypeAlias
 from study_app import figure_style as style
 from study_app.analysis.figures.levels import level_figure, settings_figure, track_figure, weber_figure
 from study_app.analysis.figures.picture import Picture, attempted
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.tables.study_tables import Study
 

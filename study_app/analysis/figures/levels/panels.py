@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import MARGIN_PT, Sheet
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study_tables import Study
 

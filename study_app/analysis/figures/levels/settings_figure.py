@@ -15,7 +15,7 @@ from study_app.analysis.figures.levels.panels import draw_panels, over_trials, s
 from study_app.analysis.figures.levels.track_figure import MARK_PT2, MOST_PANELS
 from study_app.analysis.figures.page_layout import Sheet
 from study_app.analysis.figures.picture import Picture, files_of, sample_words
-from study_app.analysis.results.levels import LevelsFound, SettingFound
+from study_app.analysis.results.level_results import LevelsFound, SettingFound
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.study_tables import Study
 

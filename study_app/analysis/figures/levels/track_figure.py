@@ -15,7 +15,7 @@ from study_app.analysis.figures.levels.level_figure import COLOURS, level_words
 from study_app.analysis.figures.levels.panels import draw_panels, over_trials, sheet_of_panels
 from study_app.analysis.figures.page_layout import Sheet
 from study_app.analysis.figures.picture import Picture, files_of, sample_words
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.results.words import counted
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.tables.study_tables import Study

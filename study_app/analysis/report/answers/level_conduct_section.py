@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from study_app.analysis.report.html_page import heading, paragraph, table
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.results.words import counted, listed, number
 
 

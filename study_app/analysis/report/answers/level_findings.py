@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from study_app.analysis.figures.levels.level_figure import level_words, with_unit
-from study_app.analysis.results.levels import ExponentFound, LevelsFound, ThresholdFound
+from study_app.analysis.results.level_results import ExponentFound, LevelsFound, ThresholdFound
 from study_app.analysis.results.words import counted, number
 
 

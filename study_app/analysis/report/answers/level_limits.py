@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
-from study_app.analysis.results.levels import LevelsFound, ThresholdFound
+from study_app.analysis.results.level_results import LevelsFound, ThresholdFound
 from study_app.analysis.results.words import counted, listed
 from study_app.analysis.statistics.random_effects import FEWEST
 

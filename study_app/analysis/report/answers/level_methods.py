@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from study_app.analysis.results.levels import LevelsFound
+from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.results.words import listed
 from study_app.analysis.statistics.psychometrics.goodness import SETS
 from study_app.analysis.statistics.random_effects import FEWEST

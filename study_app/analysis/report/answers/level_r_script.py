@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from study_app.analysis.report.r_syntax import r_number, r_text
-from study_app.analysis.results.levels import (
+from study_app.analysis.results.level_results import (
     ExponentFound,
     LevelsFound,
     SensitivityFound,

@@ -10,7 +10,7 @@ from study_app.analysis.figures.picture import Picture
 from study_app.analysis.report.answers import level_conduct_section, settings_section, threshold_section
 from study_app.analysis.report.answers.withheld_section import withheld
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
-from study_app.analysis.results.levels import LevelAnswers, LevelsFound
+from study_app.analysis.results.level_results import LevelAnswers, LevelsFound
 from study_app.analysis.results.words import number
 
 SEALED = (

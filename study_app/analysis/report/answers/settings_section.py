@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from study_app.analysis.figures.levels.level_figure import level_words
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
-from study_app.analysis.results.levels import LevelsFound, SettingFound
+from study_app.analysis.results.level_results import LevelsFound, SettingFound
 
 
 def section(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str]:

@@ -9,7 +9,7 @@ from study_app.analysis.figures.levels.level_figure import level_words
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.report.answers.level_methods import FAMILIES
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table
-from study_app.analysis.results.levels import LevelsFound, SensitivityFound, ThresholdFound
+from study_app.analysis.results.level_results import LevelsFound, SensitivityFound, ThresholdFound
 from study_app.analysis.results.words import number
 from study_app.analysis.statistics.psychometrics.goodness import SETS
 
