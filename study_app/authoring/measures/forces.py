@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.authoring.levels import hand_mps_of
+from study_app.authoring.block_levels import hand_mps_of
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.steady_state import HAND_MPS, Steady, steady

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from study_app.authoring.block_levels import levels, standard_of
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.facts import facts
-from study_app.authoring.levels import levels, standard_of
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.forces import level_limits
 from study_app.authoring.measures.texts import revealing, text_keys, texts_by_language

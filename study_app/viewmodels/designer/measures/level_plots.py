@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.authoring.levels import Level, levels, standard_of
+from study_app.authoring.block_levels import Level, levels, standard_of
 from study_app.authoring.measures.forces import LevelLimits, level_limits
 from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import GroupPrecision
