@@ -15,7 +15,7 @@ from study_app.app.designer.element_steps import Step
 from study_app.app.designer.open_study import OpenStudy
 from study_app.app.designer.studies import there
 from study_app.authoring.edited_study import Study
-from study_app.authoring.history import History
+from study_app.authoring.undo_stack import History
 from study_app.authoring.writer.edits import Edit
 from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path as Place

@@ -11,8 +11,8 @@ from typing import Final
 
 from study_app.authoring.drafts import Draft, Keeper, draft_of, drafted_files
 from study_app.authoring.edited_study import Study, read
-from study_app.authoring.history import History
 from study_app.authoring.new_study import check_free, copy_of
+from study_app.authoring.undo_stack import History
 from study_app.authoring.versions.contents import content_hash, keep_content, save, write_whole
 from study_app.authoring.versions.runs import Run, Standing, check_saving, standing
 from study_app.authoring.writer.edits import Set

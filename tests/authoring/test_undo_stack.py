@@ -6,7 +6,7 @@ import pytest
 
 from study_app.authoring.edited_study import read
 from study_app.authoring.fields import rows
-from study_app.authoring.history import MOST_STEPS, History
+from study_app.authoring.undo_stack import MOST_STEPS, History
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.errors import ProtocolError
