@@ -301,7 +301,7 @@ def test_rows_say_what_and_where_they_are_and_contain_the_problems_below_them(de
 
 def test_what_changes_by_itself_is_said_once(designer: Any, monkeypatch: Any) -> None:
     said: list[str] = []
-    monkeypatch.setattr("study_app.gui.designer.header.say", lambda _widget, words: said.append(words))
+    monkeypatch.setattr("study_app.gui.designer.designer_header.say", lambda _widget, words: said.append(words))
     monkeypatch.setattr("study_app.gui.designer.view.say", lambda _widget, words: said.append(words))
     designer.controller.open("kitchen")
     assert said == []

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import QLabel
 
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.edited_study import read
-from study_app.gui.designer.header import DesignerHeader
+from study_app.gui.designer.designer_header import DesignerHeader
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.versions.change_list import ChangeLine
 from study_app.gui.widgets.controls import ActionButton
