@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QFileDialog, QGridLayout, QScrollArea, QVBoxLayout
 from study_app.gui.lab.estimate_card import EstimateCard
 from study_app.gui.lab.flow_curve_cards import FlowCurveRow
 from study_app.gui.lab.form import FormPanel
-from study_app.gui.lab.header import LabHeader
+from study_app.gui.lab.lab_header import LabHeader
 from study_app.gui.lab.lab_plots import ForceCard, SpeedCard
 from study_app.gui.lab.lab_tank import LabTank
 from study_app.gui.lab.measurement_cards import CostCard, ErrorCard, LimiterCard
