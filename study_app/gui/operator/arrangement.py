@@ -17,9 +17,9 @@ from PySide6.QtWidgets import QGridLayout, QLayout, QScrollArea, QVBoxLayout, QW
 from study_app.gui.operator.actions import Actions
 from study_app.gui.operator.banner import Banner
 from study_app.gui.operator.device_card import ALL_ROWS, DeviceCard
-from study_app.gui.operator.header import Header
 from study_app.gui.operator.health_tiles import Tiles
 from study_app.gui.operator.notes import NotesCard
+from study_app.gui.operator.session_header import Header
 from study_app.gui.operator.steps_card import NARROW, SLIM, WIDTH, Rail
 from study_app.gui.operator.stop_panel import StopPanel
 from study_app.gui.widgets.cards import Card

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from study_app.gui.operator.header import OTHER_WINDOW, shown_state
+from study_app.gui.operator.session_header import OTHER_WINDOW, shown_state
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.gui.theme.themed import Themed, dress
 from study_app.gui.widgets.cards import Chip

@@ -16,10 +16,10 @@ from study_app.gui.operator.arrangement import Arrangement, Pieces
 from study_app.gui.operator.banner import Banner
 from study_app.gui.operator.device_card import DeviceCard
 from study_app.gui.operator.force_plots import ForceCard
-from study_app.gui.operator.header import Header
 from study_app.gui.operator.health_tiles import Tiles
 from study_app.gui.operator.notes import NotesCard
 from study_app.gui.operator.plot_cards import HiddenForceCard, LatenessCard, PositionCard
+from study_app.gui.operator.session_header import Header
 from study_app.gui.operator.steps_card import Rail
 from study_app.gui.operator.stop_panel import StopPanel
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
