@@ -6,7 +6,7 @@ from PySide6.QtCore import QEvent, QObject, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from study_app.gui.designer.form.form import FormCard
+from study_app.gui.designer.form.element_form import FormCard
 from study_app.gui.designer.outline.card import OutlineCard
 from study_app.gui.designer.pane.right_pane import RightPane
 from study_app.gui.designer.problems import ProblemsCard

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFileDialog, QStackedWidget, QVBoxLayout, QWidget
 from study_app.gui.designer.arrangement import Arrangement
 from study_app.gui.designer.banner import BannerCard
 from study_app.gui.designer.designer_header import DesignerHeader
-from study_app.gui.designer.form.form import FormCard
+from study_app.gui.designer.form.element_form import FormCard
 from study_app.gui.designer.measures.measures_page import MeasuresPage
 from study_app.gui.designer.new_study import NewStudyPage, NoStudyCard
 from study_app.gui.designer.outline.add_list import AddList

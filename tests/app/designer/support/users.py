@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.gui.designer.form.form import FormCard
+from study_app.gui.designer.form.element_form import FormCard
 from study_app.gui.designer.outline.card import OutlineCard
 from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.gui.participant.window import ParticipantWindow
