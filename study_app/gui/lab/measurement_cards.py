@@ -8,7 +8,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QStackedLayout, QVBoxLayout, QWidget
 
-from study_app.gui.lab.form import HIDDEN
+from study_app.gui.lab.parameter_form import HIDDEN
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, dress
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule

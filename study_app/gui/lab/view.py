@@ -13,11 +13,11 @@ from PySide6.QtWidgets import QFileDialog, QGridLayout, QScrollArea, QVBoxLayout
 
 from study_app.gui.lab.estimate_card import EstimateCard
 from study_app.gui.lab.flow_curve_cards import FlowCurveRow
-from study_app.gui.lab.form import FormPanel
 from study_app.gui.lab.lab_header import LabHeader
 from study_app.gui.lab.lab_plots import ForceCard, SpeedCard
 from study_app.gui.lab.lab_tank import LabTank
 from study_app.gui.lab.measurement_cards import CostCard, ErrorCard, LimiterCard
+from study_app.gui.lab.parameter_form import FormPanel
 from study_app.gui.lab.side_switch import KEY
 from study_app.gui.lab.tank_note import TankNote
 from study_app.gui.theme.theme import SPACE
