@@ -9,7 +9,7 @@ from PySide6.QtCore import QSize
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.participant.forms.form import FormWidget
+from study_app.gui.participant.forms.question_form import FormWidget
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.session.pages import QuestionnairePage
 

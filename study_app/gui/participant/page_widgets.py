@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QWidget
 
-from study_app.gui.participant.forms.form import FormWidget
+from study_app.gui.participant.forms.question_form import FormWidget
 from study_app.gui.participant.intervals.choice_page import ChoiceWidget
 from study_app.gui.participant.intervals.feedback_page import FeedbackWidget
 from study_app.gui.participant.intervals.number_page import NumberWidget

@@ -9,7 +9,7 @@ from PySide6.QtGui import QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.participant.forms.form import FormWidget
+from study_app.gui.participant.forms.question_form import FormWidget
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.forms.show_if import ShowIf
 from study_app.protocol.questions.choice import ChoiceView

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from PySide6.QtWidgets import QLabel, QWidget
 
-from study_app.gui.participant.forms.form import FormWidget
 from study_app.gui.participant.forms.question_field import LEAST_TARGET
+from study_app.gui.participant.forms.question_form import FormWidget
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.question import ItemView
 from study_app.protocol.questions.rating import RatingView

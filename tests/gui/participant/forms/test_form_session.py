@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.participant.forms.form import FormWidget
+from study_app.gui.participant.forms.question_form import FormWidget
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream

@@ -21,7 +21,7 @@ from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.operator.strip import Strip
-from study_app.gui.participant.forms.form import FormWidget
+from study_app.gui.participant.forms.question_form import FormWidget
 from study_app.gui.participant.intervals.choice_page import ChoiceWidget
 from study_app.gui.participant.intervals.number_page import NumberWidget
 from study_app.gui.participant.window import ParticipantWindow
