@@ -26,9 +26,9 @@ from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.app.designer.versions.renaming import Renaming
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.edited_study import read
-from study_app.authoring.facts import facts
 from study_app.authoring.names import renamed
 from study_app.authoring.new_study import NO_ANSWERS, Answers, answered, template
+from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.refused import Refused
 from study_app.errors import StudyError
 from study_app.gui.designer.view import DesignerPlace

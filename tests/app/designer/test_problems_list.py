@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, QPointF
 from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.authoring.facts import facts
+from study_app.authoring.study_facts import facts
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.requests import SetValue
 

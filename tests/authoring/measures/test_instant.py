@@ -6,11 +6,11 @@ import pytest
 
 from study_app.authoring.block_levels import levels, standard_of
 from study_app.authoring.edited_study import Study, read
-from study_app.authoring.facts import facts
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.forces import level_limits
 from study_app.authoring.measures.texts import revealing, text_keys, texts_by_language
 from study_app.authoring.measures.valid_part import valid_part
+from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.protocol.load import load, shipped

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from study_app.authoring.edited_study import Study, read
-from study_app.authoring.facts import facts
+from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.outline_rows import SECTIONS, outline_rows

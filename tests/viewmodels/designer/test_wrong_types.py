@@ -9,9 +9,9 @@ import pytest
 from study_app.app.designer.participant.shown_step import showing
 from study_app.app.designer.participant.sound_part import sound_part
 from study_app.app.designer.play.playable import NotPlayableError, playable
-from study_app.authoring.facts import facts
 from study_app.authoring.new_study import template
 from study_app.authoring.repairs import repairs
+from study_app.authoring.study_facts import facts
 from study_app.authoring.versions.changes import changes
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.protocol.source.document import Path, value_at

@@ -13,10 +13,10 @@ from study_app.app.designer.measures.page_fit import PageFit
 from study_app.app.designer.measures.slow_numbers import SlowNumbers
 from study_app.app.designer.measures.wanted import LAPSES, participants_of, precision_of, threshold_of, wanted_of
 from study_app.app.designer.repair_search import RepairSearch
-from study_app.authoring.facts import facts
 from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import Detectable, GroupPrecision
 from study_app.authoring.measures.valid_part import valid_part
+from study_app.authoring.study_facts import facts
 from study_app.gui.designer.view import DesignerPlace
 from study_app.viewmodels.designer.measures.level_plots import Simulated
 from study_app.viewmodels.designer.measures.level_words import LevelWords

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from study_app.authoring.edited_study import Study
-from study_app.authoring.facts import Facts
 from study_app.authoring.measures.planned import Detectable
 from study_app.authoring.measures.valid_part import valid_part
+from study_app.authoring.study_facts import Facts
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
 from study_app.protocol.model import Protocol

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Final
 
 from study_app.authoring.edited_study import Study
-from study_app.authoring.facts import Facts
 from study_app.authoring.fields import label_of
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.forces import forces
@@ -14,6 +13,7 @@ from study_app.authoring.measures.planned import Detectable
 from study_app.authoring.measures.texts import revealing, texts_by_language
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
+from study_app.authoring.study_facts import Facts
 from study_app.haptics.model.gate import calls_for
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from study_app.authoring.edited_study import Study, read
-from study_app.authoring.facts import facts
 from study_app.authoring.measures.planned import Detectable, Finding
+from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
 from study_app.haptics.model.steady_state import HAND_MPS, steady
 from study_app.protocol.load import shipped
