@@ -8,7 +8,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
-from study_app.gui.designer.pane.facts import FactsRow
+from study_app.gui.designer.pane.measure_cards import FactsRow
 from study_app.gui.designer.segments import Segments
 from study_app.gui.widgets.cards import SHADOW
 
