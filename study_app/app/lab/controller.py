@@ -20,8 +20,8 @@ from study_app.app.exception_hooks import UncaughtExceptions
 from study_app.app.guarded_slots import guarded
 from study_app.app.lab.costs import Prices
 from study_app.app.lab.device_opening import LabOpening
-from study_app.app.lab.estimation import LabEstimation
 from study_app.app.lab.initial_settings import InitialSettings, prepare_initial_settings
+from study_app.app.lab.lab_estimation import LabEstimation
 from study_app.app.lab.preset_saving import LabSaving
 from study_app.app.lab.view_values import lab_view
 from study_app.app.session.termination import Patience
