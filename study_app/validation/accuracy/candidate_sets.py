@@ -7,7 +7,7 @@ import numpy as np
 from study_app.evaluation.scene_variants import _only, _wake, with_effects, with_wake
 from study_app.haptics.model.effects.drag import REFERENCE
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.laws.drag import Law
+from study_app.haptics.model.laws.drag_laws import Law
 from study_app.haptics.model.scene import Effect, Estimator, Ewma, Foaw, Given, Line, Raw, Scene
 from study_app.validation.accuracy.candidates import (
     InterpretedRung,

@@ -14,7 +14,7 @@ from study_app.evaluation import reference_solutions as truths
 from study_app.evaluation.expected_error import Expected, expected
 from study_app.evaluation.force_error import error_of
 from study_app.evaluation.reference_solutions import measured_drag_n
-from study_app.haptics.model.laws.drag import LAWS, finite_reynolds
+from study_app.haptics.model.laws.drag_laws import LAWS, finite_reynolds
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.store.atomic import write_file
 from study_app.validation.accuracy import candidate_sets

@@ -12,7 +12,7 @@ import numpy as np
 from study_app.evaluation.identify.parameters import find
 from study_app.evaluation.reference_solutions import measured_drag_n
 from study_app.figure_style import PLOT_SETTINGS, file_bytes
-from study_app.haptics.model.laws.drag import LAWS
+from study_app.haptics.model.laws.drag_laws import LAWS
 from study_app.haptics.model.scene import Liquid
 from study_app.store.atomic import write_file
 from study_app.store.tables.csv_files import csv_text_of

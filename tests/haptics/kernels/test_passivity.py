@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.model import paths
-from study_app.haptics.model.laws import drag as laws
+from study_app.haptics.model.laws import drag_laws as laws
 from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Body, Raw

@@ -10,7 +10,7 @@ from study_app.haptics.model.effects.drag import (
     LAW_HAIDER_LEVENSPIEL,
     LAW_LINEAR,
 )
-from study_app.haptics.model.laws import drag as laws
+from study_app.haptics.model.laws import drag_laws as laws
 from study_app.haptics.model.layout import GROWS_AS_SPEED, Record
 
 _schiller_naumann = part(laws.schiller_naumann)

@@ -29,7 +29,7 @@ from study_app.haptics.model.effects.non_newtonian import (
     VISCOUS_SHARE,
 )
 from study_app.haptics.model.laws import rheology
-from study_app.haptics.model.laws.drag import finite_reynolds
+from study_app.haptics.model.laws.drag_laws import finite_reynolds
 from study_app.haptics.model.layout import GROWS_AS_SPEED, GROWS_LESS, Record
 
 SLACK_COUNTS = 2.0

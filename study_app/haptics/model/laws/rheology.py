@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
-from study_app.haptics.model.laws.drag import finite_reynolds
+from study_app.haptics.model.laws.drag_laws import finite_reynolds
 from study_app.haptics.model.ranges import Frozen, ViscosityPaS, within
 
 YIELD: Final = 1.157

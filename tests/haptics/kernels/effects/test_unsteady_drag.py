@@ -6,7 +6,7 @@ import pytest
 from study_app.evaluation.reference_solutions import oscillation, start
 from study_app.evaluation.unsteady_law import unsteady_n
 from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS_RPS
-from study_app.haptics.model.laws.drag import finite_reynolds
+from study_app.haptics.model.laws.drag_laws import finite_reynolds
 from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Kalman, MotionBox
