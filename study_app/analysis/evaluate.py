@@ -9,7 +9,7 @@ from typing import Final
 
 from study_app.analysis.designs.block_tests import SEALED, Asked, asked, facts, untested
 from study_app.analysis.designs.level_summaries import levels_found
-from study_app.analysis.designs.questions import questions_found, scores_found
+from study_app.analysis.designs.question_measures import questions_found, scores_found
 from study_app.analysis.designs.site_thresholds import site_thresholds
 from study_app.analysis.findings import all_findings
 from study_app.analysis.results.block_results import BlockFound, Results

@@ -130,7 +130,7 @@ def _read(folder: Path, tell: Tell, stop: Callable[[], bool]) -> None:
 
 def _draw_questions(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
     """Draw the figures of questions that no block of statements holds."""
-    from study_app.analysis.designs.questions import questions_found  # noqa: PLC0415
+    from study_app.analysis.designs.question_measures import questions_found  # noqa: PLC0415
     from study_app.analysis.figures.question_figures import question_pictures  # noqa: PLC0415
 
     found = questions_found(study)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.designs.questions import scored
+from study_app.analysis.designs.question_measures import scored
 from study_app.analysis.export.delivered import Delivered, with_site
 from study_app.analysis.tables.asked_questions import AskedQuestion, AskedScore
 from study_app.analysis.tables.compared_blocks import Block, Item, Setting, setting_name

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from study_app import figure_style as style
 from study_app.analysis.designs.level_summaries import levels_found
-from study_app.analysis.designs.questions import questions_found
+from study_app.analysis.designs.question_measures import questions_found
 from study_app.analysis.figures import captions
 from study_app.analysis.figures.answer_figures import KINDS, render
 from study_app.analysis.figures.levels.level_pictures import level_pictures

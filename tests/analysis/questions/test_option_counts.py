@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import pandas as pd
 import pytest
 
-from study_app.analysis.designs.questions import MEASURES
+from study_app.analysis.designs.question_measures import MEASURES
 from study_app.analysis.export.export import export
 from study_app.analysis.tables.asked_questions import AskedIn, AskedQuestion
 from study_app.protocol.forms import kinds

@@ -11,7 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 
-from study_app.analysis.designs import questions as measured
+from study_app.analysis.designs import question_measures as measured
 from study_app.analysis.figures import question_figures
 from study_app.analysis.figures.page_layout import Sheet
 from study_app.analysis.figures.questions.group_rows import Look, QuestionFigure, rows

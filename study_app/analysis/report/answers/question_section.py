@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from study_app.analysis.designs.questions import MEASURES
+from study_app.analysis.designs.question_measures import MEASURES
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.report.answers import level_section
 from study_app.analysis.report.html_page import bullets, heading, paragraph, picture, table
