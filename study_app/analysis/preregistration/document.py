@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from study_app import __version__
 from study_app.analysis.power.plan import compares_statements
+from study_app.analysis.preregistration.block_questions import analyses, hypotheses
 from study_app.analysis.preregistration.commitment import Commitment, commitment, written
-from study_app.analysis.preregistration.questions import analyses, hypotheses
 from study_app.analysis.results.words import counted
 from study_app.analysis.tables.compared_blocks import spoken
 from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows
