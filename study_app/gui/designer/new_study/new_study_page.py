@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from study_app.gui.designer.new_study.cards import TemplateButton
-from study_app.gui.designer.new_study.questions import Questions
+from study_app.gui.designer.new_study.new_study_questions import Questions
 from study_app.gui.designer.new_study.recovery_bar import RecoveryBar
 from study_app.gui.theme.themed import Themed, dress, take_away
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
