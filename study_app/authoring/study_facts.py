@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Final
 
 from study_app.authoring.edited_study import Study
-from study_app.authoring.measures.texts import missing_texts
+from study_app.authoring.measures.participant_texts import missing_texts
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.haptics.model.steady_state import HAND_MPS, steady
 from study_app.protocol.describe import warnings

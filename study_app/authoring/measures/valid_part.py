@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from study_app.authoring.document_values import with_value, without_value
 from study_app.authoring.edited_study import Study
-from study_app.authoring.measures.texts import text_keys
+from study_app.authoring.measures.participant_texts import text_keys
 from study_app.protocol.load import examined
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path, entries, value_at

@@ -9,7 +9,7 @@ from typing import Any, Final
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
-from study_app.authoring.measures.texts import missing_texts
+from study_app.authoring.measures.participant_texts import missing_texts
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.protocol.groups.group import sequences_in

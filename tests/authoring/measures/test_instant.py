@@ -8,7 +8,7 @@ from study_app.authoring.block_levels import levels, standard_of
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.forces import level_limits
-from study_app.authoring.measures.texts import revealing, text_keys, texts_by_language
+from study_app.authoring.measures.participant_texts import revealing, text_keys, texts_by_language
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set, Unset

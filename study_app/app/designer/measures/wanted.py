@@ -6,7 +6,7 @@ import json
 from typing import Any, Final
 
 from study_app.app.designer.measures.measures_worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
-from study_app.authoring.measures.texts import text_keys
+from study_app.authoring.measures.participant_texts import text_keys
 from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
 from study_app.protocol.model import Protocol
 from study_app.viewmodels.designer.measures.measures_view import Controls, Focus

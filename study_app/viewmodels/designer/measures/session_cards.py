@@ -9,8 +9,8 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.forces import forces
+from study_app.authoring.measures.participant_texts import revealing, texts_by_language
 from study_app.authoring.measures.planned import Detectable
-from study_app.authoring.measures.texts import revealing, texts_by_language
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
 from study_app.authoring.study_facts import Facts
