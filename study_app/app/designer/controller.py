@@ -14,13 +14,13 @@ from study_app.app.designer.clipboard import Clipboard
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.element_steps import Step, delete_prompt
 from study_app.app.designer.feeling import Feeling
+from study_app.app.designer.known_studies import header_state, new_choices, source_of, studies
 from study_app.app.designer.measures.measures_controller import MeasuresController
 from study_app.app.designer.open_study import OpenStudy, open_file, open_new, open_unsaved
 from study_app.app.designer.participant.preview import ParticipantPreview
 from study_app.app.designer.play.playing import Playing
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.app.designer.saving import Saving
-from study_app.app.designer.studies import header_state, new_choices, source_of, studies
 from study_app.app.designer.versions.changes_controller import ChangesController
 from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.app.designer.versions.renaming import Renaming

@@ -12,8 +12,8 @@ from PySide6.QtCore import QObject, Signal
 
 from study_app.app.designer.edit_steps import Steps
 from study_app.app.designer.element_steps import Step
+from study_app.app.designer.known_studies import there
 from study_app.app.designer.open_study import OpenStudy
-from study_app.app.designer.studies import there
 from study_app.authoring.edited_study import Study
 from study_app.authoring.undo_stack import History
 from study_app.authoring.writer.edits import Edit

@@ -9,8 +9,8 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.app.designer.editing import Editing
+from study_app.app.designer.known_studies import source_of, time_words
 from study_app.app.designer.open_study import OpenStudy, why_read_only
-from study_app.app.designer.studies import source_of, time_words
 from study_app.app.designer.versions.comparison import Comparison, compare, newest, version_of
 from study_app.app.designer.versions.file_watch import FileWatch
 from study_app.app.designer.versions.known_runs import KnownRuns
