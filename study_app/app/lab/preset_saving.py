@@ -12,7 +12,7 @@ from PySide6.QtCore import QCoreApplication, QObject, Qt, Signal
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting
 from study_app.lab.presets import Choice, liquids_at_hand, liquids_of, preset_text, save, spoken
-from study_app.lab.studies import use_in_study
+from study_app.lab.setting_in_study import use_in_study
 
 PATIENCE_S = 20.0
 
