@@ -11,10 +11,10 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
+from study_app.analysis.designs.adjustment_settings import settings
 from study_app.analysis.designs.estimated_exponents import estimated_exponents
 from study_app.analysis.designs.level_conduct import catch_answers, level_conduct
 from study_app.analysis.designs.sensitivities import sensitivities
-from study_app.analysis.designs.settings import settings
 from study_app.analysis.designs.thresholds import thresholds
 from study_app.analysis.designs.weber_exponents import weber_exponents
 from study_app.analysis.results.level_results import (

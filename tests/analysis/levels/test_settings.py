@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study_app.analysis.designs.adjustment_settings import settings
 from study_app.analysis.designs.level_summaries import levels_found
-from study_app.analysis.designs.settings import settings
 from study_app.analysis.export.export import export
 from study_app.analysis.report.answers.level_limits import level_limits
 from study_app.analysis.report.write_report import report
