@@ -16,7 +16,7 @@ import numpy as np
 from study_app.devices.inverse3.failures import FAILURES
 from study_app.devices.inverse3.frames import CLOSE, INCOMPLETE, TEXT, VIOLATION, build_frame, parse_header
 from study_app.devices.inverse3.link import Link
-from study_app.devices.inverse3.settings import (
+from study_app.devices.inverse3.service_settings import (
     DEVICE_GLOBAL,
     SESSION_SCOPED,
     differing,

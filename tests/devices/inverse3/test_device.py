@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from study_app.devices import call_gate
-from study_app.devices.inverse3 import settings
+from study_app.devices.inverse3 import service_settings
 from study_app.devices.inverse3.device import Inverse3Device, address
 from study_app.devices.inverse3.doctor import examine
 from study_app.devices.inverse3.emulated import EmulatedInverse3, EmulatedLink
@@ -106,8 +106,8 @@ class TestOpening:
     def test_a_service_that_does_not_confirm_is_used_and_the_receipt_says_so(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(settings, "full_state_request", settings.zero_force)
-        monkeypatch.setattr("study_app.devices.inverse3.opening.full_state_request", settings.zero_force)
+        monkeypatch.setattr(service_settings, "full_state_request", service_settings.zero_force)
+        monkeypatch.setattr("study_app.devices.inverse3.opening.full_state_request", service_settings.zero_force)
         lines: list[str] = []
         with EmulatedInverse3(progress=lines.append) as device:
             assert device.describe()["service_settings"]["confirmed"] is False
