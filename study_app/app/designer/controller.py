@@ -35,12 +35,12 @@ from study_app.gui.designer.view import DesignerPlace
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import find
 from study_app.viewmodels.designer.addable import addable
+from study_app.viewmodels.designer.designer_view import DesignerView, HeaderState, StudyChoice
 from study_app.viewmodels.designer.file_text import file_text
 from study_app.viewmodels.designer.form_rows import form
 from study_app.viewmodels.designer.outline_rows import outline_rows
 from study_app.viewmodels.designer.problem_rows import ProblemRow, problem_rows
 from study_app.viewmodels.designer.requests import DeleteElement, RenameElement, Request
-from study_app.viewmodels.designer.view import DesignerView, HeaderState, StudyChoice
 
 REST_MS: Final = 200
 

@@ -18,10 +18,10 @@ from study_app.protocol.load import read_document
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import has
 from study_app.protocol.source.files import find, shipped, shipped_file
+from study_app.viewmodels.designer.designer_view import HeaderState, StudyChoice, problems_chip
 from study_app.viewmodels.designer.new_study import TEMPLATES, TemplateChoice, copy_choice, template_choice
 from study_app.viewmodels.designer.outline_rows import FIRST
 from study_app.viewmodels.designer.versions.standing import VersionChip
-from study_app.viewmodels.designer.view import HeaderState, StudyChoice, problems_chip
 from study_app.viewmodels.home import holds_liquids_alone, is_shipped, sources
 
 

@@ -20,9 +20,9 @@ from study_app.authoring.writer.refused import Refused
 from study_app.errors import StudyError
 from study_app.gui.designer.versions.save_card import SaveCard
 from study_app.gui.designer.view import DesignerPlace
+from study_app.viewmodels.designer.designer_view import Banner
 from study_app.viewmodels.designer.versions.changes_view import FILE
 from study_app.viewmodels.designer.versions.standing import save_prompt
-from study_app.viewmodels.designer.view import Banner
 
 DRAFT_MS: Final = 50
 RETRY_MS: Final = 2_000

@@ -10,7 +10,7 @@ from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.view import Banner
+from study_app.viewmodels.designer.designer_view import Banner
 
 
 class BannerCard(Card):

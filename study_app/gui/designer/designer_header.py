@@ -14,7 +14,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.view import HeaderState
+from study_app.viewmodels.designer.designer_view import HeaderState
 from study_app.viewmodels.tones import Tone
 
 NEW, OPEN = "\0new", "\0open"

@@ -24,12 +24,12 @@ from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import dress, take_away
 from study_app.gui.widgets.main_view import Place
 from study_app.viewmodels.designer.addable import Addable
+from study_app.viewmodels.designer.designer_view import DesignerView, HeaderState
 from study_app.viewmodels.designer.new_study import TemplateChoice
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.prompts import DeletePrompt
 from study_app.viewmodels.designer.requests import DuplicateElement, MoveElement, MoveTo, RetypeFile
-from study_app.viewmodels.designer.view import DesignerView, HeaderState
 
 
 class DesignerPlace(Place):

@@ -23,8 +23,8 @@ from study_app.gui.theme.themed import Themed, dress, take_away
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label
+from study_app.viewmodels.designer.designer_view import StudyChoice
 from study_app.viewmodels.designer.new_study import TemplateChoice
-from study_app.viewmodels.designer.view import StudyChoice
 
 SIDE_PX, SIDE_NARROW_PX, NARROW_BELOW = 400, 330, 1200
 LOW_BELOW = 880
