@@ -15,7 +15,7 @@ from study_app import __version__
 
 yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 DECISIONS = sorted((ROOT / "docs" / "decisions").glob("*.md"))
 PAGES = [ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", ROOT / "docs" / "install.md", *DECISIONS]
 FOLDERS = ("study_app/", "tests/", "docs/", "protocols/", "packaging/", ".ci/", ".github/", "results/")

@@ -128,7 +128,7 @@ def test_a_fault_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 @needs_servo
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_examples_run(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.chdir(Path(__file__).parents[1])
+    monkeypatch.chdir(Path(__file__).parents[2])
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     module = importlib.import_module(name.rpartition(".")[0])
     (example,) = doctest.DocTestFinder(recurse=False).find(vars(module)[name.rpartition(".")[2]], name)

@@ -17,7 +17,7 @@ from study_app import __version__, documentation
 
 pytestmark = pytest.mark.slow
 
-PACKAGING = Path(__file__).resolve().parents[1] / "packaging"
+PACKAGING = Path(__file__).resolve().parents[2] / "packaging"
 
 
 def started(*words: str, code: int = 0, send: bytes = b"", **variables: str) -> str:

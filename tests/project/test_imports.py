@@ -1,17 +1,30 @@
-from __future__ import annotations
+"""Modules import one another without a cycle, those for type annotations included, and no more than they need."""
 
 import pkgutil
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 
+import grimp
 import pytest
 
 import study_app.protocol
 
+pytestmark = pytest.mark.slow
+
+FIND_THEIR_MODULES = ("study_app.haptics.model.effects", "study_app.haptics.model.estimators")
 HEAVY = ("numba", "llvmlite", "PySide6", "pyqtgraph", "pandas", "scipy", "matplotlib", "numpy")
 
 
-@pytest.mark.slow
+def test_no_module_imports_itself_through_others() -> None:
+    graph = grimp.build_graph("study_app", cache_dir=None)
+    imports = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    for package in FIND_THEIR_MODULES:
+        imports[package] |= graph.find_children(package)
+
+    TopologicalSorter(imports).prepare()  # raises CycleError, which names the modules of a cycle
+
+
 def test_reading_a_protocol_loads_neither_compiler_nor_qt():
     modules = [
         module.name for module in pkgutil.walk_packages(study_app.protocol.__path__, prefix="study_app.protocol.")
