@@ -16,7 +16,7 @@ from study_app.evaluation.replay import replay
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
-from tests.real_windows import COMPILED_S, needs_display, virtual_display
+from tests.end_to_end.real_windows import COMPILED_S, needs_display, virtual_display
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -14,7 +14,7 @@ from study_app.authoring.edited_study import Study, read
 from tests.app.designer.support.made_studies import STUDIES
 from tests.app.designer.support.program import USERS, environment
 from tests.compiled import needs_servo
-from tests.real_windows import needs_display, virtual_display
+from tests.end_to_end.real_windows import needs_display, virtual_display
 
 ROOT = Path(__file__).resolve().parents[3]
 LIMIT_S = 900.0

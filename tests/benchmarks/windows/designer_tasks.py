@@ -29,7 +29,7 @@ from tests.app.designer.support.key_user import KeyUser
 from tests.app.designer.support.made_studies import begin, participant, save
 from tests.app.designer.support.program import USERS, environment, use
 from tests.app.designer.support.users import User, name_of, wait_until
-from tests.real_windows import virtual_display
+from tests.end_to_end.real_windows import virtual_display
 
 FAULTS = (
     ("force_limit_n = 8 ", "force_limit_n = 12 "),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.real_windows import needs_display, virtual_display
+from tests.end_to_end.real_windows import needs_display, virtual_display
 
 pytestmark = pytest.mark.slow
 

@@ -34,10 +34,10 @@ from study_app.session.transitions.page_builder import page
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
 from tests.compiled import needs_servo
+from tests.end_to_end.real_windows import Program, needs_display, virtual_display
+from tests.end_to_end.walking import laid_out, place_in
 from tests.gui.small import ManualClock
 from tests.protocol.trials.level_studies import key_of
-from tests.real_windows import Program, needs_display, virtual_display
-from tests.walking import laid_out, place_in
 
 pytestmark = [pytest.mark.nightly, needs_servo, pytest.mark.xvfb, pytest.mark.timeout(300), needs_display]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from study_app.gui.display.opengl import IN_SOFTWARE, has_card, renderer
-from tests.real_windows import needs_display, virtual_display
+from tests.end_to_end.real_windows import needs_display, virtual_display
 
 pytestmark = pytest.mark.slow
 

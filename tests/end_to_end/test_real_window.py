@@ -26,8 +26,8 @@ from study_app.protocol.source.files import source_bytes
 from study_app.protocol.wording.languages import words
 from study_app.store.sessions.reopen import check_can_go_on
 from tests.compiled import needs_servo
+from tests.end_to_end.real_windows import Program, needs_display, virtual_display, wait_for
 from tests.gui.small import ManualClock, questionnaire
-from tests.real_windows import Program, needs_display, virtual_display, wait_for
 
 GIVEN = [7, 1, 4, 6, 2, 3, 5, 7, 1]
 BY_CLICK = {1, 4, 8}

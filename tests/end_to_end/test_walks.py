@@ -34,9 +34,9 @@ from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
 from study_app.user_folder import settings_file
 from tests.compiled import needs_servo
+from tests.end_to_end.real_windows import needs_display, virtual_display, wait_for
+from tests.end_to_end.walking import ANSWERS, TRIALS, Pages, Person, Visitor, laid_out, place_in, tabs_to
 from tests.gui.small import ManualClock
-from tests.real_windows import needs_display, virtual_display, wait_for
-from tests.walking import ANSWERS, TRIALS, Pages, Person, Visitor, laid_out, place_in, tabs_to
 
 SCREEN_PX = 1080
 CORRECTED = {2: 5}  # statement: first answer, of every page

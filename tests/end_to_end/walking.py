@@ -36,7 +36,7 @@ from study_app.store.progress import Progress
 from study_app.viewmodels.operator import OperatorView, Session, operator_view
 from study_app.viewmodels.servo_health import ServoHealth
 from study_app.viewmodels.session.stages import stages
-from tests.real_windows import Program, wait_for
+from tests.end_to_end.real_windows import Program, wait_for
 
 SHORTER = {
     "min_s = 10 ": "min_s = 0.5 ",

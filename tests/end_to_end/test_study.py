@@ -213,7 +213,7 @@ ODD = {
 
 
 def test_a_finished_folder_names_no_condition_liquid_parameter_or_delay(tmp_path: Path) -> None:
-    text = (Path(__file__).parent.parent / "protocols" / "demo.toml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "protocols" / "demo.toml").read_text(encoding="utf-8")
     for plain, odd in ODD.items():
         text = text.replace(plain, odd)
     odd_file = tmp_path / "odd.toml"
@@ -257,7 +257,7 @@ def test_a_kill_during_part_2_leaves_every_earlier_answer_readable(tmp_path: Pat
         [sys.executable, "-c", KILLED, str(tmp_path / "rek2024")],
         stdout=subprocess.PIPE,
         text=True,
-        cwd=Path(__file__).parent.parent,
+        cwd=Path(__file__).parents[2],
     )
     told: list[list[str]] = []
     confirmed = 0

@@ -15,7 +15,7 @@ from packaging.requirements import Requirement
 from study_app.errors import ANALYSIS_LIBRARIES, MissingExtra, naming_the_extra
 from tests.compiled import needs_servo
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 
 BLOCK = f"import sys\nsys.modules.update(dict.fromkeys({sorted(ANALYSIS_LIBRARIES)}))\n"
 """None among the modules: an import of it, or of a part of it, fails as that of a missing library."""
