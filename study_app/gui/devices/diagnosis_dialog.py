@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QProgressBar, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
 
 from study_app.devices.doctor_report import Report, lines
 from study_app.devices.doctor_worker import ExaminationClient, start_examination
@@ -17,7 +17,7 @@ from study_app.errors import StoreError
 from study_app.gui.devices.failure_rows import FindingRow
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import wear
-from study_app.gui.widgets.cards import Card, Icon, Rule
+from study_app.gui.widgets.cards import Card, Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.store.support import NAME, write_support
@@ -113,11 +113,7 @@ class DiagnosisDialog(QDialog):
         self._list.addStretch()
         inside = QWidget()
         inside.setLayout(self._list)
-        self.area = QScrollArea()
-        self.area.setWidgetResizable(True)
-        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.area.setWidget(inside)
+        self.area = scrolled(inside)
         card = Card(padding=10, gap=0)
         card.column.addWidget(self.area)
         foot = QHBoxLayout()

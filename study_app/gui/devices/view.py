@@ -9,15 +9,15 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.devices.descriptor import DeviceOption
 from study_app.gui.devices.device_rows import LEAST_WORDS, DeviceList
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import dress
-from study_app.gui.widgets.cards import SHADOW, Card
+from study_app.gui.widgets.cards import SHADOW, Card, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
@@ -146,11 +146,7 @@ class DevicesPlace(Place):
         page.setSpacing(20)
         page.addLayout(head)
         page.addLayout(self._body, 1)
-        self._area = QScrollArea()
-        self._area.setWidgetResizable(True)
-        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._area.setWidget(inside)
+        self._area = scrolled(inside)
         row = QVBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self._area)

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QGridLayout,
     QHBoxLayout,
-    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
@@ -26,7 +25,7 @@ from study_app.gui.home.study_folder_state import StudyFolderState, read_study_f
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import wear
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.cards import Icon, Rule
+from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.protocol.groups.session_steps import refuse_beyond_last
@@ -196,11 +195,7 @@ class NewSessionDialog(QDialog):
                 hint="whose row of the square is used; empty: the own row",
             )
         grid.addWidget(self.device_options, 14, 0, 1, 2)
-        self._area = QScrollArea()
-        self._area.setWidgetResizable(True)
-        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._area.setWidget(self._inside)
+        self._area = scrolled(self._inside)
         column.addWidget(self._area, 1)
         column.addSpacing(10)
         column.addWidget(Rule())

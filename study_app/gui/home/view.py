@@ -8,9 +8,9 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
@@ -25,7 +25,7 @@ from study_app.gui.home.study_cards import BrokenCard, CardGrid, StudyCard
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import dress
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.cards import SHADOW
+from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
@@ -162,11 +162,7 @@ class HomePlace(Place):
         page.addWidget(self.banner)
         page.addWidget(self.grid)
         page.addLayout(self._below, 1)
-        self.area = QScrollArea()
-        self.area.setWidgetResizable(True)
-        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.area.setWidget(inside)
+        self.area = scrolled(inside)
         row = QVBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self.area)

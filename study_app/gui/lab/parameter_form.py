@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QStackedLayout, QVBoxLayout, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QStackedLayout, QVBoxLayout, QWidget
 
 from study_app.gui.lab.parameter_rows import ParameterRow, SwitchRow, row_for
 from study_app.gui.lab.side_switch import Badge
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import dress
-from study_app.gui.widgets.cards import Card, Rule
+from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import Clamped, label
 from study_app.gui.widgets.masked_panel import MaskedPanel
@@ -125,11 +125,7 @@ class FormPanel(Card):
         self._column = QVBoxLayout(inside)
         self._column.setContentsMargins(0, 0, 6, 0)
         self._column.setSpacing(0)
-        self.area = QScrollArea()
-        self.area.setWidgetResizable(True)
-        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.area.setWidget(inside)
+        self.area = scrolled(inside)
         whole = QWidget()
         column = QVBoxLayout(whole)
         column.setContentsMargins(0, 0, 0, 0)

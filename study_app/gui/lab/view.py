@@ -9,7 +9,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
-from PySide6.QtWidgets import QFileDialog, QGridLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QVBoxLayout
 
 from study_app.gui.lab.estimate_card import EstimateCard
 from study_app.gui.lab.flow_curve_cards import FlowCurveRow
@@ -21,7 +21,7 @@ from study_app.gui.lab.parameter_form import FormPanel
 from study_app.gui.lab.side_switch import KEY
 from study_app.gui.lab.tank_note import TankNote
 from study_app.gui.theme.theme import SPACE
-from study_app.gui.widgets.cards import SHADOW
+from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.escape_key import EscapeAnywhere
 from study_app.gui.widgets.main_view import Place
 from study_app.lab.ab_comparison import Setting
@@ -115,8 +115,8 @@ class LabPlace(Place):
         self._middle.addLayout(self._side, 3, 0, 1, 2)
         self._middle.setRowStretch(0, 61)
         self._middle.setRowStretch(1, PLOTS_STRETCH)
-        self._area = _scrolled(self._middle)
-        self._side_area = _scrolled(QGridLayout())
+        self._area = scrolled(self._middle)
+        self._side_area = scrolled(QGridLayout())
         self._body = QGridLayout()
         self._body.setContentsMargins(SPACE[4] - 3, GAP, SPACE[4] - 3, GAP)
         self._body.setSpacing(GAP)
@@ -310,15 +310,3 @@ def preset_name(title: str) -> str:
     """Return a setting's title as a file is called: "Water, edited" becomes "water-edited"."""
     words = "".join(sign if sign.isalnum() else " " for sign in title.lower()).split()
     return "-".join(words) or "preset"
-
-
-def _scrolled(layout: QGridLayout) -> QScrollArea:
-    """Return ``layout`` in a frame that scrolls only where there is no room for it."""
-    inside = QWidget()
-    inside.setLayout(layout)
-    area = QScrollArea()
-    area.setWidgetResizable(True)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    area.setWidget(inside)
-    return area

@@ -12,7 +12,7 @@ from typing import Literal
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
 
 from study_app.gui.operator.actions import Actions
 from study_app.gui.operator.banner import Banner
@@ -22,7 +22,7 @@ from study_app.gui.operator.notes import NotesCard
 from study_app.gui.operator.session_header import Header
 from study_app.gui.operator.steps_card import NARROW, SLIM, WIDTH, Rail
 from study_app.gui.operator.stop_panel import StopPanel
-from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.cards import Card, scrolled
 from study_app.viewmodels.operator import NOTES_SHOWN
 
 Width = Literal["wide", "narrow", "slim"]
@@ -79,8 +79,8 @@ class Arrangement(QWidget):
         side.setSpacing(GAP)
         side.addWidget(p.device)
         side.addWidget(p.notes, 1)
-        self.middle_area = _scrolled(self._middle)
-        self.side_area = _scrolled(side)
+        self.middle_area = scrolled(self._middle)
+        self.side_area = scrolled(side)
         self.side_area.setFixedWidth(SIDE)
         right = QVBoxLayout()
         right.setSpacing(GAP)
@@ -155,15 +155,3 @@ class Arrangement(QWidget):
         self._middle.addWidget(p.position, 4, 0, 1, 2)
         for row, stretch in ((3, 30), (4, 26), (5, 0 if across else 30)):
             self._middle.setRowStretch(row, stretch)
-
-
-def _scrolled(layout: QLayout) -> QScrollArea:
-    """Return ``layout`` in a frame that scrolls only where the window is too low for it."""
-    inside = QWidget()
-    inside.setLayout(layout)
-    area = QScrollArea()
-    area.setWidgetResizable(True)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    area.setWidget(inside)
-    return area

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.operator.current_step import Now, Tally
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.cards import Card, Rule
+from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.labels import Elided, figures, set_ink
 from study_app.viewmodels.operator import OperatorView, StepRow
 
@@ -105,11 +105,7 @@ class Rail(Card):
         self._steps_column = QVBoxLayout(self._steps)
         self._steps_column.setSpacing(0)
         self._steps_column.addStretch(1)
-        self.steps_area = QScrollArea()
-        self.steps_area.setWidgetResizable(True)
-        self.steps_area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.steps_area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.steps_area.setWidget(self._steps)
+        self.steps_area = scrolled(self._steps)
         self._rules = Rule(), Rule()
         self.column.addWidget(self._rules[0])
         self.column.addWidget(self.steps_area, 1)

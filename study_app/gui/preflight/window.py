@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent
-from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from study_app.gui.preflight.check_rows import CheckRow
 from study_app.gui.preflight.masking_question import MaskingQuestion
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import dress, take_away, wear
 from study_app.gui.widgets.accessible import describe_plot
-from study_app.gui.widgets.cards import Card, Chip, Rule
+from study_app.gui.widgets.cards import Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
 from study_app.gui.widgets.live_plots import LatenessPlot
@@ -80,11 +80,7 @@ class PreflightWindow(QWidget):
         left.setContentsMargins(0, 0, 0, 0)
         left.addWidget(self.checks)
         left.addStretch()
-        area = self._area = QScrollArea()
-        area.setWidgetResizable(True)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        area.setWidget(inside)
+        area = self._area = scrolled(inside)
         middle = QHBoxLayout()
         middle.setSpacing(20)
         middle.addWidget(area, 1)

@@ -7,7 +7,7 @@ from typing import Final
 
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QDialog, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.results.export_dialog import Extra, WriteDialog
 from study_app.gui.results.figures_panel import FiguresPanel
@@ -16,7 +16,7 @@ from study_app.gui.sessions.decision_dialogs import LeaveOutDialog, TakeBackDial
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import take_away
-from study_app.gui.widgets.cards import SHADOW, Chip
+from study_app.gui.widgets.cards import SHADOW, Chip, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
@@ -127,11 +127,7 @@ class ResultsPlace(Place):
         page.addLayout(self._head)
         page.addLayout(self._below)
         page.addLayout(self._row, 1)
-        self.area = QScrollArea()
-        self.area.setWidgetResizable(True)
-        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.area.setWidget(inside)
+        self.area = scrolled(inside)
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
         whole.addWidget(self.area)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.display.screens import ScreenShown, screens_shown
 from study_app.gui.settings.display_test import DisplayTest
@@ -16,7 +16,7 @@ from study_app.gui.settings.screen_numbers import ScreenNumber, identify
 from study_app.gui.settings.setting_cards import OffsetCard, ScreensCard, SeenCard, SessionsCard, WindowsCard
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import dress
-from study_app.gui.widgets.cards import SHADOW
+from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
@@ -84,11 +84,7 @@ class MachinePlace(Place):
         page.addLayout(head)
         page.addLayout(self._body, 1)
         page.addLayout(foot)
-        self._area = QScrollArea()
-        self._area.setWidgetResizable(True)
-        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._area.setWidget(inside)
+        self._area = scrolled(inside)
         row = QVBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self._area)

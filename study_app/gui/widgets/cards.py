@@ -1,10 +1,10 @@
-"""Cards and what stands in them: hairlines, icons, chips and bars."""
+"""Cards and what stands in them: hairlines, icons, chips and bars; frames that scroll."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLayout, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.theme.icons import draw_icon, draw_logo
 from study_app.gui.theme.theme import RADIUS_CARD, RADIUS_CONTROL, Theme, font
@@ -51,6 +51,21 @@ class Card(Themed, QWidget):
         painter.setPen(QPen(QColor(self.theme.border), 1))
         painter.setBrush(QColor(self.theme.surface))
         painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
+
+
+def scrolled(content: QWidget | QLayout) -> QScrollArea:
+    """Return ``content`` in a frame that scrolls up and down, where there is too little room, and never sideways."""
+    if isinstance(content, QLayout):
+        inside = QWidget()
+        inside.setLayout(content)
+    else:
+        inside = content
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    area.setWidget(inside)
+    return area
 
 
 def paint_ground(part: QWidget, colour: str) -> None:

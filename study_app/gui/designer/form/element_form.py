@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.entry_list import EntryList
 from study_app.gui.designer.form.entry_row import EntryRow
@@ -17,7 +17,7 @@ from study_app.gui.designer.form.row_fields import add_button
 from study_app.gui.designer.form.row_widget import RowWidget, is_wide, language_heads, structure_of
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.theme.themed import dress, take_away
-from study_app.gui.widgets.cards import Card, Rule
+from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form_rows import Form, FormRow, Section
@@ -61,11 +61,7 @@ class FormCard(Card):
         self.sections = QVBoxLayout(self.inside)
         self.sections.setContentsMargins(0, 2, 8, 2)
         self.sections.setSpacing(7)
-        self.area = QScrollArea()
-        self.area.setWidgetResizable(True)
-        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.area.setWidget(self.inside)
+        self.area = scrolled(self.inside)
         self.foot = FormFoot()
         for part in (self.head, Rule(), self.own):
             self.column.addWidget(part)
