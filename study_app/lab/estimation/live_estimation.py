@@ -27,7 +27,6 @@ Source: TypeAlias = Literal["off", "other", "device", "file", "lsl"]
 
 OF_TELEMETRY: Final = ("other", "device")
 NO_LIVE: Final = "no device is open"
-OWN_FORCE: Final = "the device's own force answers to the setting itself: it is compared, not applied"
 
 
 @dataclass(frozen=True, slots=True)

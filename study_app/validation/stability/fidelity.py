@@ -20,10 +20,7 @@ from study_app.validation.stability.stability_cases import CIRCLES, REACHES, STR
 
 LOOPS: Final = ((1000.0, 0), (1000.0, 1), (1000.0, 2), (1000.0, 4), (2000.0, 1), (500.0, 1), (250.0, 1))
 """Ticks a second and ticks of delay; the first two are those of a study."""
-STUDY_LOOPS: Final = LOOPS[:2]
 MOTIONS: Final = (REACHES, CIRCLES, STROKE)
-LIMITED: Final = ("physical_tar", "dense", "damper")
-"""No free handle is stable with what these ask for, 192 N·s/m and more: they feel as thick as the loop allows."""
 SPEEDS_MPS: Final = (0.1, 0.3, 0.6, 1.0)
 RELATIVE: Final = 0.05
 ABSOLUTE_N: Final = 0.05

@@ -25,7 +25,6 @@ ITEM = 'text = { en = "It is cold.", nl = "Het is koud." }'
 SHORT = 'short = { en = "Cold", nl = "Koud" }'
 LABELS = 'labels.en = ["a", "b", "c", "d", "e", "f", "g"]'
 TITLE = 'title = { en = "Small", nl = "Klein" }'
-FEEL = 'conditions = ["is_thin", "is_thick"]'
 DELAYED = "delay_ms = 120"
 RANGE = "must be at "
 
