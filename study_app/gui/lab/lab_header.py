@@ -14,9 +14,9 @@ from study_app.gui.lab.side_switch import SideSwitch
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.compact_stop import CompactStop
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.stop_button import CompactStop
 from study_app.viewmodels.lab import Choices, LabView
 
 BUTTON = 44

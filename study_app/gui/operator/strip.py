@@ -10,9 +10,9 @@ from study_app.gui.operator.session_header import OTHER_WINDOW, shown_state
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.gui.theme.themed import Themed, dress
 from study_app.gui.widgets.cards import Chip
+from study_app.gui.widgets.compact_stop import CompactStop
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided
-from study_app.gui.widgets.stop_button import CompactStop
 from study_app.viewmodels.operator import OperatorView
 
 HEIGHT = 52
