@@ -73,7 +73,7 @@ class DesignerController(QObject):
         self._resting = QTimer(self)
         self._resting.setInterval(REST_MS)
         self._resting.setSingleShot(True)
-        self._resting.timeout.connect(self._show_outline)
+        self._resting.timeout.connect(self.show_outline)
         place.destroyed.connect(self.deleteLater)  # else a timer or thread would show what is gone
         place.entered.connect(self.enter)
         place.asked.connect(editing.ask)
@@ -167,7 +167,7 @@ class DesignerController(QObject):
         self.editing.open(opened)
         self.place.close_new()
         self.show()
-        self._show_outline()
+        self.show_outline()
 
     # steps that ask first
 
@@ -213,7 +213,7 @@ class DesignerController(QObject):
 
     def _show_step(self, step: Step) -> None:
         if step.several or step.fresh or step.said:
-            self._show_outline()
+            self.show_outline()
         self.place.show_step(step.several, step.said, fresh=step.fresh)
 
     # what is shown
@@ -240,9 +240,10 @@ class DesignerController(QObject):
     def find(self, words: str) -> None:
         """Show only the elements that hold these words."""
         self._find = words
-        self._show_outline()
+        self.show_outline()
 
-    def _show_outline(self) -> None:
+    def show_outline(self) -> None:
+        """Show the elements as the study is now, and the warnings that changed."""
         if self.editing.opened is None:
             return
         study = self.editing.opened.study

@@ -79,11 +79,11 @@ def solve(to: Path, executor: Executor, tell: Callable[[str], None]) -> tuple[Pa
 
 def _solved(case: Case, grid: Grid, coarse: Grid) -> bytes:
     step = STEP if case.reynolds <= FAST_REYNOLDS else STEP / 2
-    return motion_table(case, _flow(grid), _flow(coarse), step)
+    return motion_table(case, flow_of(grid), flow_of(coarse), step)
 
 
 @cache
-def _flow(grid: Grid) -> Flow:
+def flow_of(grid: Grid) -> Flow:
     """Return the flow on a grid; a worker makes its mesh once."""
     return Flow(grid)
 

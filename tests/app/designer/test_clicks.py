@@ -45,7 +45,7 @@ def test_a_click_on_a_block_in_the_drawer_closes_it(qtbot: Any, designer: Any) -
     for path, closes in ((("blocks", "liquids"), True), (("conditions",), False)):
         designer.place.parts.focus_outline()
         QApplication.processEvents()
-        index = next(one for one in outline._indexes() if one.data(ROW_ROLE).path == path)
+        index = next(one for one in outline.indexes() if one.data(ROW_ROLE).path == path)
         tree.scrollTo(index)
         qtbot.mouseClick(tree.viewport(), LEFT, pos=tree.visualRect(index).center())
         assert designer.place.view.form.path == path

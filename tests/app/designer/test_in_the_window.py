@@ -96,7 +96,7 @@ def test_a_small_study_is_edited_by_mouse_alone(qtbot: Any, designer: Any) -> No
     def click(part: Any) -> None:
         qtbot.mouseClick(part, Qt.MouseButton.LeftButton)
 
-    index = next(one for one in place.outline._indexes() if one.data(ROW_ROLE).path == ("blocks", "liquids"))
+    index = next(one for one in place.outline.indexes() if one.data(ROW_ROLE).path == ("blocks", "liquids"))
     qtbot.mouseClick(tree.viewport(), Qt.MouseButton.LeftButton, pos=tree.visualRect(index).center())
     assert place.view.form.path == ("blocks", "liquids")
     replicates = designer.row("blocks", "liquids", "replicates").field.toggle

@@ -21,7 +21,7 @@ LEFT = Qt.MouseButton.LeftButton
 def place_of(designer: Any, *path: str | int) -> QPoint:
     """Return the middle of an element's first row."""
     outline = designer.place.outline
-    index = next(one for one in outline._indexes() if one.data(ROW_ROLE).path == path)
+    index = next(one for one in outline.indexes() if one.data(ROW_ROLE).path == path)
     outline.tree.scrollTo(index)
     return outline.tree.visualRect(index).center()
 
@@ -85,7 +85,7 @@ def test_several_selected_elements_move_are_copied_and_deleted_together(qtbot: A
         return [item["id"] for item in designer.editing.opened.study.document["questionnaires"]["liquid"]["items"]]
 
     designer.editing.select((*path, 0))
-    designer.controller._show_outline()
+    designer.controller.show_outline()
     click(qtbot, designer, *path, 0)
     click(qtbot, designer, *path, 1, held=SHIFT)
     assert designer.place.outline.selected == ((*path, 0), (*path, 1))
@@ -99,7 +99,7 @@ def test_several_selected_elements_move_are_copied_and_deleted_together(qtbot: A
     designer.editing.undo()
     assert designer.text == text
     designer.editing.select(("liquids", "honey"))
-    designer.controller._show_outline()
+    designer.controller.show_outline()
     click(qtbot, designer, "liquids", "syrup", held=CONTROL)
     qtbot.keyClick(tree, Qt.Key.Key_Delete)
     prompt = designer.place.prompt
@@ -291,7 +291,7 @@ def test_rows_say_what_and_where_they_are_and_contain_the_problems_below_them(de
     assert block.name == f"{block.title}, block, {block.note.replace(':', ' minutes ')}, step {at} of {count}"
     designer.controller.begin("rek2024", "mine")
     designer.editing.ask(RemoveKey(("questionnaires", "liquid", "items", 1, "text")))
-    designer.controller._show_outline()
+    designer.controller.show_outline()
     rows = designer.place.outline.rows
     faulty = {row.path for row in rows if row.faults}
     assert {("blocks", "liquids"), ("questionnaires", "liquid"), ("questionnaires", "liquid", "items", 1)} <= faulty
@@ -376,7 +376,7 @@ def test_what_keys_do_in_the_outline_its_menu_does_too(designer: Any) -> None:
     outline = designer.place.outline
 
     def choose(words: str) -> None:
-        outline._open_menu(QPoint(10, 10))
+        outline.tree.customContextMenuRequested.emit(QPoint(10, 10))
         next(action for action in outline.menu.actions() if action.text().startswith(words)).trigger()
         outline.menu.close()
 

@@ -66,7 +66,7 @@ def test_a_view_like_the_last_lays_nothing_out(place: Any) -> None:
 
     class Spy(QObject):
         def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-            if event.type() == QEvent.Type.LayoutRequest and watched is place._area.widget():
+            if event.type() == QEvent.Type.LayoutRequest and watched is place.area.widget():
                 requests.append(event)
             return False
 
@@ -74,7 +74,7 @@ def test_a_view_like_the_last_lays_nothing_out(place: Any) -> None:
     for _ in range(2):
         place.show_view(view)
         settle()
-    place._area.widget().installEventFilter(spy)
+    place.area.widget().installEventFilter(spy)
     for _ in range(3):
         place.show_view(view)
         settle()
@@ -98,7 +98,7 @@ def test_the_cards_fit(place: Any, size: tuple[int, int]) -> None:
     place.resize(*size)
     place.show_view(still_view(bench("shampoo", "cornstarch")))
     settle()
-    area = place._area
+    area = place.area
     assert area.widget().width() == area.viewport().width()
     if size[1] >= 1000:
         assert area.widget().height() == area.viewport().height()

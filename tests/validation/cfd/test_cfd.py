@@ -295,10 +295,10 @@ def test_cases_are_solved_by_an_executor_and_stored_under_their_names(monkeypatc
     monkeypatch.setattr(solver, "steady_table", lambda: b"steady")
     monkeypatch.setattr(solver, "Flow", lambda grid: f"ball {grid.ball}")
     said = []
-    solver._flow.cache_clear()
+    solver.flow_of.cache_clear()
     with ThreadPoolExecutor(2) as executor:
         written = solver.solve(tmp_path / "new", executor, said.append)
-    solver._flow.cache_clear()
+    solver.flow_of.cache_clear()
     of_cases = {f"{it.name}.csv": f"{it.name} ball 0.1 ball 0.14 {_step(it)}" for it in CASES}
     assert {path.name: path.read_text("utf-8") for path in written} == {**of_cases, "steady.csv": "steady"}
     folders = [path.parent.relative_to(tmp_path / "new").as_posix() for path in written]

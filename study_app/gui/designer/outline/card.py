@@ -103,7 +103,7 @@ class OutlineCard(Card):
         flags = QItemSelectionModel.SelectionFlag
         flag = flags.Select if selects else flags.Deselect
         self._filling = True
-        for index in self._indexes():
+        for index in self.indexes():
             if index.data(ROW_ROLE).path in paths and index.data(ROW_ROLE).path:
                 if index.parent().isValid():
                     self.tree.expand(index.parent())
@@ -129,7 +129,7 @@ class OutlineCard(Card):
                 del above[depth + 1 :]
                 above[-1].appendRow(item)
                 above.append(item)
-            for index in self._indexes():
+            for index in self.indexes():
                 if self._key(index) in self._opened or self.words.text().strip():
                     self.tree.expand(index)
             self.tree.verticalScrollBar().setValue(scrolled)
@@ -144,7 +144,7 @@ class OutlineCard(Card):
         current = self.tree.currentIndex()
         if current.isValid() and current.data(ROW_ROLE).path == path:
             return
-        found = next((index for index in self._indexes() if index.data(ROW_ROLE).path == path), None)
+        found = next((index for index in self.indexes() if index.data(ROW_ROLE).path == path), None)
         self._filling = True
         if found is None:
             self.tree.clearSelection()
@@ -182,7 +182,8 @@ class OutlineCard(Card):
             action.triggered.connect(lambda _checked=False, act=act: act())
         menu.popup(self.tree.viewport().mapToGlobal(at))
 
-    def _indexes(self) -> list[QModelIndex]:
+    def indexes(self) -> list[QModelIndex]:
+        """Return the rows in their order, those of branches that are closed included."""
         found: list[QModelIndex] = []
         waiting = [self.items.index(row, 0) for row in range(self.items.rowCount())]
         while waiting:

@@ -81,7 +81,7 @@ class User:
 
         def look() -> QModelIndex | None:
             heading = ""
-            for index in self.outline._indexes():
+            for index in self.outline.indexes():
                 row, above = index.data(ROW_ROLE), index.parent()
                 heading = heading if row.path else row.title
                 around = [above.data(ROW_ROLE).title] if above.isValid() else []
