@@ -16,7 +16,7 @@ from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.live_session import LiveSession
 from study_app.gui.preflight import PreflightWindow
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.protocol.model import Reach
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.request import NewSession
@@ -108,7 +108,7 @@ class PicturedSession:
         if pictures:
             self._camera.until(lambda: "measuring …" not in [row.text() for row in asked.values()], "the scenes' error")
             for theme in (DARK, LIGHT):
-                wear(asked, theme)
+                apply_theme(asked, theme)
                 self._camera.take(asked, f"preflight-{theme.name}", (1200, 800))
         asked.start.click()
         self._camera.until(lambda: self._live.bridge is not None and self._page is not None, "the first page")

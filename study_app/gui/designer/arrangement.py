@@ -12,7 +12,7 @@ from study_app.gui.designer.pane.right_pane import RightPane
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Icon
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
 from study_app.viewmodels.designer.form_rows import Form
@@ -85,7 +85,7 @@ class PathBar(QWidget):
             return
         self._shown = form.around
         for part in self._parts:
-            take_away(part)
+            remove_widget(part)
         self.steps, self._parts = [], []
         for path, title in form.around:
             sign = Icon("chevron", "text2", 14)
@@ -93,7 +93,7 @@ class PathBar(QWidget):
             made.clicked.connect(lambda _checked=False, path=path: self.open_asked.emit(path))
             for part in (sign, made):
                 self._steps.addWidget(part)
-                dress(part, self.outline.theme)
+                apply_theme_within(part, self.outline.theme)
             self.steps.append(made)
             self._parts += [sign, made]
 

@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout
 
 from study_app.gui.participant.pages.screen_reader import say
-from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
@@ -38,11 +38,11 @@ class BannerCard(Card):
         self.words.setText(banner.words)
         say(self, banner.words)
         for button in self.buttons:
-            take_away(button)
+            remove_widget(button)
         self.buttons = []
         for action, words in banner.actions:
             made = ActionButton("", words, height=36)
             made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
-            dress(made, self.theme)
+            apply_theme_within(made, self.theme)
             self._row.addWidget(made)
             self.buttons.append(made)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed, dress
+from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label
@@ -74,7 +74,7 @@ class ProblemLine(Themed, QWidget):
             made.setFont(font("label"))
             made.setAccessibleName(f"{words}: {self.row.title}, {self.row.field}")
             made.clicked.connect(lambda _checked=False, words=words: self.repair_asked.emit(words))
-            dress(made, self.theme)
+            apply_theme_within(made, self.theme)
             self._repairs.addWidget(made)
             self.repairs.append(made)
 
@@ -158,7 +158,7 @@ class ProblemsCard(Card):
             column.addWidget(Rule())
             self.lines.append(made)
         column.addStretch()
-        dress(inside, self.theme)
+        apply_theme_within(inside, self.theme)
         self.area.setWidget(inside)
 
     @property

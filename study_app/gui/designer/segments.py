@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEven
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
-from study_app.gui.theme.themed import Themed, dress, take_away
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 
 INSIDE = 3
 
@@ -71,13 +71,13 @@ class Segments(Themed, QWidget):
         words = [word for _, word in values]
         if words != [button.text() for button in self.buttons]:
             for button in self.buttons:
-                take_away(button)
+                remove_widget(button)
             self.buttons = []
             for number, word in enumerate(words):
                 made = _Segment(word, self._height)
                 made.setAccessibleDescription(self._name)
                 made.clicked.connect(lambda _checked=False, at=number: self.chosen.emit(self._values[at]))
-                dress(made, self.theme)
+                apply_theme_within(made, self.theme)
                 self._row.addWidget(made)
                 self.buttons.append(made)
         self._values = tuple(value for value, _ in values)

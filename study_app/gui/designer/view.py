@@ -21,7 +21,7 @@ from study_app.gui.designer.pane.right_pane import PanePage, RightPane
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt
 from study_app.gui.participant.pages.screen_reader import say
-from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.main_view import Place
 from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.designer_view import DesignerView, HeaderState
@@ -238,7 +238,7 @@ class DesignerPlace(Place):
         self.prompt = prompt
         prompt.answered.connect(lambda _answer: self.close_prompt())
         prompt.given_up.connect(self.close_prompt)
-        dress(prompt, self.theme)
+        apply_theme_within(prompt, self.theme)
         self.parts.prompts.addWidget(prompt)
         first.setFocus()
 
@@ -247,7 +247,7 @@ class DesignerPlace(Place):
         if self.prompt is not None:
             closing, self.prompt = self.prompt, None
             held = closing.isAncestorOf(self.focusWidget())
-            take_away(closing)
+            remove_widget(closing)
             if held:  # else Qt hands the keyboard to the rail
                 self.outline.tree.setFocus()
 

@@ -16,7 +16,7 @@ from study_app.devices.registry import doctor_of, title_of
 from study_app.errors import StoreError
 from study_app.gui.devices.failure_rows import FindingRow
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.cards import Card, Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
@@ -92,7 +92,7 @@ class DiagnosisDialog(QDialog):
         self.setMinimumSize(680, 420)
         room = self.screen().availableSize()
         self.resize(SIZE.boundedTo(QSize(room.width() - 40, room.height() - 60)))
-        wear(self, theme)
+        apply_theme(self, theme)
         self._timer = QTimer(self)
         self._timer.setInterval(LOOK_MS)
         self._timer.timeout.connect(self._look)

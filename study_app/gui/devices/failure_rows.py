@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QVBoxLayout, 
 
 from study_app.devices.doctor_report import Finding, State
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
-from study_app.gui.theme.themed import Themed, dress
+from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.cards import Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
@@ -111,7 +111,7 @@ class FindingRow(Themed, QWidget):
         if yes and self.body is None:
             self.body = self._body(self.finding)
             self._column.addWidget(self.body)
-            dress(self.body, self.theme)
+            apply_theme_within(self.body, self.theme)
         if self.body is not None:
             self.body.setVisible(yes)
         self.more.show_action("minus" if yes else "chevron_down", "Less" if yes else "Why")

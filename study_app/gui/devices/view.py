@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QHBoxLayout
 from study_app.devices.descriptor import DeviceOption
 from study_app.gui.devices.device_rows import LEAST_WORDS, DeviceList
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import dress
+from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.cards import SHADOW, Card, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -166,7 +166,7 @@ class DevicesPlace(Place):
         self._group.setExclusive(False)  # or what is marked could not lose its mark
         for part in (self.people, self.simulated):
             part.mark(preferred.partition(":")[0])
-            dress(part, self.theme)
+            apply_theme_within(part, self.theme)
         self._group.setExclusive(True)
 
     def show_benches(self, benches: Mapping[str, BenchShown]) -> None:

@@ -90,9 +90,9 @@ class PageReader(Themed, QTextBrowser):
         if anchor:
             self._scroll_to(anchor)
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         self.setStyleSheet(f"QTextBrowser {{ background: {theme.surface}; color: {theme.text}; }}")
         if self.page:
             self._draw()

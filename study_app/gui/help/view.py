@@ -80,9 +80,9 @@ class HelpPlace(Place):
         column.addLayout(head)
         column.addLayout(body, 1)
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         row = f"border-radius: 6px; padding-left: 6px; color: {theme.text};"
         chosen = f"background: {theme.selected}; color: {theme.accent};"
         self.list.setStyleSheet(

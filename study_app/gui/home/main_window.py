@@ -12,7 +12,7 @@ from shiboken6 import isValid
 
 from study_app.gui.home.navigation import Rail
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
-from study_app.gui.theme.themed import dress, wear
+from study_app.gui.theme.themed import apply_theme, apply_theme_within
 from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
@@ -82,7 +82,7 @@ class MainWindow(QMainWindow):
         self.rail.theme_asked.connect(self._change_theme)
         self.rail.go_asked.connect(self.go)
         QShortcut(QKeySequence("Ctrl+Q"), self, self.close)  # not every window has a frame whose keys close it
-        wear(self, theme)
+        apply_theme(self, theme)
         self.resize(FULL)
         self.go(self._here)
         whole.setFocus()
@@ -100,7 +100,7 @@ class MainWindow(QMainWindow):
             made.go_asked.connect(self.go)
             self._places[name] = made
             self.stack.addWidget(made)
-            dress(made, self.theme)
+            apply_theme_within(made, self.theme)
         return self._places[name]
 
     def go(self, name: str) -> None:
@@ -165,7 +165,7 @@ class MainWindow(QMainWindow):
         """Wear a theme from now on."""
         if theme is not self.theme:
             self.theme = theme
-            wear(self, theme)
+            apply_theme(self, theme)
 
     def _change_theme(self) -> None:
         self.show_theme(LIGHT if self.theme.dark else DARK)

@@ -170,9 +170,9 @@ class Rail(Themed, QWidget):
         for button in (*self.buttons.values(), self.switch):
             button.narrow(yes)
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme`` and offer the other."""
-        super().wear(theme)
+        super().apply_theme(theme)
         word = "Light" if theme.dark else "Dark"
         self.switch.say("sun" if theme.dark else "moon", f"{word} theme", word)
 

@@ -23,7 +23,7 @@ from study_app.gui.home.device_option_fields import DeviceOptionFields
 from study_app.gui.home.form_fields import add_field, field_with_button, text_field
 from study_app.gui.home.study_folder_state import StudyFolderState, read_study_folder_state
 from study_app.gui.theme.theme import LIGHT, Theme, font
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
@@ -96,7 +96,7 @@ class NewSessionDialog(QDialog):
         self.cancel = ActionButton("", "Cancel", height=46)
         self._fill()
         self._lay_out()
-        wear(self, theme)
+        apply_theme(self, theme)
         self._check()
         self.participant.setFocus()
         self.participant.selectAll()

@@ -8,7 +8,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import LIGHT, Theme
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.controls import ActionButton, Number
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
@@ -64,7 +64,7 @@ class RehearsalDialog(QDialog):
         self._stopping = False
         self.over = False
         self._lay_out()
-        wear(self, theme)
+        apply_theme(self, theme)
         self.start.clicked.connect(self._start)
         self.cancel.clicked.connect(self.reject)
         self._listening = QTimer(self)

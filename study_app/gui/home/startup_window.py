@@ -10,7 +10,7 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import LIGHT, Theme
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.cards import Logo
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
@@ -68,7 +68,7 @@ class OpeningWindow(QWidget):
         self._timer.start(250)
         self._done = False
         self._said = False
-        wear(self, theme)
+        apply_theme(self, theme)
 
     def _tell(self) -> None:
         seconds = self._now_s() - self._since_s

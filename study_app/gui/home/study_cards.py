@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import take_away
+from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Clamped, Elided, label
@@ -115,7 +115,7 @@ class CardGrid(QWidget):
     def show_cards(self, cards: list[QWidget]) -> None:
         """Show these cards in place of those before."""
         for card in self.cards:
-            take_away(card)
+            remove_widget(card)
         self.cards = cards
         self._across = 0
         self.arrange(self.width())

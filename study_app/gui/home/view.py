@@ -23,7 +23,7 @@ from study_app.gui.home.sessions_card import SessionsCard
 from study_app.gui.home.sidebar import DeviceCard, LabCard
 from study_app.gui.home.study_cards import BrokenCard, CardGrid, StudyCard
 from study_app.gui.sessions.session_page import SessionPage
-from study_app.gui.theme.themed import dress
+from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
@@ -202,7 +202,7 @@ class HomePlace(Place):
             card.rehearsal.connect(self.ask_for_rehearsal)
             cards.append(card)
         for made in cards:
-            dress(made, self.theme)
+            apply_theme_within(made, self.theme)
         self.grid.show_cards(cards)
         self._order_focus()
         self._arrange()

@@ -41,7 +41,7 @@ class FlowCurvePlot(Plot):
         first, last = (round(math.log10(rate)) for rate in (RATES_PER_S[0], RATES_PER_S[-1]))
         self.box.setXRange(first, last + 0.06 * (last - first), padding=0)
         self.show_ticks("bottom", _decades(first, last))
-        self.wear(LIGHT)
+        self.apply_theme(LIGHT)
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return a small size: a plot takes what is left."""
@@ -57,9 +57,9 @@ class FlowCurvePlot(Plot):
         for curve, it in zip(self.curves, stresses_pa, strict=True):
             curve.setData(*((EMPTY, EMPTY) if it is None else (np.log10(RATES_PER_S), np.log10(it))))
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         for curve, style in zip(self.curves, STYLES, strict=True):
             curve.setPen(self.stroke(style.colour(theme), style.width, DASH[style.stroke]))
 

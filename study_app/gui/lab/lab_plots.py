@@ -117,7 +117,7 @@ class CurvePlot(Plot):
         self.show_ticks("bottom", [(-float(t), f"{MINUS}{t:g}" if t else "0") for t in marks])
         self._show_top(least)
         self.box.sigResized.connect(self._lay_ticks)
-        self.wear(LIGHT)
+        self.apply_theme(LIGHT)
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return a small size: a plot takes what is left."""
@@ -133,9 +133,9 @@ class CurvePlot(Plot):
         if limit is not None:
             self.limit.setPos(limit)
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         for curve, style in zip(self.curves, self._styles, strict=True):
             curve.setPen(self.stroke(style.colour(theme), style.width, DASH[style.stroke]))
         self.limit.setPen(self.stroke(theme.bad, 1.5, DASH["short"]))

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QStackedLayout, 
 
 from study_app.gui.lab.parameter_form import HIDDEN
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
-from study_app.gui.theme.themed import Themed, dress
+from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
 from study_app.gui.widgets.masked_panel import MaskedPanel
@@ -294,4 +294,4 @@ def _fit(lines: list, count: int, kind: type, layout: QVBoxLayout, whole: Readin
         line = kind()
         layout.addWidget(line)
         lines.append(line)
-        dress(line, whole.theme)
+        apply_theme_within(line, whole.theme)

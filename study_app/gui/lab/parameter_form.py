@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QStackedLayout, QVBoxLay
 from study_app.gui.lab.parameter_rows import ParameterRow, SwitchRow, row_for
 from study_app.gui.lab.side_switch import Badge
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import dress
+from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import Clamped, label
@@ -208,7 +208,7 @@ class FormPanel(Card):
         if new or came:
             self._order()
             for block in self.blocks.values():
-                dress(block, self.theme)
+                apply_theme_within(block, self.theme)
 
     def _stack_up(self) -> None:
         """Place the blocks below one another, a hairline between them."""
@@ -220,7 +220,7 @@ class FormPanel(Card):
         for number, block in enumerate(self.blocks.values()):
             if number:
                 rule = Rule()
-                rule.wear(self.theme)
+                rule.apply_theme(self.theme)
                 self._column.addWidget(rule)
             self._column.addWidget(block)
         self._column.addStretch()

@@ -60,7 +60,7 @@ class ForcePlot(TracePlot):
         self.axes["bottom"].setHeight(6)
         self.show_ticks("bottom", [])
         self._make_room()
-        self.wear(LIGHT)
+        self.apply_theme(LIGHT)
 
     def show_forces(self, times_s: Floats, forces_n: Floats) -> None:
         """Draw forces (n, 4: x, y, z, size) [N]."""
@@ -80,9 +80,9 @@ class ForcePlot(TracePlot):
             self.limit_name.setVisible(self.limit_n <= self.reach)
             self.limit_name.setPos(QPointF(-1.01 * self._span_s, self.limit_n))
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         self.curves[3].setPen(self.stroke(theme.text3, 1.4))
         self.ends[3].setColor(QColor(theme.text3))
         for line in self.limits:
@@ -110,7 +110,7 @@ class WakePlot(Plot):
         self.show_ticks("bottom", time_ticks(TRACE_WINDOW_S))
         self._right = 0.0
         self._make_room()
-        self.wear(LIGHT)
+        self.apply_theme(LIGHT)
 
     def keep_right(self, seconds: float) -> None:
         """Leave as much room right of now as the plot above, so that both share their times."""
@@ -139,9 +139,9 @@ class WakePlot(Plot):
         self.box.setYRange(-half, self.reach + half, padding=0)
         self.box.setXRange(-1.02 * TRACE_WINDOW_S, self._right or 0.08 * TRACE_WINDOW_S, padding=0)
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         self.curve.setPen(self.stroke(theme.accent, STROKE))
 
 

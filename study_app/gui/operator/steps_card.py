@@ -145,7 +145,7 @@ class Rail(Card):
         rows = view.steps
         while len(self.lines) < len(rows):
             line = StepLine()
-            line.wear(self.theme)
+            line.apply_theme(self.theme)
             line.slim(self._slim)
             self.lines.append(line)
             self._steps_column.insertWidget(len(self.lines) - 1, line)

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from study_app.gui.operator.session_header import OTHER_WINDOW, shown_state
 from study_app.gui.theme.theme import PARTICIPANT
-from study_app.gui.theme.themed import Themed, dress
+from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.cards import Chip
 from study_app.gui.widgets.compact_stop import CompactStop
 from study_app.gui.widgets.controls import ActionButton
@@ -41,7 +41,7 @@ class Strip(Themed, QWidget):
         for button in (self.operator, self.stop):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             row.addWidget(button)
-        dress(self, PARTICIPANT)
+        apply_theme_within(self, PARTICIPANT)
 
     def show_view(self, view: OperatorView) -> None:
         """Show the state and where the session is."""

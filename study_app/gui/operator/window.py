@@ -23,7 +23,7 @@ from study_app.gui.operator.session_header import Header
 from study_app.gui.operator.steps_card import Rail
 from study_app.gui.operator.stop_panel import StopPanel
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.escape_key import EscapeAnywhere
 from study_app.gui.widgets.failed_panel import Panels
@@ -129,7 +129,7 @@ class OperatorWindow(QMainWindow):
         self.arrangement.setFocus()
         self._connect()
         self.resize(FULL)
-        wear(self, theme)
+        apply_theme(self, theme)
 
     def _connect(self) -> None:
         self.header.theme_asked.connect(self._change_theme)
@@ -244,7 +244,7 @@ class OperatorWindow(QMainWindow):
 
     def _change_theme(self) -> None:
         self.theme = LIGHT if self.theme.dark else DARK
-        wear(self, self.theme)
+        apply_theme(self, self.theme)
         self.theme_changed.emit(self.theme)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QProgressBar, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.preflight.check_rows import CheckRow
 from study_app.gui.theme.theme import Theme
-from study_app.gui.theme.themed import dress
+from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import label
@@ -71,7 +71,7 @@ class ComputerWindow(Question):
         self.rows = [CheckRow(check, last=check is checks[-1]) for check in checks]
         for place, row in enumerate(self.rows):
             self._rows.insertWidget(place, row)
-            dress(row, self._theme)
+            apply_theme_within(row, self._theme)
         passed = sum(check.verdict == "ok" for check in checks)
         self.show_sentence(f"{passed} of {len(checks)} passed.")
 

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QHBoxLayout, QLabel,
 from study_app.gui.preflight.check_rows import CheckRow
 from study_app.gui.preflight.masking_question import MaskingQuestion
 from study_app.gui.theme.theme import LIGHT, Theme, font
-from study_app.gui.theme.themed import dress, take_away, wear
+from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.cards import Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
@@ -64,7 +64,7 @@ class PreflightWindow(QWidget):
         self.cancel.clicked.connect(self.close)
         self.again.clicked.connect(self.again_asked)
         self.start.clicked.connect(self._start)
-        wear(self, theme)
+        apply_theme(self, theme)
         self.start.setFocus()
 
     def _lay_out(self) -> None:
@@ -151,11 +151,11 @@ class PreflightWindow(QWidget):
         if [row.check for row in self.rows] == list(view.checks):
             return
         for row in self.rows:
-            take_away(row)
+            remove_widget(row)
         self.rows = [CheckRow(check, last=check is view.checks[-1]) for check in view.checks]
         for row in self.rows:
             self.checks.column.addWidget(row)
-            dress(row, self.theme)
+            apply_theme_within(row, self.theme)
 
     def _show_rows(self, view: PreflightView) -> None:
         for place, (name, words) in enumerate(view.rows):

@@ -10,7 +10,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.cards import Bar
 from study_app.gui.widgets.controls import ActionButton, Check
 from study_app.gui.widgets.labels import label, set_ink
@@ -91,7 +91,7 @@ class WriteDialog(QDialog):
         self.cancel.setAutoDefault(False)
         self.choose.setAutoDefault(False)
         self._lay_out(title, [extra.why_not for extra in extras if extra.why_not])
-        wear(self, theme)
+        apply_theme(self, theme)
         self.choose.clicked.connect(self._choose)
         self.go_on.clicked.connect(self._go_on)
         self.cancel.clicked.connect(self.reject)

@@ -104,9 +104,9 @@ class FigureView(Themed, QWidget):
         self.updateGeometry()
         self._ask()
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Draw in the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         self._ask()
 
     def heightForWidth(self, width: int) -> int:  # noqa: N802 - Qt's name

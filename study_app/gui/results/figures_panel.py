@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QVBoxLayout
 
 from study_app.gui.results.figure_view import FigureView
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Bar, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -62,11 +62,11 @@ class FigureCard(Card):
         if self.drawing is not None and there:
             self.drawing.show_figure(figure, colours)
         elif self.drawing is not None:
-            take_away(self.drawing)
+            remove_widget(self.drawing)
             self.drawing = None
         elif there:
             self.drawing = FigureView(figure, colours)
-            dress(self.drawing, self.theme)
+            apply_theme_within(self.drawing, self.theme)
             self._place.addWidget(self.drawing, 0, Qt.AlignmentFlag.AlignHCenter)
             self.more.raise_()
 
@@ -217,11 +217,11 @@ class FiguresPanel(QScrollArea):
         self.cards = []
         for place, figure in enumerate(view.figures):
             card = kept.pop(figure.name, None) or FigureCard(figure, view.colours)
-            dress(card, self.trouble.theme)
+            apply_theme_within(card, self.trouble.theme)
             self._column.insertWidget(place, card)
             self.cards.append(card)
         for gone in kept.values():
-            take_away(gone)
+            remove_widget(gone)
 
     def show_whole(self, yes: bool) -> None:
         """Be as high as the figures are, for a page that scrolls as a whole."""

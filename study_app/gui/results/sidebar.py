@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QScrollArea, QSizePolicy, 
 
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import label
@@ -141,10 +141,10 @@ class ExclusionsCard(Card):
     def show_left_out(self, listed: Sequence[LeftOut]) -> None:
         """Show what is left out, the last decision first."""
         for line in self.lines:
-            take_away(line)
+            remove_widget(line)
         self.lines = [self._line(one) for one in reversed(listed)]
         for place, line in enumerate(self.lines):
-            dress(line, self.theme)
+            apply_theme_within(line, self.theme)
             self._rows.insertWidget(place, line)
         self.none.setVisible(not listed)
         for part in (self.area, self.open):

@@ -15,7 +15,7 @@ from study_app.gui.results.sidebar import ExclusionsCard, SessionsCard
 from study_app.gui.sessions.decision_dialogs import LeaveOutDialog, TakeBackDialog, UnblindDialog
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import take_away
+from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.cards import SHADOW, Chip, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
@@ -190,12 +190,12 @@ class ResultsPlace(Place):
             chips.append(("warn", "warning", f"{words} not as recorded", "\n".join(self.view.doubts)))
         if [chip.word for chip in self.chips] != [words for _, _, words, _ in chips]:
             for chip in self.chips:
-                take_away(chip)
+                remove_widget(chip)
             self.chips = []
             for tone, icon, words, tip in chips:
                 chip = Chip(tone, icon, words)  # type: ignore[arg-type]  # the tones above
                 chip.setToolTip(tip)
-                chip.wear(self.theme)
+                chip.apply_theme(self.theme)
                 self._chips.addWidget(chip)
                 self.chips.append(chip)
             self._arrange()

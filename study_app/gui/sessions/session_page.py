@@ -14,7 +14,7 @@ from study_app.errors import StoreError
 from study_app.gui.sessions.decision_dialogs import LeaveOutDialog, TakeBackDialog
 from study_app.gui.sessions.motion_plots import MotionPlot
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import dress, take_away, wear
+from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.cards import Card, Chip
 from study_app.gui.widgets.controls import ActionButton
@@ -143,7 +143,7 @@ class SessionPage(QDialog):
         for button in (self.leave_out, self.folder):
             button.setAutoDefault(False)
         self.leave_out.setEnabled(False)
-        wear(self, theme)
+        apply_theme(self, theme)
         available = self.screen().availableSize()
         self.resize(min(SIZE[0], available.width() - 40), min(SIZE[1], available.height() - 60))
         self.read()
@@ -227,7 +227,7 @@ class SessionPage(QDialog):
 
     def _show_left_out(self, listed: tuple[Exclusion, ...]) -> None:
         for line in self.lines:
-            take_away(line)
+            remove_widget(line)
         self.lines = []
         for one in listed:
             what = "Whole session" if one.trial is None else f"Trial {one.trial}"
@@ -240,7 +240,7 @@ class SessionPage(QDialog):
             row.setContentsMargins(0, 0, 0, 0)
             row.addWidget(label(f"{what}: {one.reason} ({one.rule_or_person})", "label", wraps=True), 1)
             row.addWidget(back)
-            dress(line, self._theme)
+            apply_theme_within(line, self._theme)
             self._out.addWidget(line)
             self.lines.append(line)
         self.none_out.setVisible(not listed)

@@ -18,7 +18,7 @@ from study_app.gui.settings.display_offset import OffsetForm
 from study_app.gui.settings.measured_number import LEAST_WORDS
 from study_app.gui.settings.pixel_patterns import GreyRamp, LineField
 from study_app.gui.theme.theme import PARTICIPANT
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
 from study_app.gui.widgets.number_field import NumberField, write_number
@@ -81,7 +81,7 @@ class DisplayTest(QWidget):
         self.leave = ActionButton("", "Leave (Esc)", height=40)
         self._lay_out(screen_words)
         self._connect()
-        wear(self, PARTICIPANT)
+        apply_theme(self, PARTICIPANT)
         self.frames = Frames(self.times.refresh_hz, now_ns=now_ns, parent=self)
         self.frames.due.connect(self.frame)
         self.report_timer = QTimer(self)

@@ -15,7 +15,7 @@ from study_app.gui.settings.outlets_card import OutletsCard
 from study_app.gui.settings.screen_numbers import ScreenNumber, identify
 from study_app.gui.settings.setting_cards import OffsetCard, ScreensCard, SeenCard, SessionsCard, WindowsCard
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import dress
+from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -145,7 +145,7 @@ class MachinePlace(Place):
         self.offset.form.show_offset(self.settings.display_offset, there.name)
         if self.test is not None:
             self.test.show_offset(self.settings.display_offset, there.name)
-        dress(self.screens, self.theme)
+        apply_theme_within(self.screens, self.theme)
 
     def _measured(self, mean_ms: float, spread_ms: float, how: str) -> None:
         self.offset_measured.emit(mean_ms, spread_ms, how, self.participants.name)

@@ -13,18 +13,18 @@ class Themed:
 
     theme: Theme = LIGHT
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme`` from now on."""
         self.theme = theme
         if isinstance(self, QWidget):
             self.update()
 
 
-def wear(window: QWidget, theme: Theme) -> None:
+def apply_theme(window: QWidget, theme: Theme) -> None:
     """Give ``window`` and all its parts the colours of ``theme``."""
     window.setPalette(_palette(theme))
     window.setStyleSheet(stylesheet(theme))
-    dress(window, theme)
+    apply_theme_within(window, theme)
 
 
 def _palette(theme: Theme) -> QPalette:
@@ -50,14 +50,14 @@ def _palette(theme: Theme) -> QPalette:
     return made
 
 
-def dress(whole: QWidget, theme: Theme) -> None:
+def apply_theme_within(whole: QWidget, theme: Theme) -> None:
     """Pass ``theme`` to a part and its parts, for what comes into a window later."""
     for part in (whole, *whole.findChildren(QWidget)):
         if isinstance(part, Themed):
-            part.wear(theme)
+            part.apply_theme(theme)
 
 
-def take_away(part: QWidget) -> None:
+def remove_widget(part: QWidget) -> None:
     """Take a part out of its window for good.
 
     It is hidden first: the layout that it came into may still be about to show it, and would show it as a window.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import Theme
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 
@@ -39,7 +39,7 @@ class Question(QDialog):
         row.addWidget(self.go_on)
         self.column.addSpacing(8)
         self.column.addLayout(row)
-        wear(self, self._theme)
+        apply_theme(self, self._theme)
 
 
 class Notice(Question):
@@ -55,4 +55,4 @@ class Notice(Question):
         row.addWidget(self.close_button)
         self.column.addSpacing(8)
         self.column.addLayout(row)
-        wear(self, theme)
+        apply_theme(self, theme)

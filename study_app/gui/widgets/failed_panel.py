@@ -15,7 +15,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGraphicsItem, QHBoxLayout, QWidget
 
 from study_app.gui.theme.theme import LIGHT, RADIUS_CARD
-from study_app.gui.theme.themed import Themed, dress
+from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.labels import label
 
@@ -108,7 +108,7 @@ class Panels(QObject):
         for child in panel.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
             child.setEnabled(False)  # no keys go there
         cover = self.covers[panel] = FailedPanel(panel, self.names[panel])
-        dress(cover, getattr(panel.window(), "theme", LIGHT))
+        apply_theme_within(cover, getattr(panel.window(), "theme", LIGHT))
         cover.show()
 
 

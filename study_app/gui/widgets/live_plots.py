@@ -96,7 +96,7 @@ class Plot(Themed, pg.GraphicsView):
     def event(self, event: QEvent) -> bool:
         """Draw with pens for the screen that the window was moved to."""
         if event.type() == QEvent.Type.DevicePixelRatioChange:
-            self.wear(self.theme)
+            self.apply_theme(self.theme)
         return bool(super().event(event))
 
     def paint_now(self) -> None:
@@ -119,9 +119,9 @@ class Plot(Themed, pg.GraphicsView):
                 line.setZValue(-10)
                 self.box.addItem(line, ignoreBounds=True)
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         self.setBackground(theme.surface)
         for axis in self.axes.values():
             axis.setTextPen(QColor(theme.text3))
@@ -162,7 +162,7 @@ class TracePlot(Plot):
         self.box.sigResized.connect(self._make_room)
         self.show_ticks("bottom", time_ticks(span_s))
         self._make_room()
-        self.wear(LIGHT)
+        self.apply_theme(LIGHT)
 
     def show_reach(self, reach: float) -> None:
         """Show values from −reach to reach, and as much more as makes even ticks."""
@@ -207,9 +207,9 @@ class TracePlot(Plot):
         for end, height in zip(self.ends, apart(self._newest, self._name_height, self.reach), strict=True):
             end.setPos(QPointF(self._names_after_s, height))
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         colours = (theme.trace_x, theme.trace_y, theme.trace_z)
         for curve, end, colour, dash in zip(self.curves, self.ends, colours, DASHES, strict=False):
             curve.setPen(self.stroke(colour, STROKE, dash))
@@ -235,7 +235,7 @@ class LatenessPlot(Plot):
             name.textItem.document().setDocumentMargin(NAME_MARGIN)
         self.box.sigResized.connect(self._make_room)
         self._show_decades(max(3, int(np.ceil(self._limit + 0.1))), 4)
-        self.wear(LIGHT)
+        self.apply_theme(LIGHT)
 
     def _show_decades(self, across: int, up: int) -> None:
         if (across, up) == self._decades:
@@ -277,9 +277,9 @@ class LatenessPlot(Plot):
             self.p99_name.setPos(at, top)
             self.p99_name.setText(f"p99 {number(round(p99_us))}")
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         self.bars.setOpts(brush=QColor(theme.accent), pen=QPen(Qt.PenStyle.NoPen))
         self.p99_line.setPen(self.stroke(theme.text, 1.4))
         self.p99_name.setColor(QColor(theme.text))

@@ -122,7 +122,7 @@ class Table(Themed, QTableView):
         chosen = self.selectionModel().selectedRows()
         return chosen[0].row() if chosen else None
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
         self.theme = theme
         self.viewport().update()

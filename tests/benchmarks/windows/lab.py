@@ -20,7 +20,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.gui.lab.view import LabPlace
 from study_app.gui.theme.theme import LIGHT
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from tests.gui.lab.sample import lab_view, workbench
 
 SIZE = (1600 - 72, 900)  # the rail takes the rest
@@ -52,7 +52,7 @@ def main() -> None:
     app = QApplication.instance() or QApplication([])
     views = [lab_view(cut=900 + 40 * step) for step in range(30)]
     place = LabPlace()
-    wear(place, LIGHT)
+    apply_theme(place, LIGHT)
     place.resize(*SIZE)
     place.show()
     first = timed(app, 1, lambda _: place.show_view(views[0]))

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, READY, Backend
 from study_app.gui.devices.view import NO_FILE, DevicesPlace
 from study_app.gui.theme.theme import DARK
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.viewmodels.devices.bench import BenchShown
 from study_app.viewmodels.devices.list_view import devices_shown
 
@@ -107,7 +107,7 @@ def test_a_falcons_firmware_is_chosen_and_forgotten(place, qtbot, monkeypatch):
 
 @pytest.mark.parametrize("size", [QSize(952, 640), QSize(1294, 768), QSize(1704, 1080)])
 def test_no_word_is_cut_at_any_size(place, qtbot, size):
-    wear(place, DARK)
+    apply_theme(place, DARK)
     place.resize(size)
 
     def whole():

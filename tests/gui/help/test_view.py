@@ -8,7 +8,7 @@ from PySide6.QtGui import QDesktopServices, QFontDatabase, QTextDocument, QTextT
 
 from study_app.gui.help.view import PAGE, HelpPlace
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 
 pytestmark = pytest.mark.slow
 
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 def place(qtbot):
     made = HelpPlace()
     qtbot.addWidget(made)
-    wear(made, LIGHT)
+    apply_theme(made, LIGHT)
     made.resize(1266, 768)
     made.show()
     return made
@@ -96,7 +96,7 @@ def test_a_page_has_its_tables_code_and_pictures(place):
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
 def test_links_and_surface_have_the_colours_of_the_theme(place, theme):
-    wear(place, theme)
+    apply_theme(place, theme)
     cursor = place.reader.document().find("Tutorials")
     assert cursor.charFormat().foreground().color().name().upper() == theme.accent.upper()
     corner = place.reader.viewport().grab().toImage().pixelColor(3, 3)

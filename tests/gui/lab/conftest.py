@@ -9,7 +9,7 @@ import pytest
 
 from study_app.gui.lab.view import LabPlace
 from study_app.gui.theme.theme import LIGHT
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import lab_view, still_view
 
@@ -29,7 +29,7 @@ def still() -> LabView:
 @pytest.fixture
 def place(qtbot: Any) -> Any:
     made = LabPlace()
-    wear(made, LIGHT)
+    apply_theme(made, LIGHT)
     qtbot.addWidget(made)
     made.resize(1528, 900)
     made.show()

@@ -87,7 +87,7 @@ def test_thinning_keeps_the_newest_and_every_peak(count: int) -> None:
 def test_curves_are_as_wide_on_a_dense_screen(plot: CurvePlot, monkeypatch: pytest.MonkeyPatch) -> None:
     widths = [curve.opts["pen"].widthF() for curve in plot.curves]
     monkeypatch.setattr(plot, "devicePixelRatioF", lambda: 2.0)
-    plot.wear(plot.theme)
+    plot.apply_theme(plot.theme)
     assert [curve.opts["pen"].widthF() for curve in plot.curves] == [2 * width for width in widths]
 
 

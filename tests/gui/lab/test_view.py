@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLabel, 
 from study_app.gui.lab.tank_note import SHOWN_AFTER_MS
 from study_app.gui.lab.view import preset_name
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.lab.ab_comparison import Workbench
 from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import blind, heard, settle, still_view, workbench
@@ -372,7 +372,7 @@ def test_both_themes_are_worn_by_every_part(place: Any, moved: LabView) -> None:
     place.show_view(moved)
     settle()
     light = place.grab().toImage()
-    wear(place, DARK)
+    apply_theme(place, DARK)
     settle()
     dark = place.grab().toImage()
     corner = (place.width() - 4, place.height() - 4)
@@ -382,6 +382,6 @@ def test_both_themes_are_worn_by_every_part(place: Any, moved: LabView) -> None:
         at = card.mapTo(place, QPoint(card.width() // 2, 9))
         assert light.pixelColor(at).name().upper() == LIGHT.surface
         assert dark.pixelColor(at).name().upper() == DARK.surface
-    wear(place, LIGHT)
+    apply_theme(place, LIGHT)
     settle()
     assert place.grab().toImage() == light

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.gui.theme.themed import dress
+from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.live_plots import STROKE, apart, step_for
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.viewmodels.force_traces import Forces
@@ -112,7 +112,7 @@ def test_the_wake_has_a_line_above_zero_at_every_speed(card: ForceCard) -> None:
 
 def test_curves_are_told_apart_by_stroke_and_by_the_field(card: ForceCard) -> None:
     for theme in (LIGHT, DARK):
-        dress(card, theme)
+        apply_theme_within(card, theme)
         pens = [curve.opts["pen"] for curve in card.plot.curves]
         assert len({(one.color().name(), tuple(one.dashPattern())) for one in pens}) == 4
         assert card.plot.size_field is not None

@@ -11,7 +11,7 @@ from study_app.gui.display.screens import ScreenShown
 from study_app.gui.settings import view as module
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.theme.theme import DARK, font
-from study_app.gui.theme.themed import wear
+from study_app.gui.theme.themed import apply_theme
 from study_app.store.workstation import CAMERA_LENGTH, DEFAULTS, STATEMENT_X_HEIGHT_PX, DisplayOffset, MachineSettings
 
 ONE = ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0)
@@ -175,7 +175,7 @@ def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
 
 @pytest.mark.parametrize("size", [QSize(952, 640), QSize(1294, 768), QSize(1704, 1080)])
 def test_no_button_is_cut_at_any_size(place, qtbot, size):
-    wear(place, DARK)
+    apply_theme(place, DARK)
     show(place, MachineSettings(viewing_distance_mm=600), undo="width of the screen")
     place.resize(size)
 

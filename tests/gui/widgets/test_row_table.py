@@ -21,7 +21,7 @@ def test_a_chip_with_words_below_keeps_off_the_outline_of_its_row(qtbot: Any) ->
     model.appendRow([cell])
     table = Table(model, ((1, 200),), "Sessions")
     qtbot.addWidget(table)
-    table.wear(LIGHT)
+    table.apply_theme(LIGHT)
     drawn = QImage(300, ROW_HEIGHT, QImage.Format.Format_ARGB32)
     drawn.fill(Qt.GlobalColor.transparent)
     option = QStyleOptionViewItem()

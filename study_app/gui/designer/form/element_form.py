@@ -16,7 +16,7 @@ from study_app.gui.designer.form.question_rows import Panel, QuestionRow, Questi
 from study_app.gui.designer.form.row_fields import add_button
 from study_app.gui.designer.form.row_widget import RowWidget, is_wide, language_heads, structure_of
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
@@ -142,12 +142,12 @@ class FormCard(Card):
                     self.adds.append(made)
                 sections.addLayout(grid)
         whole.addStretch(1)
-        dress(inside, self.theme)
+        apply_theme_within(inside, self.theme)
         self.inside, self.sections = inside, whole
         old = self.area.takeWidget()
         self.area.setWidget(inside)
         if old is not None:
-            take_away(old)
+            remove_widget(old)
         QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(scrolled))
         if focused is not None:
             self.focus(focused)

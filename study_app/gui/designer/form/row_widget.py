@@ -16,7 +16,7 @@ from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed, dress, take_away
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import label
@@ -128,7 +128,7 @@ class RowWidget(Themed, QWidget):
             return
         self._offered = offered
         for button in self.repairs:
-            take_away(button)
+            remove_widget(button)
         self.repairs = []
         several = len(offered) > 1
         asked = [(one, word) for one, words in offered.items() for word in words[: 1 if several else 2]]
@@ -139,7 +139,7 @@ class RowWidget(Themed, QWidget):
             made.setFont(font("label"))
             made.setAccessibleName(f"{word}: {self.row.row.label}")
             made.clicked.connect(lambda _on=False, one=problem, word=word: self.repair_asked.emit(one, word))
-            dress(made, self.theme)
+            apply_theme_within(made, self.theme)
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
             self.repairs.append(made)
 

@@ -54,9 +54,9 @@ class MeasurePlot(Plot):
         """Draw a value in the colours of the theme."""
         raise NotImplementedError
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         self._draw()
 
     def clear(self) -> None:
@@ -109,7 +109,7 @@ class FunctionView(MeasurePlot):
 
     def __init__(self) -> None:
         super().__init__("Psychometric function")
-        self.wear(LIGHT)
+        self.apply_theme(LIGHT)
 
     def draw(self, shown: FunctionPlot) -> None:
         """Draw bands, function, mark and bars."""
@@ -159,7 +159,7 @@ class TrackView(MeasurePlot):
 
     def __init__(self) -> None:
         super().__init__("Expected track")
-        self.wear(LIGHT)
+        self.apply_theme(LIGHT)
 
     def draw(self, shown: TrackPlot) -> None:
         """Draw bands, median, planted threshold and trials."""
@@ -194,7 +194,7 @@ class ForcesView(MeasurePlot):
     def __init__(self) -> None:
         super().__init__("Force at each level")
         self.box.sigResized.connect(self._draw)
-        self.wear(LIGHT)
+        self.apply_theme(LIGHT)
 
     def draw(self, shown: ForcesPlot) -> None:
         """Draw bars and limit."""

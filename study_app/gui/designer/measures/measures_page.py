@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout
 
 from study_app.gui.designer.measures.controls import MeasureControls
 from study_app.gui.designer.measures.parts import CardGrid, NumberPart
-from study_app.gui.theme.themed import Themed, dress
+from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
@@ -241,4 +241,4 @@ class MeasuresPage(Themed, QWidget):
         self.column.insertWidget(2, forces, 2)
         for card in self.cards.values():
             card.hide()
-            dress(card, self.theme)
+            apply_theme_within(card, self.theme)

@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed, dress, take_away
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
@@ -321,7 +321,7 @@ class CardGrid(Themed, QWidget):
                 if at < len(cards) and card == cards[at]}  # fmt: skip
         for at, part in enumerate(self.parts):
             if at not in kept:
-                take_away(part)
+                remove_widget(part)
         while self.grid.count():
             self.grid.takeAt(0)
         self.parts = []
@@ -339,7 +339,7 @@ class CardGrid(Themed, QWidget):
     def _made(self, card: object) -> Made:
         part = part_of(card)
         part.open_asked.connect(self.open_asked)
-        dress(part, self.theme)
+        apply_theme_within(part, self.theme)
         return part
 
 

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from study_app.gui.designer.new_study.cards import TemplateButton
 from study_app.gui.designer.new_study.new_study_questions import Questions
 from study_app.gui.designer.new_study.recovery_bar import RecoveryBar
-from study_app.gui.theme.themed import Themed, dress, take_away
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label
@@ -47,12 +47,12 @@ class NoStudyCard(Card):
     def show_studies(self, studies: tuple[StudyChoice, ...]) -> None:
         """Offer to continue the studies with a draft that is not saved."""
         for old in self.drafts:
-            take_away(old)
+            remove_widget(old)
         self.drafts = []
         for study in (one for one in studies if one.drafted):
             made = ActionButton("save", f"Continue {study.title} with its unsaved changes")
             made.clicked.connect(lambda _on=False, source=study.source: self.study_asked.emit(source))
-            dress(made, self.theme)
+            apply_theme_within(made, self.theme)
             self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignLeft)
             self.drafts.append(made)
 
@@ -125,9 +125,9 @@ class ChosenCard(Card):
             column.addWidget(label(choice.recovery.sentence, "small", "text2", wraps=True))
             column.addWidget(Rule())
         for old, new in zip(before, (self.about, self.details), strict=True):
-            dress(new, self.theme)
+            apply_theme_within(new, self.theme)
             self.inside.replaceWidget(old, new)
-            take_away(old)
+            remove_widget(old)
         self.questions.show_choice(choice)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
@@ -248,7 +248,7 @@ class NewStudyPage(Themed, QWidget):
                 grid.setColumnStretch(one, 1)
             column.addLayout(grid)
         column.addStretch()
-        dress(inside, self.theme)
+        apply_theme_within(inside, self.theme)
         self.area.setWidget(inside)
         self.refuse("")
         first = next((button for button in self.buttons if button.choice.source == chosen), self.buttons[0])

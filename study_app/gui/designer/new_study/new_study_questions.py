@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QWidget
 
 from study_app.gui.designer.form.row_fields import read_number
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed, dress, take_away
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.controls import Check
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.new_study import (
@@ -90,7 +90,7 @@ class Questions(Themed, QWidget):
         for code, check in self.languages.items():
             check.setChecked(code in choice.languages)
         for part in self._own:
-            take_away(part)
+            remove_widget(part)
         self._own, self.own = [], {}
         for row, question in enumerate(choice.questions, start=4):
             field = self._field(question.words)
@@ -106,7 +106,7 @@ class Questions(Themed, QWidget):
                 across.addWidget(label(question.unit, "label", "text2"))
             self._own += [self._add(row, question.words, beside), beside]
             self.own[question] = field
-            dress(beside, self.theme)
+            apply_theme_within(beside, self.theme)
 
     def short_name(self) -> str:
         """Return the short name that was typed, else the one that the title gives."""

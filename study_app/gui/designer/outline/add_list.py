@@ -53,9 +53,9 @@ class AddList(Themed, QFrame):
         self.list.itemClicked.connect(lambda _item: self._choose())
         self.list.itemActivated.connect(lambda _item: self._choose())
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         row = f"border-radius: 6px; color: {theme.text};"
         chosen = f"background: {theme.selected}; color: {theme.accent};"
         self.list.setStyleSheet(f"QListWidget::item {{ {row} }} QListWidget::item:selected {{ {chosen} }}")

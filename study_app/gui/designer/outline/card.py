@@ -86,9 +86,9 @@ class OutlineCard(Card):
         self.add.clicked.connect(self.add_asked)
         self.duplicate.clicked.connect(self.duplicate_asked)
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         self._sign.setIcon(icon("search", theme.text2, 16))
 
     @property

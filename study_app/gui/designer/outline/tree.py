@@ -47,7 +47,7 @@ class Tree(Themed, QTreeView):
         self.target: tuple[int, float] | None = None
         self._pressed: tuple[QPoint, tuple[ElementPath, ...]] | None = None
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
         self.theme = self.rows.theme = theme
         self.viewport().update()

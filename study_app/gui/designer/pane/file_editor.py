@@ -41,7 +41,7 @@ class _Colours(QSyntaxHighlighter):
         super().__init__(document)
         self.formats: list[QTextCharFormat] = []
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         self.formats = []
         for ink, weight in ((theme.text3, 400), (theme.accent, 600), (theme.warn, 400)):
             made = QTextCharFormat()
@@ -158,11 +158,11 @@ class FileEditor(Themed, QPlainTextEdit):
         cursor.insertText(new[first : len(new) - last])
         self._showing = False
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         self._showing = True
-        self._colours.wear(theme)
+        self._colours.apply_theme(theme)
         self._showing = False
         self._mark()
 

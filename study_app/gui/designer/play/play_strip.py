@@ -7,7 +7,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.participant.pages.screen_reader import say
-from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Ink, label
@@ -52,7 +52,7 @@ class PlayStrip(Card):
         shown: list[QWidget] = [*self.buttons.values()]
         shown += [item.widget() for at in range(self._listed.count()) if (item := self._listed.itemAt(at)) is not None]
         for part in shown:
-            take_away(part)
+            remove_widget(part)
         self.buttons = {}
         self.setVisible(state is not None)
         if state is None:
@@ -71,7 +71,7 @@ class PlayStrip(Card):
             self._row.addWidget(made)
             made.show()  # at once: a part that is not shown cannot take the keyboard
             self.buttons[action] = made
-        dress(self, self.theme)
+        apply_theme_within(self, self.theme)
         if self.buttons:
             next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
 

@@ -73,9 +73,9 @@ class _Side(Themed, QPlainTextEdit):
         self._chosen = rows
         self._numbers.update()
 
-    def wear(self, theme: Theme) -> None:
+    def apply_theme(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
-        super().wear(theme)
+        super().apply_theme(theme)
         self._mark_letters()
 
     def _mark_letters(self) -> None:
