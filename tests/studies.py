@@ -6,14 +6,14 @@ from pathlib import Path
 
 from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.session.simulated.trial_features import Feelings, Felt
+from study_app.session.simulated.trial_features import ConditionFeatures, TrialFeatures
 
 
-def made_up(name: str) -> Feelings:
+def made_up(name: str) -> ConditionFeatures:
     """What every condition of a study feels like: conditions differ in force and delay alone."""
     study = load(name)
     return {
-        (block.id, condition): (Felt(0.5 + 0.4 * number, 4.0, 0.1, 0.02, 0.03, study.delay_s(condition)),)
+        (block.id, condition): (TrialFeatures(0.5 + 0.4 * number, 4.0, 0.1, 0.02, 0.03, study.delay_s(condition)),)
         for block in study.blocks.values()
         for number, condition in enumerate(block.conditions)
     }

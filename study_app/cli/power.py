@@ -133,10 +133,10 @@ def _of_statements(
     from study_app.analysis.power.plan import plan
     from study_app.analysis.power.power_curves import powers
     from study_app.analysis.power.power_sweep import sweep
-    from study_app.session.simulated.trial_features import feelings
+    from study_app.session.simulated.trial_features import condition_features
 
     show("simulating every condition")
-    planned = plan(study, feelings(study, seed=seed, progress=show))
+    planned = plan(study, condition_features(study, seed=seed, progress=show))
     for done, counts in sweep(planned, sizes, studies, seed, executor):
         yield powers(planned, sizes, done, studies, seed, counts)
 

@@ -38,7 +38,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     """
     from study_app.analysis.power.plan import plan
     from study_app.protocol.load import load
-    from study_app.session.simulated.trial_features import feelings
+    from study_app.session.simulated.trial_features import condition_features
     from study_app.store.output_files import make_folder, write_files
     from study_app.validation.report_rates.known_effects import simulated
     from study_app.validation.report_rates.rate_tables import markdown, table
@@ -57,7 +57,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
         with progress() as show, executor_for(workers) as executor:
             show("rehearsing every condition")
             protocol = load("rek2024")
-            studied = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))
+            studied = simulated(protocol, plan(protocol, condition_features(protocol, seed=seed)))
             begun = time.monotonic()
             for done, so_far in validate(studied, studies, executor, seed=seed, progress=say):
                 rates = so_far

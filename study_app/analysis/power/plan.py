@@ -12,13 +12,13 @@ from study_app.analysis.tables.planned_analysis import Decided
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.forms.scale import POINTS
-from study_app.protocol.forms.simulated_observer import OPINIONS, Felt
+from study_app.protocol.forms.simulated_observer import OPINIONS, TrialFeatures
 from study_app.protocol.groups.session_steps import groups_with
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions.question import Question
 from study_app.protocol.texts import text_in
 
-Feelings: TypeAlias = Mapping[tuple[str, str], Sequence[Felt]]
+ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
 """(Block, condition) → what was felt there in rehearsed trials."""
 
 
@@ -36,7 +36,7 @@ class Planned:
     names: tuple[str, ...]
     delays_ms: tuple[float, ...] | None
     items: tuple[Item, ...]
-    felt: tuple[tuple[Felt, ...], ...]
+    felt: tuple[tuple[TrialFeatures, ...], ...]
     repetitions: int
     groups: tuple[str, ...] = ()
 
@@ -62,7 +62,7 @@ class Plan:
         return tuple(item.id for block in self.blocks for item in block.items if item.id not in OPINIONS)
 
 
-def plan(protocol: Protocol, felt: Feelings) -> Plan:
+def plan(protocol: Protocol, felt: ConditionFeatures) -> Plan:
     """Return what can be planned of a protocol.
 
     Raises
@@ -96,7 +96,7 @@ def _compared(protocol: Protocol) -> list[Block]:
     return [block for block in protocol.main_blocks if _statements(protocol, block) and len(block.conditions) > 1]
 
 
-def _planned(protocol: Protocol, block: Block, felt: Feelings, language: str) -> Planned:
+def _planned(protocol: Protocol, block: Block, felt: ConditionFeatures, language: str) -> Planned:
     conditions = list(block.conditions)
     delays = {name: protocol.conditions[name].delay_ms for name in conditions}
     kind = protocol.compared_in(block.id)

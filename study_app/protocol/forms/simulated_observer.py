@@ -22,7 +22,7 @@ Draw = Callable[[], float]
 
 
 @dataclass(frozen=True, slots=True)
-class Felt:
+class TrialFeatures:
     """What reached the senses in one trial; all of it at the hand.
 
     Attributes
@@ -51,7 +51,7 @@ class Felt:
     force_delay_s: float = 0.0
 
 
-NOTHING_FELT = Felt(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_FEATURES = TrialFeatures(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,13 +93,13 @@ def rater(draw: Draw) -> Rater:
     )
 
 
-def rate(items: Iterable[str], felt: Felt, person: Rater, draw: Draw) -> dict[str, int]:
+def rate(items: Iterable[str], felt: TrialFeatures, person: Rater, draw: Draw) -> dict[str, int]:
     """Return an answer from 1 to 7 for each item id, in the order given."""
     judged = judgements(items, felt, person, draw)
     return {item: min(POINTS, max(1, math.floor(points + 0.5))) for item, points in judged.items()}
 
 
-def judgements(items: Iterable[str], felt: Felt, person: Rater, draw: Draw) -> dict[str, float]:
+def judgements(items: Iterable[str], felt: TrialFeatures, person: Rater, draw: Draw) -> dict[str, float]:
     """Return what a person would answer to each item id, in the order given: from 1 to 7, or a little beyond."""
     asked = tuple(items)
     return {
@@ -108,7 +108,7 @@ def judgements(items: Iterable[str], felt: Felt, person: Rater, draw: Draw) -> d
     }
 
 
-def opinions(items: Iterable[str], felt: Felt, person: Rater) -> list[float]:
+def opinions(items: Iterable[str], felt: TrialFeatures, person: Rater) -> list[float]:
     """Return what a person thinks of each item, from 1 to 7, before leaning and noise make an answer of it."""
     impression = _impression(felt, person)
     return [OPINIONS.get(item, _no_opinion)(impression) for item in items]
@@ -125,7 +125,7 @@ def _rise(value: float, middle: float, width: float) -> float:
     return 0.5 + 0.5 * x / math.sqrt(1 + x * x)
 
 
-def _impression(felt: Felt, person: Rater) -> _Impression:
+def _impression(felt: TrialFeatures, person: Rater) -> _Impression:
     force = felt.force_mean_n * person.strength
     resistance = force / max(felt.speed_rms_mps, 0.01) ** 2  # quadratic drag: the same however fast the hand
     peak = felt.force_peak_n / max(felt.force_mean_n, 0.05)

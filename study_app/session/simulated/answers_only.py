@@ -1,8 +1,8 @@
 """Sessions that are answered without being held: the machine, the questionnaires and the answer model, and no servo.
 
-What a trial felt like is drawn from what rehearsed participants felt in its condition (see ``feelings``); a task takes
-its least time, and nothing of it is measured, so those columns say n/a. Everything else is as in a rehearsal: the same
-machine, orders, answer model and files, and every row says that it is simulated. Who feels what the rehearsed
+What a trial felt like is drawn from what rehearsed participants felt in its condition (`condition_features`); a task
+takes its least time, and nothing of it is measured, so those columns say n/a. Everything else is as in a rehearsal: the
+same machine, orders, answer model and files, and every row says that it is simulated. Who feels what the rehearsed
 participant felt answers word for word as in the rehearsal.
 """
 
@@ -18,7 +18,7 @@ from typing import Any
 
 from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
-from study_app.protocol.forms.simulated_observer import NOTHING_FELT, Felt
+from study_app.protocol.forms.simulated_observer import NO_FEATURES, TrialFeatures
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Explore, Follow, Protocol
 from study_app.protocol.orders.schedule import build_schedule
@@ -30,7 +30,7 @@ from study_app.session.simulated.adjusting_observer import LOOK_S
 from study_app.session.simulated.design_observer import OBSERVER, Comparison
 from study_app.session.simulated.observers import reading_s
 from study_app.session.simulated.participant import SimulatedParticipant
-from study_app.session.simulated.trial_features import FEELING, Feelings, feelings
+from study_app.session.simulated.trial_features import REHEARSED_PEOPLE, ConditionFeatures, condition_features
 from study_app.session.transitions.commands import Adjust, Command, Finish, ShowPage, StartTrial, Write
 from study_app.session.transitions.events import Begin, Continue, Event, Stepped, TaskDone, TimeUp
 from study_app.session.transitions.state import FINAL, SessionState
@@ -51,7 +51,7 @@ def rehearse_answers(
     participants: int,
     seed: int,
     results: Path | None = None,
-    felt: Feelings | None = None,
+    felt: ConditionFeatures | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> Path:
     """Answer for P001, P002 … and return the study folder.
@@ -66,7 +66,7 @@ def rehearse_answers(
         All randomness comes from it, the key's too.
     results : Path, optional
         Study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace.
-    felt : Feelings, optional
+    felt : ConditionFeatures, optional
         What each condition feels like; by default rehearsed first.
     progress : callable, optional
         Called with a line now and then.
@@ -86,7 +86,7 @@ def rehearse_answers(
     people = tuple(f"P{number:03d}" for number in range(1, participants + 1))
     kept = SimulatedStudy(folder, study, source, people, seed=seed, device=DEVICE, screens=REHEARSED_SCREENS)
     if felt is None:
-        felt = feelings(study, seed=seed, people=FEELING, progress=progress)
+        felt = condition_features(study, seed=seed, people=REHEARSED_PEOPLE, progress=progress)
     said_s = time.monotonic()
     with kept:
         for number, person in enumerate(people, start=1):
@@ -97,7 +97,7 @@ def rehearse_answers(
     return folder
 
 
-def _answer(study: Protocol, who: str, seed: int, kept: SimulatedStudy, felt: Feelings) -> None:
+def _answer(study: Protocol, who: str, seed: int, kept: SimulatedStudy, felt: ConditionFeatures) -> None:
     """Answer one session of a study."""
     time_passed = SimulatedTime()
     store = kept.begin(who, SessionClock(time_passed.ns, datetime.now().astimezone()))
@@ -148,10 +148,10 @@ class Answering(SimulatedParticipant):
         state: SessionState,
         kept: Kept,
         time_passed: SimulatedTime,
-        felt: Callable[[str, str], Sequence[Felt]],
+        felt: Callable[[str, str], Sequence[TrialFeatures]],
     ) -> None:
         self._felt_in = felt
-        self._feels = NOTHING_FELT
+        self._feels = NO_FEATURES
         self._sensed_in: dict[int, list[float]] = {}  # by trial, interval by interval
         self._time = time_passed
         self._store = kept
@@ -198,7 +198,7 @@ class Answering(SimulatedParticipant):
         self.answers += 1
         self._post(TaskDone(self._time.seconds, "timeout" if over else "complete", {}))
 
-    def _felt(self, _trial: int | None) -> Felt:
+    def _felt(self, _trial: int | None) -> TrialFeatures:
         return self._feels
 
     def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:

@@ -16,7 +16,7 @@ from typing import Final
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.forms.show_if import Value
-from study_app.protocol.forms.simulated_observer import Felt
+from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions.choice import ChoiceView
 from study_app.protocol.questions.question import ItemView, plain_number
@@ -90,7 +90,7 @@ class Comparison:
         delays = {protocol.conditions[name].delay_ms for name in block.conditions}
         return cls(len(delays) > 1, smallest=False, observer=observer)
 
-    def sensed(self, felt: Felt) -> float:
+    def sensed(self, felt: TrialFeatures) -> float:
         """Return what is attended to: a delay [s], a roughness [N], or a resistance [N·s/m]."""
         if self.vary == FORCE_DELAY:
             return felt.force_delay_s

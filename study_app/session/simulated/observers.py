@@ -15,7 +15,7 @@ import numpy as np
 
 from study_app.devices.simulated.hand_commands import HandOrders
 from study_app.protocol.forms.show_if import Value, shown
-from study_app.protocol.forms.simulated_observer import Felt, Rater, judgements
+from study_app.protocol.forms.simulated_observer import Rater, TrialFeatures, judgements
 from study_app.protocol.model import Explore, Follow, Reach
 from study_app.protocol.questions.question import ItemView
 from study_app.protocol.trials.task import AnyTask
@@ -42,7 +42,7 @@ def reading_s(page: TextPage) -> float:
 
 
 @dataclass(slots=True)
-class Senses:
+class SensedTrial:
     """What reached hand and eyes in one trial; ``scale`` is scene metres per hand metre.
 
     ``period_s`` is the time between two ticks [s] in studies that delay the force, else None.
@@ -72,7 +72,7 @@ class Senses:
         for came in (self.forces_n, self.velocities_mps, self.ages_s):
             came.clear()
 
-    def felt(self) -> Felt:
+    def features(self) -> TrialFeatures:
         """Return the features that an opinion is made of."""
         force_n = np.concatenate(self.forces_n or [np.zeros((0, 3))])
         velocity_mps = np.concatenate(self.velocities_mps or [np.zeros((0, 3))]) / self.scale
@@ -80,7 +80,7 @@ class Senses:
         power_w = np.einsum("ij,ij->i", force_n, velocity_mps)
         effort_w = float(np.abs(power_w).sum())
         changes_n = _norm(np.diff(force_n, axis=0))
-        return Felt(
+        return TrialFeatures(
             force_mean_n=_mean(norm_n),
             force_peak_n=float(norm_n.max(initial=0.0)),
             speed_rms_mps=math.sqrt(_mean(_norm(velocity_mps) ** 2)),
@@ -199,7 +199,7 @@ class Choice:
     after_s: float
 
 
-def filled_in(page: QuestionnairePage, felt: Felt, person: Rater, draw: Draw) -> list[Choice]:
+def filled_in(page: QuestionnairePage, felt: TrialFeatures, person: Rater, draw: Draw) -> list[Choice]:
     """Return how a page is answered by what was felt."""
     judged = judgements([item.id for item in page.items], felt, person, draw)
     answers = {item.id: item.simulated(judged[item.id], draw) for item in page.items}

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.forms.show_if import Value
-from study_app.protocol.forms.simulated_observer import Felt, rater
+from study_app.protocol.forms.simulated_observer import TrialFeatures, rater
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, stream
 from study_app.protocol.trials.tracks import design_of
@@ -53,7 +53,7 @@ class SimulatedParticipant(ABC):
         """Give the session an event."""
 
     @abstractmethod
-    def _felt(self, trial: int | None) -> Felt:
+    def _felt(self, trial: int | None) -> TrialFeatures:
         """Return what was felt last in a trial; on a page of no trial nothing."""
 
     @abstractmethod

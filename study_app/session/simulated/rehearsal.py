@@ -19,7 +19,7 @@ from pathlib import Path
 from study_app.devices.registry import descriptor_of, discover
 from study_app.devices.rig import Rig
 from study_app.errors import SessionError
-from study_app.protocol.forms.simulated_observer import Felt
+from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule
@@ -175,9 +175,9 @@ def _run(
 
 def _felt_in_whole_session(
     study: Protocol, schedule: Schedule, device: str, codes: dict[str, dict[str, str]], secret: bytes
-) -> dict[int, tuple[Felt, ...]]:
+) -> dict[int, tuple[TrialFeatures, ...]]:
     """Return what is felt in each trial (by number) of a session that is not interrupted."""
-    felt: dict[int, tuple[Felt, ...]] = {}
+    felt: dict[int, tuple[TrialFeatures, ...]] = {}
     with rehearsal_rig(study, schedule.participant, schedule.seed, device) as rig:
         RehearsedSession(study, schedule, rig, Unkept(rig.servo.now_ns, codes, secret), felt=felt.__setitem__).run()
     return felt

@@ -16,7 +16,7 @@ from study_app.devices.simulated.hand_commands import hand_of
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.blocks import Block
-from study_app.protocol.forms.simulated_observer import NOTHING_FELT, Felt
+from study_app.protocol.forms.simulated_observer import NO_FEATURES, TrialFeatures
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, stream
 from study_app.protocol.trials.presentation import delays_force
@@ -36,7 +36,7 @@ from study_app.session.runner import Runner
 from study_app.session.simulated.adjusting_observer import LOOK_S as LOOK_AT_SETTING_S
 from study_app.session.simulated.adjusting_observer import AdjustingObserver
 from study_app.session.simulated.design_observer import OBSERVER, Comparison, Observer
-from study_app.session.simulated.observers import Draw, Senses, hand_for, reading_s, rest
+from study_app.session.simulated.observers import Draw, SensedTrial, hand_for, reading_s, rest
 from study_app.session.simulated.participant import SimulatedParticipant
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeAsked, Stepped, Submitted
 from study_app.session.trial import TankView
@@ -65,10 +65,10 @@ class _Setting:
     scale: float
     judged_s: float = 0.0
     done: bool = False
-    senses: Senses = field(init=False)
+    senses: SensedTrial = field(init=False)
 
     def __post_init__(self) -> None:
-        self.senses = Senses(self.scale)
+        self.senses = SensedTrial(self.scale)
 
 
 class RehearsedSession(SimulatedParticipant):
@@ -88,7 +88,7 @@ class RehearsedSession(SimulatedParticipant):
         Where a resumed session goes on.
     felt : callable, optional
         Called after every trial or interval with the trial's number and what was felt in it until then, by interval.
-    known : mapping of int to tuple of Felt, optional
+    known : mapping of int to tuple of TrialFeatures, optional
         What is answered by instead, by trial number.
     observer : Observer, optional
         Discriminates the intervals of a trial.
@@ -101,8 +101,8 @@ class RehearsedSession(SimulatedParticipant):
         rig: Rig,
         store: KeptSession,
         start: Start = FIRST,
-        felt: Callable[[int, tuple[Felt, ...]], object] | None = None,
-        known: Mapping[int, tuple[Felt, ...]] | None = None,
+        felt: Callable[[int, tuple[TrialFeatures, ...]], object] | None = None,
+        known: Mapping[int, tuple[TrialFeatures, ...]] | None = None,
         observer: Observer = OBSERVER,
     ) -> None:
         super().__init__(study, schedule, observer)
@@ -113,7 +113,7 @@ class RehearsedSession(SimulatedParticipant):
         assert hand is not None  # noqa: S101 - `rehearsal_rig` has looked
         self._hand = hand
         self._now_s = store.clock.seconds
-        self._felt_in: dict[int, tuple[Felt, ...]] = {}
+        self._felt_in: dict[int, tuple[TrialFeatures, ...]] = {}
         self._touch = rig.servo.telemetry.reader()
         self._next_frame_ns = 0
         self._period_s = 1 / study.device.rate_hz if delays_force(study) else None
@@ -180,7 +180,7 @@ class RehearsedSession(SimulatedParticipant):
         named = str(page.trial) if interval is None else f"{page.trial}/{interval.number}"
         arm, draw = self._hand, self._stream(f"{named}/behaviour")
         self._paint = self._stream(f"{named}/screen")
-        senses = Senses(self._study.scene.scale, self._period_s)
+        senses = SensedTrial(self._study.scene.scale, self._period_s)
         self._touch.read()
         self._next_frame_ns = self.rig.servo.now_ns()
         hand = hand_for(page.task, arm, draw, self._now_s())
@@ -199,7 +199,7 @@ class RehearsedSession(SimulatedParticipant):
                 self._post(Continue(self._now_s()))
         rest(page.task, arm)
         earlier = () if interval is None or interval.number == 1 else self._felt_in.get(page.trial, ())
-        self._felt_in[page.trial] = (*earlier, senses.felt())
+        self._felt_in[page.trial] = (*earlier, senses.features())
         if self._tell_felt is not None:
             self._tell_felt(page.trial, self._felt_in[page.trial])
 
@@ -210,7 +210,7 @@ class RehearsedSession(SimulatedParticipant):
         since_s = view.task.elapsed_s - setting.judged_s
         if setting.done or since_s < LOOK_AT_SETTING_S or view.task.elapsed_s < page.task.lead_s + LOOK_AT_SETTING_S:
             return
-        sensed = self._attended(page.trial).sensed(setting.senses.felt())
+        sensed = self._attended(page.trial).sensed(setting.senses.features())
         steps = setting.observer.steps(sensed, self._remembered(page.trial, sensed))
         setting.senses.clear()
         setting.judged_s = view.task.elapsed_s
@@ -221,7 +221,7 @@ class RehearsedSession(SimulatedParticipant):
             self.answers += 1
             self._post(Submitted(self._now_s()))
 
-    def look(self, senses: Senses) -> TankView | None:
+    def look(self, senses: SensedTrial) -> TankView | None:
         """Show the frames that are due since the last look; return what the newest showed, None where none was due."""
         view = None
         while self._next_frame_ns <= self.rig.servo.now_ns():
@@ -234,8 +234,8 @@ class RehearsedSession(SimulatedParticipant):
             self._next_frame_ns += round(1e9 * FRAME_S)
         return view
 
-    def _felt(self, trial: int | None) -> Felt:
-        return NOTHING_FELT if trial is None else {**self._felt_in, **self._known}[trial][-1]
+    def _felt(self, trial: int | None) -> TrialFeatures:
+        return NO_FEATURES if trial is None else {**self._felt_in, **self._known}[trial][-1]
 
     def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
         sensed = Comparison.of(self._study, block, self.observer).sensed

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import SessionError
-from study_app.protocol.forms.simulated_observer import NOTHING_FELT
+from study_app.protocol.forms.simulated_observer import NO_FEATURES
 from study_app.protocol.model import Protocol
 from study_app.session.simulated.answers_only import Answering, SimulatedTime
 from study_app.session.simulated.preview import preview
@@ -53,7 +53,7 @@ def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart,
     shown = preview(study, start.seed, start.participant)
     state = open_session(shown.protocol, shown.schedule, shown.codes, start.language, secret=shown.secret)
     lines, passed = _Lines(), SimulatedTime()
-    answering = Answering(study, state, lines, passed, lambda _block, _condition: (NOTHING_FELT,))
+    answering = Answering(study, state, lines, passed, lambda _block, _condition: (NO_FEATURES,))
     lines.session = answering
     lines.until = step
     answering.run(until=step)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final, TypeAlias
 
-from study_app.protocol.forms.simulated_observer import Felt
+from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
 from study_app.protocol.trials.due import next_level
@@ -21,16 +21,16 @@ from study_app.session.unkept import Unkept
 Where: TypeAlias = tuple[str, str]
 """A block, whose task is done, and a condition."""
 
-Feelings: TypeAlias = Mapping[Where, tuple[Felt, ...]]
+ConditionFeatures: TypeAlias = Mapping[Where, tuple[TrialFeatures, ...]]
 """What was felt in each trial of a condition in a block."""
 
-FEELING: Final = 4
+REHEARSED_PEOPLE: Final = 4
 """So many simulated participants feel all conditions."""
 
 
-def feelings(
-    protocol: Protocol, *, seed: int, people: int = FEELING, progress: Callable[[str], object] | None = None
-) -> Feelings:
+def condition_features(
+    protocol: Protocol, *, seed: int, people: int = REHEARSED_PEOPLE, progress: Callable[[str], object] | None = None
+) -> ConditionFeatures:
     """Return what ``people`` simulated participants feel in every condition of the blocks.
 
     Raises
@@ -42,13 +42,13 @@ def feelings(
     """
     codes = draw_key(protocol, stream(seed, "blinding").random)
     key = Key(codes, b"what each condition feels like")
-    found: dict[Where, list[Felt]] = {}
+    found: dict[Where, list[TrialFeatures]] = {}
     for number in range(1, people + 1):
         person = f"P{number:03d}"
         schedule = build_schedule(protocol, person, seed)
         places = {trial.number: _presented(protocol, key, schedule, trial) for trial in schedule.trials}
 
-        def feel(trial: int, felt: tuple[Felt, ...], places: Mapping[int, tuple[Where, ...]] = places) -> None:
+        def feel(trial: int, felt: tuple[TrialFeatures, ...], places: Mapping[int, tuple[Where, ...]] = places) -> None:
             found.setdefault(places[trial][len(felt) - 1], []).append(felt[-1])
 
         with rehearsal_rig(protocol, person, seed, "scripted") as machine:

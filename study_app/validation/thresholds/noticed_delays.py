@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from study_app.analysis.statistics.psychometrics.threshold import Threshold, noticed
-from study_app.protocol.forms.simulated_observer import NOTHING_FELT, Draw, Rater, rate, rater
+from study_app.protocol.forms.simulated_observer import NO_FEATURES, Draw, Rater, rate, rater
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.streams import stream
@@ -155,7 +155,7 @@ def delays_of(protocol: Protocol) -> tuple[float, ...]:
 
 def _rating(person: Person, delay_s: float, draw: Draw) -> int:
     perceived_s = delay_s + person.observer.delay_noise_s * _normal(draw)
-    return rate([STATEMENT], replace(NOTHING_FELT, delay_s=perceived_s), person.rater, draw)[STATEMENT]
+    return rate([STATEMENT], replace(NO_FEATURES, delay_s=perceived_s), person.rater, draw)[STATEMENT]
 
 
 def _normal(draw: Draw) -> float:

@@ -29,7 +29,7 @@ from study_app.analysis.power.simulated_studies import people
 from study_app.analysis.statistics.trend import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError
-from study_app.protocol.forms.simulated_observer import NOTHING_FELT, Felt
+from study_app.protocol.forms.simulated_observer import NO_FEATURES, TrialFeatures
 from study_app.protocol.load import load, parse
 from study_app.store.verification.table_checks import problems
 from study_app.workers.executors import Workers, open_executor
@@ -41,12 +41,12 @@ pytestmark = pytest.mark.slow
 SIZES = (5, 9)
 
 
-def felt_in(protocol: Any) -> dict[tuple[str, str], tuple[Felt, ...]]:
+def felt_in(protocol: Any) -> dict[tuple[str, str], tuple[TrialFeatures, ...]]:
     """Liquids that differ in force, delays that differ in what was seen."""
     return {
         (block.id, condition): (
-            Felt(0.3 + 0.6 * number, 4.0, 0.1, 0.01, 0.03, 0.006 + protocol.delay_s(condition)),
-            Felt(0.4 + 0.6 * number, 4.0, 0.1, 0.02, 0.03, 0.006 + protocol.delay_s(condition)),
+            TrialFeatures(0.3 + 0.6 * number, 4.0, 0.1, 0.01, 0.03, 0.006 + protocol.delay_s(condition)),
+            TrialFeatures(0.4 + 0.6 * number, 4.0, 0.1, 0.02, 0.03, 0.006 + protocol.delay_s(condition)),
         )
         for block in protocol.blocks.values()
         for number, condition in enumerate(block.conditions)
@@ -102,7 +102,9 @@ def test_the_counts_do_not_depend_on_the_executor(counted: tuple[int, Counts], w
 def test_the_command_writes_the_same_bytes_with_one_worker_two_and_a_cluster(
     worker_options: tuple[tuple[str, str], ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda protocol, **_: felt_in(protocol))
+    monkeypatch.setattr(
+        "study_app.session.simulated.trial_features.condition_features", lambda protocol, **_: felt_in(protocol)
+    )
     written = []
     for number, words in enumerate(worker_options):
         to = tmp_path / str(number)
@@ -286,7 +288,7 @@ def test_a_block_of_some_groups_counts_their_participants() -> None:
     """Where all groups have a block, nothing is said."""
     steps = {"a": ["hello", "thin", "end"], "b": ["hello", "thin", "thick", "end"]}
     groups = "".join(f"\n[groups.{name}]\nsequence = {of_group}\n" for name, of_group in steps.items())
-    felt = {(block, condition): (NOTHING_FELT,) for block in ("thin", "thick") for condition in ("water", "honey")}
+    felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
     study_plan = plan(grouped(groups=groups), felt)
     assert {block.id: block.groups for block in study_plan.blocks} == {"thin": (), "thick": ("b",)}
     studies, counts = swept(study_plan)
@@ -315,7 +317,9 @@ def test_the_command_ended_by_the_user_writes_what_it_has(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(power_sweep, "sweep", until)
-    monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda protocol, **_: felt_in(protocol))
+    monkeypatch.setattr(
+        "study_app.session.simulated.trial_features.condition_features", lambda protocol, **_: felt_in(protocol)
+    )
     to = tmp_path / "power"
     result = CliRunner().invoke(commands, ["power", "rek2024", "--sizes", "5,9", "--to", str(to)])
     assert result.exit_code == 130

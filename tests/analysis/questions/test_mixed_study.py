@@ -16,7 +16,7 @@ from study_app.analysis.report.write_report import report
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
-from study_app.protocol.forms.simulated_observer import Felt
+from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded import blinding
@@ -37,7 +37,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("mixed")
     protocol = mixed_file(place)
     study = load(protocol)
-    felt = {("stir", name): (Felt(0.5 + n, 4.0, 0.1, 0.02, 0.03, 0.0),) for n, name in enumerate(study.conditions)}
+    felt = {
+        ("stir", name): (TrialFeatures(0.5 + n, 4.0, 0.1, 0.02, 0.03, 0.0),) for n, name in enumerate(study.conditions)
+    }
     return rehearse_answers(protocol, participants=PEOPLE, seed=1, results=place / "results", felt=felt)
 
 
@@ -59,7 +61,9 @@ def test_rehearsed_study_is_sound(folder: Path) -> None:
 def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None:
     condition = 'id = "pleasant"\nshow_if = { item = "thickness", at_least = 3 }'
     protocol = mixed_file(tmp_path, ('id = "pleasant"', condition))
-    felt = {("stir", name): (Felt(0.5 + n, 4.0, 0.1, 0.02, 0.03, 0.0),) for n, name in enumerate(("thin", "thick"))}
+    felt = {
+        ("stir", name): (TrialFeatures(0.5 + n, 4.0, 0.1, 0.02, 0.03, 0.0),) for n, name in enumerate(("thin", "thick"))
+    }
     folder = rehearse_answers(protocol, participants=8, seed=1, results=tmp_path / "results", felt=felt)
     sessions = StudyFolder(folder).sessions()
     asked = len(load_study(folder).answered.query("item == 'pleasant'"))

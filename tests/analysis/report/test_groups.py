@@ -9,7 +9,7 @@ import pytest
 from study_app.analysis.report.write_report import report
 from study_app.analysis.tables.group_means import group_counts, group_means
 from study_app.analysis.tables.study_tables import load_study
-from study_app.protocol.forms.simulated_observer import NOTHING_FELT
+from study_app.protocol.forms.simulated_observer import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from tests.protocol.groups.grouped import GROUPS, STUDY
@@ -22,7 +22,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a sealed study of six participants in two groups."""
     path = tmp_path_factory.mktemp("grouped")
     (path / "grouped.toml").write_text(STUDY + GROUPS)
-    felt = {(block, condition): (NOTHING_FELT,) for block in ("thin", "thick") for condition in ("water", "honey")}
+    felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
     return rehearse_answers(path / "grouped.toml", participants=6, seed=2, results=path / "r", felt=felt)
 
 

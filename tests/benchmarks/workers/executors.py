@@ -21,7 +21,7 @@ import psutil
 
 from study_app.analysis.power.batch_counts import BATCH, count
 from study_app.analysis.power.plan import Plan, plan
-from study_app.protocol.forms.simulated_observer import Felt
+from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
 from study_app.workers.environment import environment
 from study_app.workers.executors import Workers, open_executor
@@ -52,7 +52,7 @@ def planned() -> Plan:
     """Return what power estimation computes with, without rehearsals."""
     protocol = load("rek2024")
     features = {
-        (block.id, name): (Felt(0.3 + 0.6 * number, 4.0, 0.1, 0.01, 0.03, 0.006 + protocol.delay_s(name)),)
+        (block.id, name): (TrialFeatures(0.3 + 0.6 * number, 4.0, 0.1, 0.01, 0.03, 0.006 + protocol.delay_s(name)),)
         for block in protocol.main_blocks
         for number, name in enumerate(block.conditions)
     }

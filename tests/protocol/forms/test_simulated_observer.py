@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.forms.simulated_observer import OPINIONS, Felt, Rater, rate, rater
+from study_app.protocol.forms.simulated_observer import OPINIONS, Rater, TrialFeatures, rate, rater
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import stream
 
@@ -16,14 +16,14 @@ LIQUID = tuple(item.id for item in REK.questionnaires["liquid"].items)
 DELAY = tuple(item.id for item in REK.questionnaires["delay"].items)
 
 # What a rehearsed participant meets in each liquid while exploring it for half a minute.
-WATER = Felt(1.38, 8.0, 0.131, 0.004, 0.051, 0.004)
-HONEY = Felt(1.29, 8.0, 0.104, 0.001, 0.066, 0.004)
-LIGHT_OIL = Felt(1.24, 8.0, 0.120, 0.098, 0.102, 0.004)
+WATER = TrialFeatures(1.38, 8.0, 0.131, 0.004, 0.051, 0.004)
+HONEY = TrialFeatures(1.29, 8.0, 0.104, 0.001, 0.066, 0.004)
+LIGHT_OIL = TrialFeatures(1.24, 8.0, 0.120, 0.098, 0.102, 0.004)
 
 CALM = Rater(leaning=0.0, noise=0.0, strength=1.0, threshold_s=0.13)
 
 felt_anything = st.builds(
-    Felt,
+    TrialFeatures,
     *(st.floats(0, 8) for _ in range(2)),
     st.floats(0, 1),
     st.floats(0, 1),
@@ -33,7 +33,7 @@ felt_anything = st.builds(
 seeds = st.integers(0, 2**32)
 
 
-def answers(items, felt: Felt, people: int = 200) -> dict[str, float]:
+def answers(items, felt: TrialFeatures, people: int = 200) -> dict[str, float]:
     """Return the mean answers of many raters."""
     given_ = [
         rate(items, felt, rater(stream(seed, "rater").random), stream(seed, "a").random) for seed in range(people)
@@ -42,7 +42,7 @@ def answers(items, felt: Felt, people: int = 200) -> dict[str, float]:
 
 
 @given(felt_anything, seeds)
-def test_answers_are_points_of_the_scale(felt: Felt, seed: int):
+def test_answers_are_points_of_the_scale(felt: TrialFeatures, seed: int):
     draw = stream(seed, "rater").random
     answered = rate((*LIQUID, *DELAY, "something_else"), felt, rater(draw), draw)
     assert list(answered) == [*LIQUID, *DELAY, "something_else"]
@@ -50,7 +50,7 @@ def test_answers_are_points_of_the_scale(felt: Felt, seed: int):
 
 
 @given(felt_anything, seeds)
-def test_the_same_trial_and_draw_give_the_same_answers(felt: Felt, seed: int):
+def test_the_same_trial_and_draw_give_the_same_answers(felt: TrialFeatures, seed: int):
     person = rater(stream(seed, "rater").random)
     once, again = (rate(LIQUID, felt, person, stream(seed, "answers").random) for _ in range(2))
     assert once == again
@@ -81,7 +81,7 @@ def test_light_oil_is_not_recognised():
 
 
 def test_nothing_felt_is_no_liquid():
-    nothing = Felt(0.0, 0.0, 0.1, 0.0, 0.0, 0.0)
+    nothing = TrialFeatures(0.0, 0.0, 0.1, 0.0, 0.0, 0.0)
     assert answers(LIQUID, nothing)["feels_liquid"] < 3 < answers(LIQUID, WATER)["feels_liquid"]
 
 

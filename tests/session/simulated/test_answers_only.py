@@ -13,12 +13,12 @@ from study_app.analysis.figures.plotting import plot
 from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
 from study_app.errors import StoreError
-from study_app.protocol.forms.simulated_observer import Felt
+from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
 from study_app.session.simulated import answers_only
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.session.simulated.trial_features import Feelings, feelings
+from study_app.session.simulated.trial_features import ConditionFeatures, condition_features
 from study_app.store.blinded.blinding import reveal
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.reproduction import reproduced
@@ -30,13 +30,13 @@ pytestmark = pytest.mark.slow
 WALL_CLOCK = ("answered_at", "trial_started_at", "session_started_at", "session_ended_at")
 
 
-def made_up(name: str = "rek2024") -> Feelings:
+def made_up(name: str = "rek2024") -> ConditionFeatures:
     """What every condition of a study feels like: conditions differ in force and delay alone."""
     study = load(name)
     return {
         (block.id, condition): (
-            Felt(0.5 + 0.4 * number, 4.0, 0.1, 0.02, 0.03, study.delay_s(condition)),
-            Felt(0.6 + 0.4 * number, 4.2, 0.1, 0.02, 0.03, study.delay_s(condition)),
+            TrialFeatures(0.5 + 0.4 * number, 4.0, 0.1, 0.02, 0.03, study.delay_s(condition)),
+            TrialFeatures(0.6 + 0.4 * number, 4.2, 0.1, 0.02, 0.03, study.delay_s(condition)),
         )
         for block in study.blocks.values()
         for number, condition in enumerate(block.conditions)
@@ -108,7 +108,7 @@ def test_fewer_participants_answer_as_the_first_of_many(twelve: Path, tmp_path: 
 @needs_servo
 def test_who_feels_what_was_felt_in_a_rehearsal_answers_as_in_it(tmp_path: Path) -> None:
     held = rehearse("demo", participants=1, seed=3, results=tmp_path / "held", recordings=False)
-    felt = feelings(load("demo"), seed=3, people=1)
+    felt = condition_features(load("demo"), seed=3, people=1)
     assert all(len(once) == 1 for once in felt.values()), "otherwise which of them is felt is drawn"
     answered = rehearse_answers("demo", participants=1, seed=3, results=tmp_path / "answered", felt=felt)
     asked = ("trial", "code", "item", "number", "response", "changes")
@@ -127,7 +127,7 @@ def test_who_feels_what_was_felt_in_a_rehearsal_answers_as_in_it(tmp_path: Path)
 @needs_servo
 def test_what_is_felt_is_what_each_condition_gives(tmp_path: Path) -> None:
     study = load("demo")
-    felt = feelings(study, seed=1, people=2)
+    felt = condition_features(study, seed=1, people=2)
     assert felt.keys() == {(block.id, condition) for block in study.blocks.values() for condition in block.conditions}
     for (block, condition), lived in felt.items():
         assert len(lived) == 2 * study.blocks[block].repetitions

@@ -26,9 +26,9 @@ from study_app.protocol.questions.rating import RatingView
 from study_app.session.pages import TextPage
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.exploration import RATE_HZ, exploration
-from study_app.session.simulated.observers import Reacher, Senses, choices, reading_s
+from study_app.session.simulated.observers import Reacher, SensedTrial, choices, reading_s
 from study_app.session.simulated.rehearsed_session import RehearsedSession
-from study_app.session.simulated.trial_features import feelings
+from study_app.session.simulated.trial_features import condition_features
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
 from study_app.store.folders import StudyFolder
@@ -73,7 +73,7 @@ def test_reading_takes_longer_the_more_there_is_to_read() -> None:
 
 def test_senses_tell_drag_from_a_push_and_half_of_each() -> None:
     def share(force_x: list[float]) -> float:
-        senses = Senses(scale=10.0)
+        senses = SensedTrial(scale=10.0)
         force = np.zeros((len(force_x), 3))
         force[:, 0] = force_x
         times = np.arange(len(force_x)) / 1000
@@ -84,7 +84,7 @@ def test_senses_tell_drag_from_a_push_and_half_of_each() -> None:
                 )
             )
         )
-        return senses.felt().push_share
+        return senses.features().push_share
 
     assert share([-1.0, -2.0]) == 0.0
     assert share([1.0, 2.0]) == pytest.approx(1.0)
@@ -92,7 +92,7 @@ def test_senses_tell_drag_from_a_push_and_half_of_each() -> None:
 
 
 def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
-    senses = Senses(scale=10.0)
+    senses = SensedTrial(scale=10.0)
     force = [(3.0, 0.0, 4.0), (0.0, 0.0, 0.0)] * 50
     rows = small.samples(
         np.arange(100) / 1000, np.zeros((100, 3)), device_force_n=force, velocity_mps=(0, 2.0, 0), scene=4
@@ -104,7 +104,7 @@ def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
         painted_ns = 1_000_000_000
         shown_ns = painted_ns - age_ms * 1_000_000
         senses.see(painted_ns, TankView(np.zeros(3), TaskView(0, 0, 1, 0.0, 0.0), shown_ns))
-    felt = senses.felt()
+    felt = senses.features()
     assert felt.force_mean_n == pytest.approx(2.5)
     assert felt.force_peak_n == pytest.approx(5)
     assert felt.speed_rms_mps == pytest.approx(0.2)
@@ -113,7 +113,7 @@ def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
 
 
 def test_who_felt_nothing_has_senses_all_the_same() -> None:
-    assert Senses(scale=1.0).felt().force_peak_n == 0.0
+    assert SensedTrial(scale=1.0).features().force_peak_n == 0.0
 
 
 class StillHand:
@@ -219,7 +219,7 @@ def test_a_servo_that_is_ended_from_outside_ends_the_rehearsal(monkeypatch: Any)
 
     monkeypatch.setattr(Servo, "advance", ended)
     with pytest.raises(SessionError, match="stopped from outside"):
-        feelings(small.protocol(), seed=1, people=1)
+        condition_features(small.protocol(), seed=1, people=1)
 
 
 def confirmed(lines: Iterable[Any]) -> dict[tuple[int, str], int]:

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import StoreError, StudyError
-from study_app.protocol.forms.simulated_observer import NOTHING_FELT
+from study_app.protocol.forms.simulated_observer import NO_FEATURES
 from study_app.protocol.groups.own_protocol import own_protocol
 from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.session.simulated.trial_features import Feelings
+from study_app.session.simulated.trial_features import ConditionFeatures
 from study_app.store.blinded import allocation
 from study_app.store.blinded.allocation import allocate, allocated, claims, session_protocol
 from study_app.store.blinded.blinding import open_or_draw_key
@@ -299,5 +299,5 @@ def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> N
     assert trials[1].rsplit(",", 1)[1] in GROUP_NAMES
 
 
-def _felt() -> Feelings:
-    return {(block, condition): (NOTHING_FELT,) for block in ("thin", "thick") for condition in ("water", "honey")}
+def _felt() -> ConditionFeatures:
+    return {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.forms.simulated_observer import Felt
+from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
@@ -59,7 +59,7 @@ def rehearse_short(study: Path, protocol: Path, _enough: Any) -> None:
 def answer_only(study: Path, _enough: Any) -> None:
     protocol = load("demo")
     felt = {
-        (block.id, condition): (Felt(0.5, 4.0, 0.1, 0.02, 0.03, 0.0),)
+        (block.id, condition): (TrialFeatures(0.5, 4.0, 0.1, 0.02, 0.03, 0.0),)
         for block in protocol.blocks.values()
         for condition in block.conditions
     }

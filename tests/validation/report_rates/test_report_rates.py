@@ -23,7 +23,7 @@ from study_app.analysis.findings.settings_differ import FINDING as OMNIBUS
 from study_app.analysis.power.plan import plan
 from study_app.analysis.statistics.psychometrics.threshold import noticed
 from study_app.cli import commands
-from study_app.protocol.forms.simulated_observer import Felt
+from study_app.protocol.forms.simulated_observer import TrialFeatures
 from study_app.protocol.load import load
 from study_app.validation.report_rates import known_effects as studies
 from study_app.validation.report_rates import simulation, single_test_rates
@@ -51,7 +51,7 @@ def rek() -> Simulated:
     force_n = {"water": 0.3, "honey": 1.2, "light_oil": 0.6}
     felt = {
         (block.id, name): (
-            Felt(force_n.get(name, 0.3), 3 * force_n.get(name, 0.3), 0.1, 0.05, 0.1, protocol.delay_s(name)),
+            TrialFeatures(force_n.get(name, 0.3), 3 * force_n.get(name, 0.3), 0.1, 0.05, 0.1, protocol.delay_s(name)),
         )
         for block in protocol.main_blocks
         for name in block.conditions
@@ -197,7 +197,7 @@ def test_the_command_tells_rates_that_are_undecided_from_rates_that_hold(
 ) -> None:
     rates = tuple(Rate("cell", 5, f"what {at}", "at most 5 %", hit, 1000) for at, hit in enumerate(hits))
     rates += (Rate("cell", 5, "size", "counted", 7, 1000),) if rates else ()
-    monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda *_args, **_named: None)
+    monkeypatch.setattr("study_app.session.simulated.trial_features.condition_features", lambda *_args, **_named: None)
     monkeypatch.setattr("study_app.analysis.power.plan.plan", lambda *_args: None)
     monkeypatch.setattr("study_app.validation.report_rates.known_effects.simulated", lambda *_args: None)
     monkeypatch.setattr(

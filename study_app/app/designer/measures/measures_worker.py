@@ -14,7 +14,7 @@ from study_app.workers.messages import Stopped
 from study_app.workers.server import Stop, Tell
 
 if TYPE_CHECKING:
-    from study_app.session.simulated.trial_features import Feelings
+    from study_app.session.simulated.trial_features import ConditionFeatures
 
 SEED: Final = 1
 """That of ``power`` where none is given."""
@@ -176,20 +176,20 @@ def _detectable(wanted: Detecting, stop: Stop) -> Detectable | None:
     return Detectable(wanted.participants, STUDIES, HIGHEST, tuple(findings))
 
 
-_feelings: dict[str, Feelings] = {}
+_features_of: dict[str, ConditionFeatures] = {}
 
 
-def _features(wanted: Detecting, stop: Stop) -> Feelings:
+def _features(wanted: Detecting, stop: Stop) -> ConditionFeatures:
     """Return the features of each condition, kept for the last study: rehearsing them takes most of the time."""
-    from study_app.session.simulated.trial_features import feelings  # noqa: PLC0415 - the compiler: only here
+    from study_app.session.simulated.trial_features import condition_features  # noqa: PLC0415 - the compiler: only here
 
-    if wanted.depends not in _feelings:
+    if wanted.depends not in _features_of:
 
         def look(_words: str) -> None:
             if stop():
                 raise GivenUp
 
-        found = feelings(wanted.protocol, seed=SEED, progress=look)
-        _feelings.clear()
-        _feelings[wanted.depends] = found
-    return _feelings[wanted.depends]
+        found = condition_features(wanted.protocol, seed=SEED, progress=look)
+        _features_of.clear()
+        _features_of[wanted.depends] = found
+    return _features_of[wanted.depends]
