@@ -130,7 +130,7 @@ def delays(seconds: float, load: LoadName, *, tell: Callable[[str], object] = la
         for refresh_hz in rates:
             for each in loads:
                 with tempfile.TemporaryDirectory() as folder, busy_cores() if each == "gui+cpu" else nullcontext():
-                    shown.extend(_Showing(Path(folder), seconds, refresh_hz, each).hold())
+                    shown.extend(_Showing(Path(folder), seconds, refresh_hz, each).run())
                 tell(f"{shown[-1].screen}, {BESIDE[each]}")
     return Delayed(machine_here(), seconds, SIZE_PX, tuple(shown))
 
@@ -158,8 +158,8 @@ class _Showing:
         )
         self._ended = False
 
-    def hold(self) -> tuple[Shown, ...]:
-        """Hold the session and return what was shown in it."""
+    def run(self) -> tuple[Shown, ...]:
+        """Run the session and return what was shown in it."""
         rig = open_rig(self._chosen.device, study_settings(self._protocol, self._chosen.tremor()))
         schedule = self._chosen.schedule(self._protocol)
         try:

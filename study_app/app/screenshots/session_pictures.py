@@ -31,7 +31,7 @@ ANSWERS: Final = (6, 5, 6, None, 3, 7, 2, None, 1)
 def take_session(camera: Camera, protocol: Path, results: Path) -> None:
     """Take the pre-flight, every kind of page, and the cockpit of a double-blind study."""
     with PicturedSession(camera, protocol, results) as held:
-        held.hold()
+        held.take_pictures()
 
 
 def take_single_blind(camera: Camera, protocol: Path, results: Path) -> None:
@@ -81,7 +81,7 @@ class PicturedSession:
     def _page(self) -> Page | None:
         return self._bridge.participant.page
 
-    def hold(self) -> None:
+    def take_pictures(self) -> None:
         """Go through the first part and into the second, and take what is new."""
         self.begin(pictures=True)
         self.to_the_liquids()

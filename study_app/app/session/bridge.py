@@ -104,7 +104,7 @@ class SessionBridge(QObject):
         self._thread_exceptions.ended.connect(self._tell_of_thread)
         self.frames = Frames(refresh_hz, parent=self)
         self.frames.due.connect(self.draw_frame)
-        self._urgency = ThreadPriority()
+        self._thread_priority = ThreadPriority()
         self.budget = FrameBudget(
             ((self.show_tiles, TILES_S), (self.show_traces, TRACES_S), (self.show_forces, TRACES_S))
         )
@@ -153,7 +153,7 @@ class SessionBridge(QObject):
         self.uncaught.install()
         self._thread_exceptions.install()
         freeze_garbage()
-        self._urgency.hurry()
+        self._thread_priority.raise_priority()
         self.frames.start()
         self._begin()
 
@@ -366,7 +366,7 @@ class SessionBridge(QObject):
             return
         self._gone = True
         self.frames.stop()
-        self._urgency.rest()
+        self._thread_priority.restore()
         unfreeze_garbage()
         self.uncaught.remove()
         self._thread_exceptions.remove()

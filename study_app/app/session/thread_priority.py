@@ -24,7 +24,7 @@ class ThreadPriority:
     def __init__(self) -> None:
         self._before: int | None = None
 
-    def hurry(self) -> bool:
+    def raise_priority(self) -> bool:
         """Let this thread go before those of other programs; return whether the system let it."""
         if sys.platform == "win32":
             return _prefer(ABOVE_NORMAL)
@@ -42,7 +42,7 @@ class ThreadPriority:
         self._before = before
         return True
 
-    def rest(self) -> None:
+    def restore(self) -> None:
         """Let this thread be one among others again."""
         if sys.platform == "win32":
             _prefer(NORMAL)

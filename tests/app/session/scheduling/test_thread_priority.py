@@ -31,12 +31,12 @@ def kept():
 
 def test_it_hurries_and_rests(kept):
     made = ThreadPriority()
-    if not made.hurry():
+    if not made.raise_priority():
         pytest.skip("this user may not")
     assert level() == thread_priority.NICE
-    made.rest()
+    made.restore()
     assert level() == kept
-    made.rest()
+    made.restore()
     assert level() == kept
 
 
@@ -48,7 +48,7 @@ def test_who_may_not_asks_the_desktops_service(kept, monkeypatch):
 
     monkeypatch.setattr(os, "setpriority", refuse)
     monkeypatch.setattr(thread_priority, "make_high_priority", lambda *given: asked.append(given))
-    assert ThreadPriority().hurry()
+    assert ThreadPriority().raise_priority()
     assert asked == [(threading.get_native_id(), thread_priority.NICE)]
 
 
@@ -59,6 +59,6 @@ def test_where_nobody_grants_it_nothing_breaks(kept, monkeypatch):
     monkeypatch.setattr(os, "setpriority", refuse)
     monkeypatch.setattr(thread_priority, "make_high_priority", refuse)
     made = ThreadPriority()
-    assert not made.hurry()
-    made.rest()
+    assert not made.raise_priority()
+    made.restore()
     assert level() == kept
