@@ -57,7 +57,7 @@ def basset_force(
     history, tracks = liquid.history, local.history
     intervals, exponentials = rows.intervals, rows.exponentials
     if local.ticks == 0:
-        _begin(history, tracks, local.relative_mps, exponentials)
+        _reset_tracks(history, tracks, local.relative_mps, exponentials)
     _fade(history, exponentials, interval_s)
     _append(history, tracks, local.relative_mps, intervals, interval_s)
     force_n = local.inertia_n[local.inertial]
@@ -91,7 +91,7 @@ def _storing_square(parameters: Record, local: Record, tracks: Record) -> float:
 
 
 @part
-def _begin(history: Record, tracks: Record, w: Any, exponentials: Any) -> None:
+def _reset_tracks(history: Record, tracks: Record, w: Any, exponentials: Any) -> None:
     """Begin at the present velocity, as if it had always been so."""
     tracks.first = 0
     tracks.held = 0

@@ -134,7 +134,7 @@ def _merge_oldest(wake: Record, tracks: Record, cells: Any) -> None:
     oldest = cells[wake.row + tracks.first]
     cell = cells[wake.row + _wrapped(tracks.first + 1)]
     elapsed_s = cell.time_s - oldest.time_s
-    _weaken(oldest, math.exp(wake.log_decay_per_s * elapsed_s))
+    _scale_cell(oldest, math.exp(wake.log_decay_per_s * elapsed_s))
     speed_mps = oldest.speed_mps + cell.speed_mps
     share = oldest.speed_mps / speed_mps if speed_mps > 0.0 else 0.5
     apart_m2 = 0.0
@@ -156,7 +156,7 @@ def _grow(wake: Record, tracks: Record, cell: Record, x_m: float, y_m: float, z_
     """Bring the newest cell to the present, and count one more element at this place."""
     tracks.held += 1
     elapsed_s = tracks.time_s - cell.time_s
-    _weaken(cell, math.exp(wake.log_decay_per_s * elapsed_s))
+    _scale_cell(cell, math.exp(wake.log_decay_per_s * elapsed_s))
     cell.time_s = tracks.time_s
     cell.count += 1
     share = 1.0 / cell.count
@@ -191,7 +191,7 @@ def _drop_oldest(tracks: Record) -> None:
 
 
 @part
-def _weaken(cell: Record, keep: float) -> None:
+def _scale_cell(cell: Record, keep: float) -> None:
     """Multiply every element of a cell."""
     for axis in range(3):
         cell.velocity_mps[axis] *= keep

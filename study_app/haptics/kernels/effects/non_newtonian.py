@@ -84,8 +84,8 @@ def _yielding(parameters: Record, law: Any, tracks: Record, local: Record, state
     if speed_mps > 0.0:
         resistance_nspm = local.frontal * (viscous_n + beyond_n) / speed_mps
         stable_nspm = min(resistance_nspm, VISCOUS_SHARE * limit_nspm) if law.yield_n > 0.0 else resistance_nspm
-        _resist(local, state, w, stable_nspm)
-        _exceed(local, state, w, resistance_nspm - stable_nspm)
+        _add_limited_force(local, state, w, stable_nspm)
+        _add_excess_force(local, state, w, resistance_nspm - stable_nspm)
     state.growth = GROWS_LESS
     if law.yield_n == 0.0:
         return
@@ -153,17 +153,19 @@ def _viscous(law: Any, local: Record, state: Record, limit_nspm: float) -> None:
     if law.kind == KIND_CARREAU:
         force_n = _carreau(speed_mps, law.stokes_nspm, law.time_spm, law.exponent)
         state.growth = GROWS_LESS
-        _resist(local, state, w, local.frontal * _inertial_factor(law, force_n, speed_mps) * force_n / speed_mps)
+        _add_limited_force(
+            local, state, w, local.frontal * _inertial_factor(law, force_n, speed_mps) * force_n / speed_mps
+        )
         return
     force_n = _shear_thickening(speed_mps, law.stokes_nspm, law.thickened_nspm, law.onset_mps, math.inf)
     stable_n = _shear_thickening(speed_mps, law.stokes_nspm, law.thickened_nspm, law.onset_mps, limit_nspm)
     ratio = local.frontal * _inertial_factor(law, force_n, speed_mps) / speed_mps
-    _resist(local, state, w, ratio * stable_n)
-    _exceed(local, state, w, ratio * (force_n - stable_n))
+    _add_limited_force(local, state, w, ratio * stable_n)
+    _add_excess_force(local, state, w, ratio * (force_n - stable_n))
 
 
 @part
-def _resist(local: Record, state: Record, w: Any, resistance_nspm: float) -> None:
+def _add_limited_force(local: Record, state: Record, w: Any, resistance_nspm: float) -> None:
     """Add −R w to the force, as one that the slope limit holds."""
     for axis in range(3):
         force_n = -resistance_nspm * w[axis]
@@ -172,7 +174,7 @@ def _resist(local: Record, state: Record, w: Any, resistance_nspm: float) -> Non
 
 
 @part
-def _exceed(local: Record, state: Record, w: Any, resistance_nspm: float) -> None:
+def _add_excess_force(local: Record, state: Record, w: Any, resistance_nspm: float) -> None:
     """Add −R w to the force, as one that exceeds the slope limit."""
     for axis in range(3):
         local.excess_n[axis] = -resistance_nspm * w[axis]

@@ -58,16 +58,16 @@ def unsteady_drag_force(
     """
     law, tracks, w = liquid.unsteady_drag, local.unsteady_drag, local.relative_mps
     if local.ticks == 0:
-        _begin(law, tracks, w)
+        _reset_tracks(law, tracks, w)
     accelerate(tracks.acceleration_mps2, w, tracks.previous_mps, law.filter_per_s, interval_s)
     accelerate(tracks.remembered_mps2, w, tracks.previous_mps, law.history_filter_per_s, interval_s)
     copy(w, tracks.previous_mps)
     wake2 = square(tracks.wake_mps)
     u_mps = math.sqrt(square(w) + wake2)
-    _follow(law, tracks, w, u_mps, wake2, interval_s)
+    _update_wakes(law, tracks, w, u_mps, wake2, interval_s)
     force_n = local.inertia_n[local.inertial]
     local.inertial += 1
-    _remember(law, tracks, u_mps, interval_s, force_n)
+    _update_memory(law, tracks, u_mps, interval_s, force_n)
     for axis in range(3):
         inertial = law.factor_kg_rs * force_n[axis] + law.mass_kg * tracks.acceleration_mps2[axis]
         force_n[axis] = -local.share * inertial
@@ -85,7 +85,7 @@ def unsteady_drag_force(
 
 
 @part
-def _begin(law: Any, tracks: Record, w: Any) -> None:
+def _reset_tracks(law: Any, tracks: Record, w: Any) -> None:
     """Begin at the present velocity, as if it had always been so."""
     excess = _over_stokes(law.reynolds_spm * norm(w)) - 1.0
     copy(w, tracks.previous_mps)
@@ -100,7 +100,7 @@ def _begin(law: Any, tracks: Record, w: Any) -> None:
 
 
 @part
-def _follow(law: Any, tracks: Record, w: Any, u_mps: float, wake2: float, interval_s: float) -> None:
+def _update_wakes(law: Any, tracks: Record, w: Any, u_mps: float, wake2: float, interval_s: float) -> None:
     """Move y, then z and s, toward what they follow."""
     wake, far, excess = tracks.wake_mps, tracks.far_wake_mps, tracks.excess_mps
     far2 = square(far)
@@ -127,7 +127,7 @@ def _follow(law: Any, tracks: Record, w: Any, u_mps: float, wake2: float, interv
 
 
 @part
-def _remember(law: Any, tracks: Record, u_mps: float, interval_s: float, history: Any) -> None:
+def _update_memory(law: Any, tracks: Record, u_mps: float, interval_s: float, history: Any) -> None:
     """Add dw/dt to the exponentials and let them decay; set ``history`` to Σ b_i m_i and what that lacks [m/s/√s]."""
     acceleration, memory = tracks.remembered_mps2, tracks.memory_mps
     loss_per_s = MEMORY_LOSS * u_mps * law.per_m

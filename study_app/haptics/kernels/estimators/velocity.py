@@ -40,10 +40,10 @@ def estimate_velocity(parameters: Record, state: Record, window: Any, interval_s
         _ewma(parameters, state, state.lead.smoothed_mps, interval_s)
         add_lead(state, state.lead, interval_s)
     elif parameters.estimator == line.CODE:
-        _remember(parameters, state, window, interval_s)
+        _store_sample(parameters, state, window, interval_s)
         _line(parameters, state, window)
     elif parameters.estimator == foaw.CODE:
-        _remember(parameters, state, window, interval_s)
+        _store_sample(parameters, state, window, interval_s)
         _foaw(parameters, state, window)
     elif parameters.estimator == raw.CODE:
         _raw(state, interval_s)
@@ -75,7 +75,7 @@ def _raw(state: Record, interval_s: float) -> None:
 
 
 @part
-def _remember(parameters: Record, state: Record, window: Any, interval_s: float) -> None:
+def _store_sample(parameters: Record, state: Record, window: Any, interval_s: float) -> None:
     """Put the newest sample into the window, in place of the oldest once it is full, and say how old all are."""
     samples = parameters.window_samples
     state.window_newest = (state.window_newest + 1) % samples
