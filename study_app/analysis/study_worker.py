@@ -41,13 +41,13 @@ if TYPE_CHECKING:
 
 # The libraries of an evaluation are loaded where they are needed: sessions are listed before.
 
-Tell: TypeAlias = Callable[[Answer], object]
+Send: TypeAlias = Callable[[Answer], object]
 
 EVALUATION: Final = 0.7
 """The share of an evaluation in what comes after the first figures; the rest is drawing."""
 
 
-def carry_out(order: Order, tell: Tell, stop: Callable[[], bool]) -> Done:
+def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:
     """Carry out an order; ``stop`` is asked again and again whether to give up.
 
     Raises
@@ -57,9 +57,9 @@ def carry_out(order: Order, tell: Tell, stop: Callable[[], bool]) -> Done:
     """
     match order:
         case FindStudies():
-            tell(StudiesFound(tuple(_studies(order.results))))
+            send(StudiesFound(tuple(_studies(order.results))))
         case ReadStudy():
-            _read(order.folder, tell, stop)
+            _read(order.folder, send, stop)
         case LeaveOut():
             place = own_place(order.folder, order.participant)
             exclude(*place, order.session, trial=order.trial, by=order.by, reason=order.reason)
@@ -70,7 +70,7 @@ def carry_out(order: Order, tell: Tell, stop: Callable[[], bool]) -> Done:
             opened = unblind_folder(order.folder, by=order.by, reason=order.reason)
             return Done(warnings=tuple(line for site in opened.values() for line in site.left))
         case WriteTables() | WriteReport():
-            return _write(order, tell, stop)
+            return _write(order, send, stop)
     return Done()
 
 
@@ -101,34 +101,34 @@ def _changed(path: Path) -> float:
     return 0.0
 
 
-def _read(folder: Path, tell: Tell, stop: Callable[[], bool]) -> None:
+def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
     """Tell of the sessions, then of the study, then draw; once the key is open, evaluate and draw the rest."""
     from study_app.analysis.tables.study_tables import load_study  # noqa: PLC0415
 
-    tell(Progress("reading sessions", 0.0))
+    send(Progress("reading sessions", 0.0))
     opened = reveals_of(folder) if all_opened(folder) else ()
-    tell(SessionsFound(folder, tuple(participants_of(folder)), all_exclusions(folder), opened[-1] if opened else None))
+    send(SessionsFound(folder, tuple(participants_of(folder)), all_exclusions(folder), opened[-1] if opened else None))
     _go_on(stop)
-    tell(Progress("reading answers", 0.1))
+    send(Progress("reading answers", 0.1))
     study = load_study(folder)
-    tell(_study_found(study))
+    send(_study_found(study))
     _go_on(stop)
     from study_app.analysis.figures import answer_figures, captions  # noqa: PLC0415
 
     for number, block in enumerate(study.blocks):
-        tell(Progress("drawing", 0.3 + 0.7 * number / len(study.blocks)))
+        send(Progress("drawing", 0.3 + 0.7 * number / len(study.blocks)))
         if len(study.answers(block)):
             svg = answer_figures.render(study, block, "svg")
-            tell(FigureDrawn(_name(study, block), captions.title(block), captions.caption(study, block), svg))
+            send(FigureDrawn(_name(study, block), captions.title(block), captions.caption(study, block), svg))
         else:
-            tell(FigureDrawn(_name(study, block), captions.title(block), "No completed session has answers here yet."))
+            send(FigureDrawn(_name(study, block), captions.title(block), "No completed session has answers here yet."))
         _go_on(stop)
-    _draw_questions(study, tell, stop)
+    _draw_questions(study, send, stop)
     if study.revealed and study.n:
-        _evaluate(study, tell, stop)
+        _evaluate(study, send, stop)
 
 
-def _draw_questions(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
+def _draw_questions(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     """Draw the figures of questions that no block of statements holds."""
     from study_app.analysis.designs.question_measures import questions_found  # noqa: PLC0415
     from study_app.analysis.figures.question_figures import question_pictures  # noqa: PLC0415
@@ -137,7 +137,7 @@ def _draw_questions(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
     titles = {(one.where, one.item): f"{one.title}: {one.short}" for one in found}
     for picture in question_pictures(study, found, ("svg",)):
         title = titles[picture.block, picture.name.removeprefix(f"question-{picture.block}-")]
-        tell(FigureDrawn(picture.name, title, picture.caption, picture.files["svg"]))
+        send(FigureDrawn(picture.name, title, picture.caption, picture.files["svg"]))
         _go_on(stop)
 
 
@@ -177,17 +177,17 @@ def _study_found(study: Study) -> StudyFound:
     )
 
 
-def _evaluate(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
+def _evaluate(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     """Test everything, then draw again what that adds to, and what only then can be drawn."""
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
     from study_app.analysis.figures.report_figures import pictures  # noqa: PLC0415
 
-    going = partial(_going, tell, stop)
+    going = partial(_going, send, stop)
     going("testing", 0.0)
     results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share), planning=False)
     for drawn, picture in enumerate(pictures(study, results, ("svg",)), start=1):
         title = _title(study, picture.name)
-        tell(FigureDrawn(picture.name, title, picture.caption, picture.files["svg"]))
+        send(FigureDrawn(picture.name, title, picture.caption, picture.files["svg"]))
         going("drawing", EVALUATION + (1 - EVALUATION) * min(1.0, drawn / 4))
 
 
@@ -205,21 +205,21 @@ def _name(study: Study, block: Block) -> str:
     return f"{block.kind}-{block.id}" if len(study.blocks_of(block.kind)) > 1 else block.kind
 
 
-def _write(order: WriteTables | WriteReport, tell: Tell, stop: Callable[[], bool]) -> Done:
+def _write(order: WriteTables | WriteReport, send: Send, stop: Callable[[], bool]) -> Done:
     from study_app.analysis.export.export import export  # noqa: PLC0415
     from study_app.analysis.report.write_report import report  # noqa: PLC0415
 
     warnings: list[str] = []
     make = partial(export, extras=order.extras) if isinstance(order, WriteTables) else report
     written = make(
-        order.folder, order.to, progress=partial(_going, tell, stop), warn=warnings.append, failed=warnings.append
+        order.folder, order.to, progress=partial(_going, send, stop), warn=warnings.append, failed=warnings.append
     )
     return Done(written, tuple(warnings))
 
 
-def _going(tell: Tell, stop: Callable[[], bool], what: str, share: float) -> None:
+def _going(send: Send, stop: Callable[[], bool], what: str, share: float) -> None:
     _go_on(stop)
-    tell(Progress(what, share))
+    send(Progress(what, share))
 
 
 def _go_on(stop: Callable[[], bool]) -> None:

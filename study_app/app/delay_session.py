@@ -103,7 +103,7 @@ def study_of_delays(seconds: float) -> bytes:
     return _STUDY.format(conditions=conditions, seconds=seconds, names=listed).encode()
 
 
-def delays(seconds: float, load: LoadName, *, tell: Callable[[str], object] = lambda _line: None) -> Delayed:
+def delays(seconds: float, load: LoadName, *, progress: Callable[[str], object] = lambda _line: None) -> Delayed:
     """Show each delay for ``seconds`` on virtual screens, and on the real one if there is one; return what came of it.
 
     Parameters
@@ -131,7 +131,7 @@ def delays(seconds: float, load: LoadName, *, tell: Callable[[str], object] = la
             for each in loads:
                 with tempfile.TemporaryDirectory() as folder, busy_cores() if each == "gui+cpu" else nullcontext():
                     shown.extend(_Showing(Path(folder), seconds, refresh_hz, each).run())
-                tell(f"{shown[-1].screen}, {BESIDE[each]}")
+                progress(f"{shown[-1].screen}, {BESIDE[each]}")
     return Delayed(machine_here(), seconds, SIZE_PX, tuple(shown))
 
 

@@ -117,14 +117,14 @@ class MainController(QObject):
         self.devices.looked.connect(lambda _shown: self._show_machine())
         QShortcut(QKeySequence(QKeySequence.StandardKey.HelpContents), self.window, self.show_help)
         for desk in (self.machine, self.devices):
-            desk.troubled.connect(self.window.tell)
+            desk.troubled.connect(self.window.show_message)
 
     def open(self) -> None:
         """Show the window, no larger than the screen, and look at the machine once it stands."""
         place(self.window, self.window.screen(), corner=False)
         self.window.show()
         if self.machine.trouble:
-            self.window.tell("The default settings are used", f"{self.machine.trouble}.")
+            self.window.show_message("The default settings are used", f"{self.machine.trouble}.")
         elif self._follows_machine and chosen_workspace() is None:
             self._ask_for_workspace()
         QTimer.singleShot(LOOK_AFTER_MS, self.devices, self.devices.look)
@@ -141,7 +141,7 @@ class MainController(QObject):
         try:
             create_workspace(Workspace(folder.absolute()))
         except StoreError as error:
-            self.window.tell("This folder cannot be used as the workspace", f"{error}.")
+            self.window.show_message("This folder cannot be used as the workspace", f"{error}.")
             return
         self.machine.change({"workspace": str(folder.absolute())})
         self.check_computer()
@@ -353,9 +353,9 @@ class MainController(QObject):
         self.window.come_back()
         if live.error is not None:
             title = "The session did not finish" if live.began else "The session did not start"
-            self.window.tell(title, f"{live.error}.")
+            self.window.show_message(title, f"{live.error}.")
         elif live.code == BUG:
-            self.window.tell("A bug in the program stopped the session", "The terminal shows the details.")
+            self.window.show_message("A bug in the program stopped the session", "The terminal shows the details.")
 
     def _leave(self) -> None:
         if self.live is None:

@@ -208,12 +208,12 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
     if not kind.startswith("falcon"):
         raise DeviceError(f"'{name}' has no motors to calibrate: only a Falcon has motors")
     if kind != "falcon-emulated":
-        return FalconDevice(name, firmware=firmware, tell=click.echo), None
+        return FalconDevice(name, firmware=firmware, progress=click.echo), None
     if grams is None:
         raise DeviceError("an emulated Falcon cannot be pulled with a scale: use a weight with --grams")
     # A serial number of its own: no rehearsal shall find this calibration.
     emulator = Emulator(running=firmware is None, serial="EMULATED-WEIGHED")
-    return EmulatedFalcon(firmware=firmware, tell=click.echo, emulator=emulator), emulator
+    return EmulatedFalcon(firmware=firmware, progress=click.echo, emulator=emulator), emulator
 
 
 def _calibrated(found: Calibration, notes: Notes) -> list[str]:
@@ -321,21 +321,21 @@ def emulate_falcon(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: server.stop())
     click.echo(f"An emulated Falcon at {socket}; press Ctrl-C to end it.")
-    server.serve(_teller(emulator) if sys.stdout.isatty() else None)
+    server.serve(_state_reporter(emulator) if sys.stdout.isatty() else None)
 
 
-def _teller(emulator: Emulator) -> Callable[[], None]:
+def _state_reporter(emulator: Emulator) -> Callable[[], None]:
     """Return what prints the state when it has changed."""
     printed = ""
 
-    def tell() -> None:
+    def report_state() -> None:
         nonlocal printed
         state = state_of(emulator)
         if state != printed:
             printed = state
             click.echo(state)
 
-    return tell
+    return report_state
 
 
 def state_of(emulator: Emulator) -> str:

@@ -20,4 +20,4 @@ def screenshots(to: Path, only: str | None) -> None:
     from study_app.store.output_files import make_folder
 
     make_folder(to)
-    take(to, only=only, tell=click.echo)
+    take(to, only=only, progress=click.echo)

@@ -160,7 +160,7 @@ def run(
         results=results,
         pilot=pilot,
         recordings=not no_recordings,
-        tell=click.echo,
+        progress=click.echo,
     )
     click.get_current_context().exit(code)
 
@@ -250,6 +250,6 @@ def resume(
         operator=operator,
         windowed=windowed,
         screen=screen,
-        tell=click.echo,
+        progress=click.echo,
     )
     click.get_current_context().exit(code)

@@ -16,7 +16,7 @@ from typing import NoReturn, TypeAlias
 from study_app.devices.doctor_report import Report
 from study_app.devices.registry import doctor_of
 from study_app.workers.client import WorkerClient
-from study_app.workers.server import Stop, Tell
+from study_app.workers.server import Send, Stop
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ def start_examination(
     return client
 
 
-def carry_out(examination: Examination, tell: Tell, _stop: Stop) -> Report:
+def carry_out(examination: Examination, send: Send, _stop: Stop) -> Report:
     """Examine a device, and return what was found.
 
     Raises
@@ -58,7 +58,7 @@ def carry_out(examination: Examination, tell: Tell, _stop: Stop) -> Report:
     """
     signal.signal(signal.SIGTERM, _leave)
     name, options, faults = examination.name, examination.options, examination.faults
-    return doctor_of(name).examine(name, options=options, faults=faults, progress=tell)
+    return doctor_of(name).examine(name, options=options, faults=faults, progress=send)
 
 
 def _leave(_number: int, _frame: object) -> NoReturn:

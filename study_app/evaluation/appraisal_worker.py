@@ -14,7 +14,7 @@ from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.trials.tasks.stroke import Stroke
 from study_app.workers.client import WorkerClient
-from study_app.workers.server import Stop, Tell
+from study_app.workers.server import Send, Stop
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ def start_appraisal_worker() -> AppraisalClient:
     return WorkerClient("study_app.evaluation.appraisal_worker:appraise", name="appraisal", background=True)
 
 
-def appraise(question: Question, tell: Tell, stop: Stop) -> Errors | None:
+def appraise(question: Question, send: Send, stop: Stop) -> Errors | None:
     """Tell the `Costs` of a scene, then return its `Errors`; None where another question waits.
 
     Raises
@@ -46,7 +46,7 @@ def appraise(question: Question, tell: Tell, stop: Stop) -> Errors | None:
         return None
     from study_app.evaluation.appraisal_measurement import costs, errors  # noqa: PLC0415 - the compiler: only in that process
 
-    tell(costs(question.scene))
+    send(costs(question.scene))
     if stop():
         return None
     stroke = question.stroke

@@ -17,13 +17,13 @@ from study_app.errors import StudyError, naming_the_extra
 from study_app.workers.messages import Refused, Stopped
 from study_app.workers.spawning import ignore_interrupts
 
-Tell: TypeAlias = Callable[[Any], object]
+Send: TypeAlias = Callable[[Any], object]
 """Sends an answer before the last one."""
 
 Stop: TypeAlias = Callable[[], bool]
 """Whether to give up: that was asked for, another order waits, or the client is gone."""
 
-Task: TypeAlias = Callable[[Any, Tell, Stop], object]
+Task: TypeAlias = Callable[[Any, Send, Stop], object]
 """Carries out an order; what it returns is its last answer. A `StudyError` is answered by `Refused`."""
 
 _STOP: Final = None
@@ -57,13 +57,13 @@ def serve(orders: Connection, answers: Connection, task: str, *, background: boo
             try:
                 with naming_the_extra():
                     carry_out: Task = resolve_name(task)
-                    last = carry_out(order, partial(_tell, answers, number), lambda: not waiting.empty())
+                    last = carry_out(order, partial(_send, answers, number), lambda: not waiting.empty())
             except StudyError as error:
                 last = Refused(str(error), stopped=isinstance(error, Stopped))
             answers.send((number, last, True))
 
 
-def _tell(answers: Connection, number: int, answer: object) -> None:
+def _send(answers: Connection, number: int, answer: object) -> None:
     answers.send((number, answer, False))
 
 

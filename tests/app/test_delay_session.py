@@ -179,7 +179,7 @@ def test_a_session_of_delays_is_held_and_its_recordings_are_read(qapp, monkeypat
     monkeypatch.setattr(held, "DELAYS_S", (0.0, 0.2))
     monkeypatch.setattr(held, "VIRTUAL_HZ", (60.0,))
     lines = []
-    found = held.delays(0.5, "gui", tell=lines.append)
+    found = held.delays(0.5, "gui", progress=lines.append)
     assert lines == ["virtual, 60 Hz, tank alone", "virtual, 60 Hz, with the cockpit"]
     assert found.loads == ("none", "gui")
     for load in found.loads:

@@ -23,7 +23,7 @@ def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, 
     monkeypatch.setattr(session_pictures, "TRACED_MS", 500)
     monkeypatch.setattr("study_app.session.start.MEASURED_S", 0.1)
     here, told = Path.cwd(), []
-    taken = screenshots(tmp_path, only="single-blind", tell=told.append)
+    taken = screenshots(tmp_path, only="single-blind", progress=told.append)
     assert [path.name for path in taken][-3:] == [
         "cockpit-single-blind-dark.png",
         "cockpit-single-blind-light.png",
@@ -52,7 +52,7 @@ def test_a_session_that_cannot_be_taken_is_let_go_of(qapp, tmp_path, monkeypatch
     monkeypatch.setattr(session_pictures.PicturedSession, "take_cockpit", fails)
     monkeypatch.setattr("study_app.session.start.MEASURED_S", 0.1)
     with pytest.raises(StudyError, match="no picture"):
-        screenshots(tmp_path, only="single-blind", tell=lambda _line: None)
+        screenshots(tmp_path, only="single-blind", progress=lambda _line: None)
     assert not [window for window in QApplication.topLevelWidgets() if window.isVisible()]
     assert not [thread for thread in threading.enumerate() if thread.name == "servo"]
 

@@ -118,7 +118,7 @@ class TestDoctorOverASocket:
 
     def test_one_that_answers_is_homed_and_turned(self, tmp_path):
         with self.serving(tmp_path):
-            examined = examine(f"falcon-socket:{tmp_path / 'falcon'}", tell=str, seconds=0.25)
+            examined = examine(f"falcon-socket:{tmp_path / 'falcon'}", progress=str, seconds=0.25)
         assert examined.facts.program == "running"
         assert examined.facts.homed == 0b111
         assert examined.facts.replies  # how fast they come is this machine's affair

@@ -97,7 +97,7 @@ def test_nothing_seen_written_or_logged_tells_a_condition(
         seed=3,
         operator="AK",
         results=results,
-        tell=told.append,
+        progress=told.append,
     )
     person.leave()
     assert code == 0

@@ -101,7 +101,7 @@ def test_nothing_seen_written_or_logged_tells_a_level(
         seed=3,
         operator="AK",
         results=tmp_path / "results",
-        tell=told.append,
+        progress=told.append,
     )
     person.leave()
     assert code == 0

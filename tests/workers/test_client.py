@@ -22,14 +22,14 @@ from study_app.errors import StudyError
 from study_app.workers import client as clients
 from study_app.workers.client import WorkerClient
 from study_app.workers.messages import Crashed, Refused, Stopped
-from study_app.workers.server import Stop, Tell
+from study_app.workers.server import Send, Stop
 
 SOON_S = 60.0
 
 
-def carry_out(order: str, tell: Tell, stop: Stop) -> object:
+def carry_out(order: str, send: Send, stop: Stop) -> object:
     """Do what an order says."""
-    tell(f"{order} begun")
+    send(f"{order} begun")
     match order:
         case "refuse":
             raise StudyError("it cannot be done")
@@ -43,7 +43,7 @@ def carry_out(order: str, tell: Tell, stop: Stop) -> object:
             raise Stopped("given up")
         case "ignore":
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
-            tell("deaf")
+            send("deaf")
             threading.Event().wait()
         case "loaded":
             return sorted({"PySide6", "numba", "pandas"} & sys.modules.keys())

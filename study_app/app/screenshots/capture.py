@@ -27,12 +27,12 @@ class Camera:
     ----------
     to
         The folder; it must exist.
-    tell
+    progress
         Is given a line for every picture.
     """
 
-    def __init__(self, to: Path, tell: Callable[[str], object]) -> None:
-        self._to, self._tell = to, tell
+    def __init__(self, to: Path, progress: Callable[[str], object]) -> None:
+        self._to, self._progress = to, progress
         self.taken: list[Path] = []
 
     def until(self, found: Callable[[], T | None], what: str) -> T:
@@ -74,7 +74,7 @@ class Camera:
         path = self._to / f"{name}.png"
         write_file(path, bytes(held.data().data()))
         self.taken.append(path)
-        self._tell(str(path))
+        self._progress(str(path))
 
     @staticmethod
     def _turn() -> None:

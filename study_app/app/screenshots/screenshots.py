@@ -25,14 +25,14 @@ from study_app.workspace import FOLDER_NAME, WORKSPACE_VARIABLE
 GROUPS: Final = ("places", "session", "single-blind")
 
 
-def screenshots(to: Path, *, only: str | None = None, tell: Callable[[str], object] = print) -> tuple[Path, ...]:
+def screenshots(to: Path, *, only: str | None = None, progress: Callable[[str], object] = print) -> tuple[Path, ...]:
     """Take pictures of every window in both themes into the folder ``to``; return the files.
 
     Parameters
     ----------
     to : must exist
     only : one of `GROUPS`, by default all
-    tell : is given a line for every picture
+    progress : is given a line for every picture
 
     Raises
     ------
@@ -43,7 +43,7 @@ def screenshots(to: Path, *, only: str | None = None, tell: Callable[[str], obje
     """
     qInstallMessageHandler(_pass_on)
     application_here()
-    camera = Camera(to.resolve(), tell)
+    camera = Camera(to.resolve(), progress)
     with tempfile.TemporaryDirectory(prefix="liquid-study-") as held, _at_home_in(Path(held)), collecting_here():
         if only in (None, "places"):
             results = rehearsed(Path(FOLDER_NAME))

@@ -212,7 +212,7 @@ class SessionBridge(QObject):
     @guarded_session_slot
     def _tell_of_thread(self, what: str) -> None:
         """Tell the operator, and note it: what that thread did is missing from here on."""
-        self.operator.tell("A part of the program ended", f"{what}. All answers are kept.")
+        self.operator.show_message("A part of the program ended", f"{what}. All answers are kept.")
         self.requests.record_note(f"a thread of the program ended: {what}")
 
     def _now(self) -> float:

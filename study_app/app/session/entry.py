@@ -36,7 +36,7 @@ def run(
     pilot: bool = False,
     recordings: bool = True,
     row_of: str | None = None,
-    tell: Callable[[str], object] | None = None,
+    progress: Callable[[str], object] | None = None,
 ) -> int:
     """Run a session without dialogs; return the exit code when its windows are closed.
 
@@ -52,7 +52,7 @@ def run(
     pilot : to try it out: in a window with a frame, apart from the data and marked
     row_of : the participant who is replaced, whose rows of squares the session takes; default: the participant's own
     recordings : whether every tick of the servo and every frame of a trial is kept
-    tell : is given the lines of the pre-flight, before the first page
+    progress : is given the lines of the pre-flight, before the first page
 
     Raises
     ------
@@ -84,7 +84,7 @@ def run(
     if Path(protocol).is_file():
         with contextlib.suppress(StoreError):  # a session does not depend on it
             remember_protocol(Path(protocol))
-    return run_session(chosen, tell)
+    return run_session(chosen, progress)
 
 
 def resume(
@@ -96,7 +96,7 @@ def resume(
     operator: str = "",
     windowed: bool = False,
     screen: int | None = None,
-    tell: Callable[[str], object] | None = None,
+    progress: Callable[[str], object] | None = None,
 ) -> int:
     """Go on with a session whose program was ended; return the exit code when its windows are closed.
 
@@ -106,7 +106,7 @@ def resume(
     ----------
     protocol : file or name of its protocol; default: looked for among those at hand
     device : default: the one it began with
-    device_options, operator, windowed, screen, tell : as for ``run``
+    device_options, operator, windowed, screen, progress : as for ``run``
 
     Raises
     ------
@@ -131,4 +131,4 @@ def resume(
         device_options=device_options,
     )
     check(chosen, chosen.read_protocol())
-    return run_session(chosen, tell)
+    return run_session(chosen, progress)

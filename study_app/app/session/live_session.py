@@ -56,10 +56,10 @@ NOT_EXAMINED = (
 )
 
 
-def run_session(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
+def run_session(chosen: NewSession, progress: Callable[[str], object] | None) -> int:
     """Open a session's windows and return when they are closed."""
     application_here()
-    live = LiveSession(chosen, LIGHT, tell)
+    live = LiveSession(chosen, LIGHT, progress)
     loop = QEventLoop()
     live.over.connect(loop.quit)
     with collecting_here(), ended_from_outside(live.end_by_signal):
@@ -91,11 +91,11 @@ class LiveSession(QObject):
     _compiled = Signal(float)
 
     def __init__(
-        self, chosen: NewSession, theme: Theme, tell: Callable[[str], object] | None = None, *, asks: bool = False
+        self, chosen: NewSession, theme: Theme, progress: Callable[[str], object] | None = None, *, asks: bool = False
     ) -> None:
         super().__init__()
         self.chosen = chosen
-        self._tell = tell
+        self._progress = progress
         self._asks = asks
         self.preflight: Preflight | None = None
         self.theme = theme
@@ -123,8 +123,8 @@ class LiveSession(QObject):
         self._go_on(self._open)
 
     def _open(self) -> None:
-        if self._unread and self._tell is not None:
-            self._tell(self._unread)
+        if self._unread and self._progress is not None:
+            self._progress(self._unread)
         self.note = OpeningWindow(f"Preparing {Path(self.chosen.source).stem}", self.chosen.who, theme=self.theme)
         self.note.cancelled.connect(self.cancel)
         place(self.note, self.note.screen(), corner=False)
@@ -294,8 +294,8 @@ class LiveSession(QObject):
         """Tell what the device asks for while it is being opened."""
         if self.settings.sound:
             QApplication.beep()
-        if self._tell is not None:
-            self._tell(line)
+        if self._progress is not None:
+            self._progress(line)
         if self.note is not None:
             self.note.say(line)
         elif self.bridge is not None:
@@ -304,8 +304,8 @@ class LiveSession(QObject):
     def _pass_checks(self, found: tuple[Check, ...]) -> None:
         """Tell what the pre-flight found; refuse the session if it must not begin."""
         for one in found:
-            if self._tell is not None:
-                self._tell(str(one))
+            if self._progress is not None:
+                self._progress(str(one))
         if reason := refused(found):
             raise SessionError(f"the session did not start: {reason}")
 
@@ -313,11 +313,11 @@ class LiveSession(QObject):
         """Hear that the windows are gone; keep what broke, for whoever asked for the session."""
         assert self.bridge is not None  # noqa: S101 - it has just spoken
         self.theme = self.bridge.operator.theme
-        if self._tell is not None and (proof := self.bridge.parts.journal.fingerprint):
-            self._tell(f"fingerprint of the session, also in the study's fingerprints.txt: {proof}")
-        if self._tell is not None and self._store is not None:
+        if self._progress is not None and (proof := self.bridge.parts.journal.fingerprint):
+            self._progress(f"fingerprint of the session, also in the study's fingerprints.txt: {proof}")
+        if self._progress is not None and self._store is not None:
             status, folder = self.bridge.parts.journal.progress.ended, self._store.folder.path
-            self._tell(f"session {status}: {folder}" if status else f"session not finished: {folder}")
+            self._progress(f"session {status}: {folder}" if status else f"session not finished: {folder}")
         trouble = self.bridge.trouble or self.bridge.runner.stalled or self.bridge.parts.journal.progress.broke
         if trouble and isinstance(self.bridge.failure, StudyError | None):
             self.error = StudyError(f"the session was stopped: {trouble}; all answers so far are on disk")

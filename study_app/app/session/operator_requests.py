@@ -103,7 +103,7 @@ class OperatorRequests(QObject):
         try:
             self._parts.exclude(trial if isinstance(trial, int) else None, reason)
         except StudyError as error:
-            self._operator.tell("It was not excluded", f"{error}.")
+            self._operator.show_message("It was not excluded", f"{error}.")
         else:
             what = f"trial {trial}" if isinstance(trial, int) else "the session"
             self.record_note(f"excluded from the analysis: {what}: {reason}")

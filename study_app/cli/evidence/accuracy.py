@@ -61,7 +61,7 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
         make_folder(to)
     named = "stirring" if path == DEFAULT_PATH else path
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
-        found = measure(numerical, physical, motion, named=named, notes=notes, tell=show)
+        found = measure(numerical, physical, motion, named=named, notes=notes, progress=show)
     if to is None:
         click.echo(markdown(found), nl=False)
         return

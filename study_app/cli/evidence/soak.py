@@ -54,7 +54,7 @@ def soak(
         found = under_load(
             load,
             windows_thread(load) if load != "none" else None,
-            lambda: soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, tell=click.echo),
+            lambda: soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, progress=click.echo),
         )
     finally:
         for number, handler in before.items():

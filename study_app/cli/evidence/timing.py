@@ -105,7 +105,7 @@ def timing(
     if to is not None:
         make_folder(to)
     with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
-        found = time_loops(seconds, load, windows_thread(load), spin_us=spin_us, ending=ending, tell=show)
+        found = time_loops(seconds, load, windows_thread(load), spin_us=spin_us, ending=ending, progress=show)
     click.echo(text(found), nl=False)
     for written in write(found, to) if to is not None else ():
         click.echo(written)
@@ -123,7 +123,7 @@ def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
     from study_app.app.delay_session import delays
 
     with progress(partial(click.echo, err=True)) as show:
-        found = delays(seconds, load, tell=show)
+        found = delays(seconds, load, progress=show)
     click.echo(text(found), nl=False)
     for written in write(found, to) if to is not None else ():
         click.echo(written)
@@ -141,7 +141,7 @@ def compare_devices(seconds: float, load: LoadName, to: Path | None) -> None:
         found = under_load(
             load,
             windows_thread(load) if load != "none" else None,
-            lambda: time_devices(seconds, emulated_devices(), ending=ending, tell=show),
+            lambda: time_devices(seconds, emulated_devices(), ending=ending, progress=show),
         )
     print_and_keep(text(found), to, "devices.txt")
     if any(one.missed for one in found):
@@ -167,8 +167,8 @@ def measure_streams(seconds: float, load: LoadName, to: Path | None) -> None:
             load,
             windows,
             lambda: (
-                stream(seconds, ending=ending, tell=show),
-                compare(min(seconds, MOST_COMPARED_S), ending=ending, tell=show),
+                stream(seconds, ending=ending, progress=show),
+                compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show),
             ),
         )
     print_and_keep(stream_text(found, ratios), to, "streams.txt")
@@ -188,7 +188,7 @@ def measure_triggers(port: str, seconds: float, load: LoadName, to: Path | None)
         make_folder(to)
     windows = windows_thread(load) if load != "none" else None
     with ending_by_signal() as ending, progress(partial(click.echo, err=True)) as show:
-        found = under_load(load, windows, lambda: measure(port, seconds, ending=ending, tell=show))
+        found = under_load(load, windows, lambda: measure(port, seconds, ending=ending, progress=show))
     print_and_keep(trigger_text(found), to, "triggers.txt")
     if found.wrong:
         click.get_current_context().exit(EXIT_FOUND)

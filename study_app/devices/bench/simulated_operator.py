@@ -9,7 +9,7 @@ from study_app.devices.bench.measurements import GRAVITY_MPS2
 from study_app.devices.bench.procedure import Ask
 
 
-def asks_hand(device: Any, tell: Callable[[str], object]) -> Ask:
+def asks_hand(device: Any, progress: Callable[[str], object]) -> Ask:
     """Return what asks the hand of a device that moves by itself: it lets go, or is the scale.
 
     The hand is the device's ``hand``, or the device itself: with ``held`` and the motors' ``force_n``.
@@ -18,7 +18,7 @@ def asks_hand(device: Any, tell: Callable[[str], object]) -> Ask:
     ----------
     device : Device
         A simulated one.
-    tell : callable
+    progress : callable
         Is given what is asked for.
     """
     hand = getattr(device, "hand", device)
@@ -26,7 +26,7 @@ def asks_hand(device: Any, tell: Callable[[str], object]) -> Ask:
     def ask(kind: str, words: str) -> Callable[[], str | None]:
         if kind in ("let-go", "scale"):
             hand.held = kind == "scale"
-            tell(words)
+            progress(words)
         if kind == "scale":
             hand.reach_to(0.0, 0.0, 0.0)
         if kind == "damping":

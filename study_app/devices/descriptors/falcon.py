@@ -39,7 +39,7 @@ def _open_bridge(bridge: str, request: OpenRequest) -> Device:
     falcon = FalconDevice(
         bridge,
         firmware=request.options.get("firmware"),
-        tell=request.progress,
+        progress=request.progress,
         cancelled=request.cancelled,
         **request.limits,
     )
@@ -60,7 +60,7 @@ def _open_emulated(request: OpenRequest) -> Device:
     falcon = EmulatedFalcon(
         request.random,
         firmware=request.options.get("firmware"),
-        tell=request.progress,
+        progress=request.progress,
         cancelled=request.cancelled,
         **request.limits,
     )

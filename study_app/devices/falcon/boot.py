@@ -136,7 +136,7 @@ def _round_trip_s(transport: Transport) -> float:
 
 
 def boot(
-    transport: Transport, firmware: bytes, *, attempts: int = ATTEMPTS, tell: Callable[[str], object] | None = None
+    transport: Transport, firmware: bytes, *, attempts: int = ATTEMPTS, progress: Callable[[str], object] | None = None
 ) -> Firmware:
     """Load ``firmware`` and see it run; return what it is.
 
@@ -145,7 +145,7 @@ def boot(
     transport : the Falcon's bridge; each attempt but the first opens it anew
     firmware : the bytes of its file
     attempts : how many there are at most
-    tell : is given a line about each attempt that failed
+    progress : is given a line about each attempt that failed
 
     Raises
     ------
@@ -161,8 +161,8 @@ def boot(
         except _Ended as ended:
             if attempt == attempts:
                 raise BootFailure(ended.step, attempt, ended.reason, silent=ended.silent) from None
-            if tell is not None:
-                tell(f"Loading the firmware, attempt {attempt} of {attempts}: {ended.reason}; trying again.")
+            if progress is not None:
+                progress(f"Loading the firmware, attempt {attempt} of {attempts}: {ended.reason}; trying again.")
             transport.reopen()
             transport.pause(_BETWEEN_ATTEMPTS_S)
         else:

@@ -44,7 +44,7 @@ class FalconDevice(Device):
     workspace_m : half extents of where the grip shall reach [m]
     force_limit_n : the greatest force it may be asked for [N]
     geometry : published measures, where a calibration names no others
-    tell : is given what to do while it is opened, a line at a time
+    progress : is given what to do while it is opened, a line at a time
     cancelled : is asked while it is homed whether to give up
     patience_s : how long homing may take [s]
     """
@@ -60,7 +60,7 @@ class FalconDevice(Device):
         workspace_m: tuple[float, float, float] = WORKSPACE_M,
         force_limit_n: float = FORCE_LIMIT_N,
         geometry: str = DEFAULT_GEOMETRY,
-        tell: Callable[[str], object] | None = None,
+        progress: Callable[[str], object] | None = None,
         cancelled: Callable[[], bool] | None = None,
         patience_s: float = PATIENCE_S,
     ) -> None:
@@ -70,7 +70,7 @@ class FalconDevice(Device):
         self.force_limit_n = force_limit_n
         self._firmware = firmware
         self._published = self._geometry = geometry_named(geometry)
-        self._tell = tell if tell is not None else _say_nothing
+        self._progress = progress if progress is not None else _say_nothing
         self._cancelled = cancelled
         self._patience_s = patience_s
         self.transport: Transport | None = None
@@ -219,8 +219,8 @@ class FalconDevice(Device):
             ) from error
         found = check(program)
         unknown = f"SHA-256 {found.sha256[:16]}…, which is none of those that are known to work"
-        self._tell(f"Loading the Falcon's firmware, {found.name or unknown}.")
-        return boot.boot(transport, program, tell=self._tell).sha256
+        self._progress(f"Loading the Falcon's firmware, {found.name or unknown}.")
+        return boot.boot(transport, program, progress=self._progress).sha256
 
     def _hasten(self, transport: Transport) -> dict[str, Any]:
         """Measure the round trip with the bridge's event character and without, and keep the quicker way."""
@@ -249,7 +249,7 @@ class FalconDevice(Device):
         mechanism = self.falcon.mechanism.copy()
         self.memory[:] = new_exchange(transport.calls(), mechanism, self._geometry)
         self.falcon.unguarded = int(self._guard_died)
-        home(self.falcon, self._tick, transport.now_s, self._tell, patience_s=self._patience_s)
+        home(self.falcon, self._tick, transport.now_s, self._progress, patience_s=self._patience_s)
         self._begin_anew()
 
     def _lose_guard(self) -> None:

@@ -30,7 +30,7 @@ class EmulatedFalcon(FalconDevice):
     firmware : file to load into it; without one its program runs already
     workspace_m : half extents of where the grip shall reach, and can be sent [m]
     force_limit_n : the greatest force it may be asked for [N]
-    tell : is given what to do while it is opened
+    progress : is given what to do while it is opened
     emulator : another than a new one
     options : of ``FalconDevice``
     """
@@ -44,7 +44,7 @@ class EmulatedFalcon(FalconDevice):
         firmware: str | Path | None = None,
         workspace_m: tuple[float, float, float] = WORKSPACE_M,
         force_limit_n: float = FORCE_LIMIT_N,
-        tell: Callable[[str], object] | None = None,
+        progress: Callable[[str], object] | None = None,
         emulator: Emulator | None = None,
         **options: Any,
     ) -> None:
@@ -53,7 +53,7 @@ class EmulatedFalcon(FalconDevice):
             firmware=firmware,
             workspace_m=workspace_m,
             force_limit_n=force_limit_n,
-            tell=tell,
+            progress=progress,
             **options,
         )
         self.hand = emulator if emulator is not None else new_emulator(random, firmware, workspace_m)

@@ -42,7 +42,7 @@ def home(
     falcon: Any,
     tick: Callable[[], None],
     now_s: Callable[[], float],
-    tell: Callable[[str], object],
+    progress: Callable[[str], object],
     *,
     patience_s: float = PATIENCE_S,
 ) -> None:
@@ -53,7 +53,7 @@ def home(
     falcon : record of ``exchange.FALCON``
     tick : takes one tick of it, and lets a millisecond pass
     now_s : the time [s]
-    tell : is given what to do, a line at a time
+    progress : is given what to do, a line at a time
 
     Raises
     ------
@@ -64,20 +64,20 @@ def home(
     advised_s = began_s
     lowest, highest = [0] * 3, [0] * 3
     announced = False
-    tell(STROKES)
+    progress(STROKES)
     while not falcon.pulled_out:
         tick()
         _follow(falcon, lowest, highest)
         if falcon.homed and not announced:
             announced = True
-            tell(PULL_OUT)
+            progress(PULL_OUT)
         kind = _trouble(falcon, lowest, highest)
         if now_s() - began_s > patience_s:
             raise NotHomed(kind)
         if now_s() - advised_s > patience_s / ADVICES:
             advised_s = now_s()
-            tell(f"Still homing: {sentence(_SEEN[kind])}.")
-    tell(READY)
+            progress(f"Still homing: {sentence(_SEEN[kind])}.")
+    progress(READY)
 
 
 def _follow(falcon: Any, lowest: list[int], highest: list[int]) -> None:

@@ -96,7 +96,7 @@ class MainWindow(QMainWindow):
         """Return a place, made on first use."""
         if name not in self._places:
             made = self._makers[name]()
-            made.message.connect(self.tell)
+            made.message.connect(self.show_message)
             made.go_asked.connect(self.go)
             self._places[name] = made
             self.stack.addWidget(made)
@@ -154,7 +154,7 @@ class MainWindow(QMainWindow):
             self._had_keyboard.setFocus()
         self._now().enter()
 
-    def tell(self, title: str, sentence: str) -> None:
+    def show_message(self, title: str, sentence: str) -> None:
         """Say what went wrong, with one button."""
         notice = Notice(self, self.theme, title, sentence)
         notice.finished.connect(notice.deleteLater)

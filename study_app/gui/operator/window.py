@@ -194,7 +194,7 @@ class OperatorWindow(QMainWindow):
         question.accepted.connect(lambda: self.exclude_asked.emit(question.trial, question.reason.text().strip()))
         self._open(question)
 
-    def tell(self, title: str, sentence: str) -> None:
+    def show_message(self, title: str, sentence: str) -> None:
         """Say something in one sentence, with one button."""
         notice = Notice(self, self.theme, title, sentence)
         notice.finished.connect(notice.deleteLater)

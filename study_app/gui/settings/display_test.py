@@ -86,7 +86,7 @@ class DisplayTest(QWidget):
         self.frames.due.connect(self.frame)
         self.report_timer = QTimer(self)
         self.report_timer.setInterval(REPORT_MS)
-        self.report_timer.timeout.connect(self.tell)
+        self.report_timer.timeout.connect(self.show_figures)
 
     def _lay_out(self, screen_words: str) -> None:
         titles = QVBoxLayout()
@@ -190,7 +190,7 @@ class DisplayTest(QWidget):
         self._unpainted = True
         self.update(self.patch_area())
 
-    def tell(self) -> None:
+    def show_figures(self) -> None:
         """Show what the frames come to."""
         for value, words in zip(self.values, figures_words(self.times.figures(), self.times.refresh_hz), strict=True):
             value.setText(words)

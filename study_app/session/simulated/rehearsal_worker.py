@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final, TypeAlias
 
 from study_app.workers.client import WorkerClient
-from study_app.workers.server import Stop, Tell
+from study_app.workers.server import Send, Stop
 
 TASK: Final = "study_app.session.simulated.rehearsal_worker:carry_out"
 
@@ -26,10 +26,10 @@ RehearsalClient: TypeAlias = WorkerClient[RehearsalOrder, str | Path]
 """Its answers are a line for each participant, then the study folder."""
 
 
-def carry_out(order: RehearsalOrder, tell: Tell, _stop: Stop) -> Path:
+def carry_out(order: RehearsalOrder, send: Send, _stop: Stop) -> Path:
     """Rehearse, and return the study folder (see `study_app.session.simulated.rehearsal.rehearse`)."""
     from study_app.session.simulated.rehearsal import rehearse  # noqa: PLC0415 - the compiler: only in that process
 
     return rehearse(
-        order.protocol, participants=order.participants, seed=order.seed, results=order.results, progress=tell
+        order.protocol, participants=order.participants, seed=order.seed, results=order.results, progress=send
     )

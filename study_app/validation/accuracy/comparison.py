@@ -97,7 +97,7 @@ def accuracy(
     repeats: int = REPEATS,
     batches: int = BATCHES,
     allowance_s: float = ALLOWANCE_S,
-    tell: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Accuracy:
     """Measure the ladder of one scene against its definition, and that of another against physics.
 
@@ -125,14 +125,14 @@ def accuracy(
             raise StudyError(
                 f"along {named} {scene.liquids[0].id} exerts no force: there is no share of it to be wrong by"
             )
-        measured += _rows("numerical", scene, rungs, choice, (truth,), tell)
+        measured += _rows("numerical", scene, rungs, choice, (truth,), progress)
         found.append(truth)
     if physical is not None:
         rungs, choice = candidate_sets.physical(physical)
         real = _physical_truths(rungs[0].scene, said)
-        measured += _rows("physical", physical, rungs, choice, real, tell)
+        measured += _rows("physical", physical, rungs, choice, real, progress)
         found += real
-    tell("timing")
+    progress("timing")
     times = race(tuple(dict.fromkeys(row.rung for row in measured)), motion, repeats, batches, allowance_s)
     rows = tuple(replace(row, time=times[row.rung]) for row in measured)
     return Accuracy(_with_fronts(rows), tuple(found), tuple(said), machine(), named)
@@ -155,12 +155,12 @@ def _rows(
     rungs: Sequence[Rung],
     choice: Rung,
     against: Sequence[Truth],
-    tell: Callable[[str], None],
+    progress: Callable[[str], None],
 ) -> list[Row]:
     unknown = Time(math.nan, math.nan, 0)
     rows = []
     for rung in rungs:
-        tell(f"{kind}: {rung.name}")
+        progress(f"{kind}: {rung.name}")
         for truth in against:
             error = error_of(rung.forces_against(truth), truth)
             chosen = rung is choice

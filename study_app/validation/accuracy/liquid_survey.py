@@ -79,14 +79,14 @@ class Surveyed:
         return self.speed_mps / self.mps_per_reynolds
 
 
-def survey(scenes: Mapping[str, Scene], tell: Callable[[str], None] = lambda _: None) -> tuple[Surveyed, ...]:
+def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda _: None) -> tuple[Surveyed, ...]:
     """Measure every liquid with a viscosity of a file, by name; thicker ones first."""
     found = []
     for name, scene in scenes.items():
         liquid = scene.liquids[0]
         if liquid.viscosity_pa_s is None or liquid.drag.law == "linear":
             continue
-        tell(name)
+        progress(name)
         found.append(_surveyed(name, scene, liquid, liquid.viscosity_pa_s))
     return tuple(sorted(found, key=lambda it: it.reynolds))
 

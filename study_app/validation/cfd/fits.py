@@ -84,11 +84,11 @@ class Fitted:
     warnings: tuple[str, ...] = ()
 
 
-def fit_all(tables: Sequence[Table], tell: Callable[[str], None] = lambda _: None) -> tuple[Fitted, ...]:
+def fit_all(tables: Sequence[Table], progress: Callable[[str], None] = lambda _: None) -> tuple[Fitted, ...]:
     """Return every model fitted to every table, each tried on the others of the same liquid."""
     found = []
     for table in tables:
-        tell(f"fitting {len(MODELS)} models to {table.case.liquid_id}, {table.notes['title']} ...")
+        progress(f"fitting {len(MODELS)} models to {table.case.liquid_id}, {table.notes['title']} ...")
         others = [it for it in tables if it.case.liquid_id == table.case.liquid_id and it is not table]
         for model in MODELS:
             values, warnings = fit_one(model, table)

@@ -90,7 +90,7 @@ class _Solved:
 
 
 def refit(
-    tables: Sequence[Table], held_out: Sequence[Table] = (), tell: Callable[[str], None] = lambda _: None
+    tables: Sequence[Table], held_out: Sequence[Table] = (), progress: Callable[[str], None] = lambda _: None
 ) -> Refit:
     """Return the constants by all tables, each of equal weight, and each table's errors when it is left out.
 
@@ -104,11 +104,11 @@ def refit(
     if len(tables) < 2:
         raise StudyError(f"{len(tables)} solved motion(s): a fit that leaves one out needs at least two")
     solved = [_Solved(it) for it in tables]
-    tell(f"fitting the constants to {len(tables)} motions ...")
+    progress(f"fitting the constants to {len(tables)} motions ...")
     constants = fit_constants(tables)
     errors = []
     for table, one in zip(tables, solved, strict=True):
-        tell(f"... without {table.case.liquid_id}, {table.notes['title']} ...")
+        progress(f"... without {table.case.liquid_id}, {table.notes['title']} ...")
         others = _fit([it for it in solved if it is not one], constants)
         errors.append(MotionError(table, others, one.errors(constants), one.errors(others), _as_run(table)))
     errors += [MotionError(it, constants, None, _Solved(it).errors(constants), _as_run(it)) for it in held_out]

@@ -49,7 +49,7 @@ PERMITTED: Final = 0.02
 """Greatest difference, as a share of the greatest force: from the coarse solution, and from the exact linear one."""
 
 
-def solve(to: Path, executor: Executor, tell: Callable[[str], None]) -> tuple[Path, ...]:
+def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tuple[Path, ...]:
     """Write the tables of all cases and of steady drag, solved by an executor, into the folder ``to``.
 
     Return the files.
@@ -71,7 +71,7 @@ def solve(to: Path, executor: Executor, tell: Callable[[str], None]) -> tuple[Pa
     }
     solved[to / STEADY_FILE] = executor.submit(steady_table)
     for number, (path, table) in enumerate(solved.items(), start=1):
-        tell(f"{path.name}, {number} of {len(solved)} ...")
+        progress(f"{path.name}, {number} of {len(solved)} ...")
         make_folder(path.parent)
         write_file(path, table.result())
     return tuple(solved)

@@ -107,7 +107,7 @@ class YieldFlow(Flow):
         return False
 
 
-def solve_materials(to: Path, executor: Executor, tell: Callable[[str], None]) -> Path:
+def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None]) -> Path:
     """Write the table of Herschel–Bulkley liquids, solved by an executor, into the folder ``to``; return the file.
 
     Raises
@@ -120,7 +120,7 @@ def solve_materials(to: Path, executor: Executor, tell: Callable[[str], None]) -
     rows: list[tuple[float, ...]] = []
     for index, found in zip(INDICES, executor.map(_solved, INDICES), strict=True):
         rows += found
-        tell(f"n {index:g}: drag {', '.join(f'{row[2]:.4f}' for row in found)}")
+        progress(f"n {index:g}: drag {', '.join(f'{row[2]:.4f}' for row in found)}")
     notes = {
         "title": "creeping drag of a sphere in Herschel–Bulkley liquids, over 3πD² K (U/D)^n",
         **made(COMMAND),

@@ -45,7 +45,7 @@ class Ratio:
 
 
 def compare(
-    seconds: float, *, ending: threading.Event, tell: Callable[[str], object] = lambda _line: None
+    seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> tuple[Ratio, ...]:
     """Return the median lateness with and without outlets, and the 99th percentile.
 
@@ -88,7 +88,7 @@ def compare(
                     for switch in (samples.running, marking):
                         (switch.set if active else switch.clear)()
                     late_ns[active].append(loop.run(ticks).lateness_ns)
-                tell(f"{100 * (number + 1) // rounds:3} %")
+                progress(f"{100 * (number + 1) // rounds:3} %")
     finally:
         over.set()
         marking.set()

@@ -7,7 +7,9 @@ import time
 from collections.abc import Callable, Iterator
 
 
-def paced(seconds: float, every_s: float, *, ending: threading.Event, tell: Callable[[str], object]) -> Iterator[int]:
+def paced(
+    seconds: float, every_s: float, *, ending: threading.Event, progress: Callable[[str], object]
+) -> Iterator[int]:
     """Yield 0, 1, 2 … for so many seconds, with a pause after each, and report each per cent once.
 
     Raises
@@ -21,7 +23,7 @@ def paced(seconds: float, every_s: float, *, ending: threading.Event, tell: Call
             raise KeyboardInterrupt
         if int(100 * share) > shown:
             shown = int(100 * share)
-            tell(f"{shown:3} %")
+            progress(f"{shown:3} %")
         yield number
         number += 1
         time.sleep(every_s)

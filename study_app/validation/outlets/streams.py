@@ -51,7 +51,9 @@ class Streamed:
         return self.samples_lost == self.markers_lost == 0 and self.intact and self.error_p99_ms <= MOST_ERROR_MS
 
 
-def stream(seconds: float, *, ending: threading.Event, tell: Callable[[str], object] = lambda _line: None) -> Streamed:
+def stream(
+    seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
+) -> Streamed:
     """Stream a servo at 1 kHz, and twenty markers a second, to a listener in another process.
 
     Parameters
@@ -71,7 +73,7 @@ def stream(seconds: float, *, ending: threading.Event, tell: Callable[[str], obj
             servo.start()
             try:
                 servo.load(FULL)
-                for number in paced(seconds, MARKER_EVERY_S, ending=ending, tell=tell):
+                for number in paced(seconds, MARKER_EVERY_S, ending=ending, progress=progress):
                     servo.check()
                     sent.append(numbered(number, servo.now_ns(), origin_ns))
                     sink.mark(sent[-1])

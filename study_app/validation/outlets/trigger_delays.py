@@ -93,7 +93,7 @@ class VirtualPort:
 
 
 def measure(
-    port: str, seconds: float, *, ending: threading.Event, tell: Callable[[str], object] = lambda _line: None
+    port: str, seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> TriggerDelays:
     """Send twenty events a second to a port, or to a virtual one, and return how long they took.
 
@@ -109,9 +109,9 @@ def measure(
         The port cannot be opened, or failed.
     """
     if port != VIRTUAL:
-        return TriggerDelays(port, _written_us(_send(port, seconds, ending, tell)[1]))
+        return TriggerDelays(port, _written_us(_send(port, seconds, ending, progress)[1]))
     with VirtualPort() as virtual:
-        sent, sink = _send(virtual.address, seconds, ending, tell)
+        sent, sink = _send(virtual.address, seconds, ending, progress)
         came = virtual.unplug()
     codes = [one for one in came if one[0]]
     idle_ns = [at_ns for byte, at_ns in came[1:] if not byte]  # the first 0 is from opening the port
@@ -130,7 +130,7 @@ def _written_us(sink: TriggerSink) -> NDArray[np.float64]:
 
 
 def _send(
-    address: str, seconds: float, ending: threading.Event, tell: Callable[[str], object]
+    address: str, seconds: float, ending: threading.Event, progress: Callable[[str], object]
 ) -> tuple[list[tuple[int, int]], TriggerSink]:
     """Send the codes in turn; return each with the time of its event [ns], and the sink."""
     now_ns = SystemClock().now_ns
@@ -140,7 +140,7 @@ def _send(
     thread = SinkThread(sink)
     sent: list[tuple[int, int]] = []
     events = list(CODES)
-    for number in paced(seconds, EVERY_S, ending=ending, tell=tell):
+    for number in paced(seconds, EVERY_S, ending=ending, progress=progress):
         if thread.lost:
             break
         marker = marker_of(events[number % len(events)], 1e-9 * now_ns(), 0, {})

@@ -338,11 +338,11 @@ def soak(
     virtual: bool,
     seed: int = 1,
     ending: threading.Event | None = None,
-    tell: Callable[[str], None] = lambda _line: None,
+    progress: Callable[[str], None] = lambda _line: None,
 ) -> Soaked:
     """Soak the servo in ``scenes`` and return what was found; one that is asked to end early says what it has.
 
-    ``tell`` hears a line at the start and at every tenth, ``ending`` is set by whoever wants no more.
+    ``progress`` hears a line at the start and at every tenth, ``ending`` is set by whoever wants no more.
 
     Raises
     ------
@@ -351,12 +351,12 @@ def soak(
     """
     ending = ending or threading.Event()
     with Soak(scenes, hours, virtual=virtual, seed=seed) as run:
-        tell(f"{run.ticks:,} ticks begin; Ctrl+C ends the run with the report so far")
+        progress(f"{run.ticks:,} ticks begin; Ctrl+C ends the run with the report so far")
         tenth = 0
         while run.done < run.ticks and not ending.is_set():
             run.step(ending)
             if 10 * run.done // run.ticks > tenth:
                 tenth = 10 * run.done // run.ticks
                 held_mib = psutil.Process().memory_info().rss / 2**20
-                tell(f"{10 * tenth:3} %  {run.done:,} ticks, drift {run.drift.worst:.1e}, {held_mib:.1f} MiB")
+                progress(f"{10 * tenth:3} %  {run.done:,} ticks, drift {run.drift.worst:.1e}, {held_mib:.1f} MiB")
         return run.report()

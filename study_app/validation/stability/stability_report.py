@@ -28,7 +28,7 @@ from study_app.validation.stability.stability_cases import FALCON, Case
 from study_app.validation.stability.stability_map import draw_map
 from study_app.validation.stability.verdict import REASONS, Verdict, judge
 
-Tell = Callable[[int, int], None]
+Progress = Callable[[int, int], None]
 
 MEASURES: Final = ("balance_j", "permitted_j", "swing_mps", "fast_n", "played_n")
 
@@ -66,7 +66,9 @@ class Swept:
         return (*([Judged("first plant", self.on)] if self.on else []), *self.others)
 
 
-def run_sweep(cases: Sequence[Case], others: Sequence[Group], executor: Executor, tell: Tell | None = None) -> Swept:
+def run_sweep(
+    cases: Sequence[Case], others: Sequence[Group], executor: Executor, progress: Progress | None = None
+) -> Swept:
     """Judge the sweep's cases with safety off and on, and the other groups with it.
 
     Parameters
@@ -75,7 +77,7 @@ def run_sweep(cases: Sequence[Case], others: Sequence[Group], executor: Executor
     others : sequence of Group
     executor : concurrent.futures.Executor
         Judges the cases; the verdicts do not depend on it.
-    tell : callable, optional
+    progress : callable, optional
         Is called with the number of verdicts so far and the number of all.
     """
     began = time.perf_counter()
@@ -84,8 +86,8 @@ def run_sweep(cases: Sequence[Case], others: Sequence[Group], executor: Executor
     found = []
     for verdict in executor.map(_judge, planned):
         found.append(verdict)
-        if tell is not None:
-            tell(len(found), len(planned))
+        if progress is not None:
+            progress(len(found), len(planned))
     verdicts = iter(found)
     off, on = [tuple(itertools.islice(verdicts, len(cases))) for _ in range(2)]
     judged = [Judged(group.name, tuple(itertools.islice(verdicts, len(group.cases)))) for group in others]
@@ -189,7 +191,7 @@ def write(to: Path, swept: Swept, fidelities: Sequence[Fidelity]) -> tuple[Path,
     return tuple(to / name for name in files)
 
 
-def write_limits(file: Path, executor: Executor, tell: Tell | None = None) -> None:
+def write_limits(file: Path, executor: Executor, progress: Progress | None = None) -> None:
     """Measure the table of limits that `haptics.model.limits` reads by an executor, and write it.
 
     Raises
@@ -202,8 +204,8 @@ def write_limits(file: Path, executor: Executor, tell: Tell | None = None) -> No
     for name, value, period_s, delay, (drag, inertia) in measure_limits(executor=executor):
         parameter = "" if value is None else f"{value:g}"
         rows.append((name, parameter, f"{period_s * 1e3:g}", delay, f"{drag:g}", f"{inertia:g}"))
-        if tell is not None:
-            tell(len(rows) - 1, lines)
+        if progress is not None:
+            progress(len(rows) - 1, lines)
     write_file(file, csv_text_of(rows).encode())
 
 

@@ -65,7 +65,7 @@ def time_devices(
     names: Sequence[str],
     *,
     ending: threading.Event,
-    tell: Callable[[str], object] = lambda _line: None,
+    progress: Callable[[str], object] = lambda _line: None,
 ) -> tuple[DeviceLateness, ...]:
     """Return how late ticks begin with each device.
 
@@ -98,7 +98,7 @@ def time_devices(
                 if hand is not None:
                     hand.reach_to(_REACH_M * (-1) ** number, 0.0, 0.0)
                 late_ns[name].append(loops[name].run(ticks).lateness_ns)
-            tell(f"{100 * (number + 1) // rounds:3} %")
+            progress(f"{100 * (number + 1) // rounds:3} %")
     return tuple(_compared(name, late_ns) for name in names)
 
 

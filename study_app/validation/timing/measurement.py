@@ -26,7 +26,7 @@ def timing(
     *,
     spin_us: float | None = None,
     ending: threading.Event | None = None,
-    tell: Callable[[str], object] = lambda _line: None,
+    progress: Callable[[str], object] = lambda _line: None,
 ) -> Timed:
     """Time all loops for ``seconds`` each and return what was found.
 
@@ -46,7 +46,7 @@ def timing(
     """
     if not LEAST_S <= seconds <= MOST_S:
         raise StudyError(f"each loop is timed for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
-    run = _Run(seconds, load, windows, spin_us, ending or threading.Event(), tell)
+    run = _Run(seconds, load, windows, spin_us, ending or threading.Event(), progress)
     return under_load(load, windows, run.race)
 
 
@@ -60,9 +60,15 @@ class _Run:
         windows: Windows | None,
         spin_us: float | None,
         ending: threading.Event,
-        tell: Callable[[str], object],
+        progress: Callable[[str], object],
     ) -> None:
-        self._seconds, self._load, self._windows, self._ending, self._tell = seconds, load, windows, ending, tell
+        self._seconds, self._load, self._windows, self._ending, self._progress = (
+            seconds,
+            load,
+            windows,
+            ending,
+            progress,
+        )
         classes = granted()
         ordinary, best = classes.normal, classes.best
         self._servos = [ServoLoop(ordinary, real_time=False, spin_us=spin_us)]
@@ -98,7 +104,7 @@ class _Run:
                     raise KeyboardInterrupt
                 mine.append(loop.run(ticks))
             if number * 10 // rounds < (number + 1) * 10 // rounds:
-                self._tell(f"{100 * (number + 1) // rounds:3} %")
+                self._progress(f"{100 * (number + 1) // rounds:3} %")
         lasted_s = time.monotonic() - began_s
         clocks = [servo.clock for servo in self._servos]
         ticked_ns = len(self._servos) * rounds * ticks * PERIOD_NS

@@ -73,7 +73,7 @@ def ending(bridge: Bridge) -> QWidget:
 
 
 def told(bridge: Bridge) -> QWidget:
-    bridge.operator.tell("It was not excluded", "trial 1 is already excluded.")
+    bridge.operator.show_message("It was not excluded", "trial 1 is already excluded.")
     return next(one for one in bridge.operator.findChildren(QDialog) if one.isVisible())
 
 

@@ -75,7 +75,7 @@ def main(name: str = "rek2024", seconds: float = 600.0) -> None:
                 windowed=True,
                 seed=sessions,
                 results=results,
-                tell=print,
+                progress=print,
             )
             person.leave()
         lasted_s = time.monotonic() - began

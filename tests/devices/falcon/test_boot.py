@@ -58,7 +58,7 @@ def failing(transport, **options):
     """Return how booting fails, and what was told of the attempts before the last."""
     told = []
     with pytest.raises(BootFailure) as caught:
-        boot(transport, stream(), tell=told.append, **options)
+        boot(transport, stream(), progress=told.append, **options)
     return caught.value, told
 
 
@@ -76,7 +76,7 @@ def test_a_falcon_just_switched_on_is_loaded_and_answers(size):
     configure(transport)
     assert not is_running(transport)
     told = []
-    found = boot(transport, data, tell=told.append)
+    found = boot(transport, data, progress=told.append)
     assert (found.size, emulator.loaded) == (len(data), len(data))
     assert emulator.running
     assert is_running(transport)
@@ -220,7 +220,7 @@ def test_more_pings_ignored_than_an_attempt_has_are_the_next_attempts():
     emulator, transport = falcon()
     emulator.faults.ignore_pings(PINGS + 3)
     told = []
-    boot(transport, stream(), tell=told.append)
+    boot(transport, stream(), progress=told.append)
     assert len(told) == 1
     assert emulator.running
 
@@ -271,7 +271,7 @@ def test_an_echo_spoilt_by_the_falcon_is_the_next_attempts():
     emulator, transport = falcon()
     emulator.faults.once("echo")
     told = []
-    boot(transport, stream(), tell=told.append)
+    boot(transport, stream(), progress=told.append)
     assert emulator.running
     assert len(told) == 1
     assert "byte 0 of the firmware came back as ba, not aa" in told[0]
@@ -333,14 +333,14 @@ def test_a_falcon_that_is_unplugged_is_not_waited_for():
         emulator.faults.on("unplugged")
 
     with pytest.raises(FalconNotFound):
-        boot(transport, stream(), tell=unplug)
+        boot(transport, stream(), progress=unplug)
 
 
 def test_a_falcon_that_somebody_takes_between_attempts_is_busy():
     emulator, transport = falcon()
     emulator.power(False)
     with pytest.raises(UsbFailure) as caught:
-        boot(transport, stream(), tell=lambda _: emulator.faults.on("busy"))
+        boot(transport, stream(), progress=lambda _: emulator.faults.on("busy"))
     assert caught.value.kind == "busy"
 
 

@@ -93,7 +93,7 @@ def told():
 
 @pytest.fixture
 def opened(told):
-    with EmulatedFalcon(emulator=still(), tell=told.append) as device:
+    with EmulatedFalcon(emulator=still(), progress=told.append) as device:
         yield device
 
 
@@ -185,7 +185,7 @@ class TestHoming:
     def test_it_does_not_wait_for_ever(self, fault, kind, told):
         emulator = still()
         emulator.faults.on(fault)
-        device = EmulatedFalcon(emulator=emulator, tell=told.append, patience_s=3.0)
+        device = EmulatedFalcon(emulator=emulator, progress=told.append, patience_s=3.0)
         with pytest.raises(NotHomed) as caught:
             device.open()
         assert caught.value.kind == kind
@@ -202,7 +202,7 @@ class TestHoming:
                 emulator.hold(0.0, 0.0, 0.0)
 
         with pytest.raises(NotHomed, match="pull it fully out"):
-            EmulatedFalcon(emulator=emulator, tell=hinder, patience_s=3.0).open()
+            EmulatedFalcon(emulator=emulator, progress=hinder, patience_s=3.0).open()
         assert emulator.highest_torque == 0
 
     def test_a_power_failure_while_homing_is_told(self):
@@ -213,7 +213,7 @@ class TestHoming:
                 emulator.power(False)
 
         with pytest.raises(NotHomed) as caught:
-            EmulatedFalcon(emulator=emulator, tell=pull_the_plug, patience_s=1.0).open()
+            EmulatedFalcon(emulator=emulator, progress=pull_the_plug, patience_s=1.0).open()
         assert caught.value.kind == "silent"
 
     def test_a_cable_that_is_pulled_while_homing_is_told(self):
@@ -224,11 +224,11 @@ class TestHoming:
                 emulator.faults.on("unplugged")
 
         with pytest.raises(UsbFailure, match="no longer there"):
-            EmulatedFalcon(emulator=emulator, tell=pull_the_cable).open()
+            EmulatedFalcon(emulator=emulator, progress=pull_the_cable).open()
 
     def test_it_can_be_given_up(self):
         lines = []
-        device = EmulatedFalcon(emulator=still(), tell=lines.append, cancelled=lambda: PULL_OUT in lines)
+        device = EmulatedFalcon(emulator=still(), progress=lines.append, cancelled=lambda: PULL_OUT in lines)
         with pytest.raises(DeviceError, match="given up"):
             device.open()
         assert READY not in lines

@@ -41,7 +41,7 @@ def test_without_its_guard_it_does_not_push():
 
 
 def test_a_guard_that_dies_while_it_is_homed_ends_that():
-    device = EmulatedFalcon(emulator=still(), tell=lambda line: kill() if line == PULL_OUT else None)
+    device = EmulatedFalcon(emulator=still(), progress=lambda line: kill() if line == PULL_OUT else None)
     device.guarded = True
 
     def kill():

@@ -105,9 +105,9 @@ class TestModes:
         assert re.search(r"rules\.d/[0-6]\d-", BY_ID["permission"].cure("linux"))  # before 73, where uaccess is read
 
 
-def refused(emulator, *, firmware=None, tell=None):
+def refused(emulator, *, firmware=None, progress=None):
     with pytest.raises(FalconFailure) as caught:
-        EmulatedFalcon(emulator=emulator, firmware=firmware, tell=tell, patience_s=3.0).open()
+        EmulatedFalcon(emulator=emulator, firmware=firmware, progress=progress, patience_s=3.0).open()
     assert emulator.highest_torque == 0
     return caught.value
 
@@ -160,13 +160,13 @@ class TestFaultsOfTheEmulator:
     def test_one_that_is_homed_and_not_pulled_out(self):
         emulator = Emulator(running=True)
         hinder = {PULL_OUT: lambda: emulator.hold(0.0, 0.0, 0.0)}
-        failure = refused(emulator, tell=lambda line: hinder.get(line, int)())
+        failure = refused(emulator, progress=lambda line: hinder.get(line, int)())
         assert isinstance(failure, NotHomed)
         has_words_of(failure, "stroke-out")
 
     def test_a_mains_adapter_that_is_pulled_while_homing(self):
         emulator = Emulator(running=True)
-        failure = refused(emulator, tell=lambda line: emulator.power(False) if line.startswith("Homing") else None)
+        failure = refused(emulator, progress=lambda line: emulator.power(False) if line.startswith("Homing") else None)
         has_words_of(failure, "power")
 
     def test_no_mains_adapter_while_its_firmware_is_loaded(self, firmware):
@@ -194,7 +194,7 @@ class TestFaultsOfTheEmulator:
     def test_a_cable_that_is_pulled_while_homing(self):
         emulator = Emulator(running=True)
         failure = refused(
-            emulator, tell=lambda line: emulator.faults.on("unplugged") if line.startswith("Homing") else None
+            emulator, progress=lambda line: emulator.faults.on("unplugged") if line.startswith("Homing") else None
         )
         assert isinstance(failure, UsbFailure)
         has_words_of(failure, "unplugged")
@@ -249,13 +249,13 @@ class TestDoctor:
         ],
     )
     def test_it_finds_what_is_wrong_and_nothing_else(self, faults, modes):
-        examined = examine("falcon-emulated", faults=faults, tell=str)
+        examined = examine("falcon-emulated", faults=faults, progress=str)
         assert [mode.id for mode in diagnose(examined.facts)] == modes
         assert (examined.failure is None) == (not modes or modes == ["broken-packets"])
 
     def test_it_says_what_it_saw(self, firmware):
         told = []
-        examined = examine("falcon-emulated", firmware=firmware, tell=told.append)
+        examined = examine("falcon-emulated", firmware=firmware, progress=told.append)
         assert examined.facts.program == "loaded"
         assert any(line.startswith("round trip 0.") for line in examined.seen)
         assert "opened, serial number EMULATED" in examined.seen
@@ -264,13 +264,15 @@ class TestDoctor:
     def test_encoders_that_freeze_after_homing_are_found(self):
         emulator = Emulator(running=True)
         freeze = {"Hold": lambda: emulator.faults.on("frozen")}
-        examined = examine("falcon-emulated", emulator=emulator, tell=lambda line: freeze.get(line.split()[0], int)())
+        examined = examine(
+            "falcon-emulated", emulator=emulator, progress=lambda line: freeze.get(line.split()[0], int)()
+        )
         assert [mode.id for mode in diagnose(examined.facts)] == ["frozen"]
 
     def test_a_cable_pulled_during_it_is_found(self):
         emulator = Emulator(running=True)
         pull = {"Hold": lambda: emulator.faults.on("unplugged")}
-        examined = examine("falcon-emulated", emulator=emulator, tell=lambda line: pull.get(line.split()[0], int)())
+        examined = examine("falcon-emulated", emulator=emulator, progress=lambda line: pull.get(line.split()[0], int)())
         assert "unplugged" in [mode.id for mode in diagnose(examined.facts)]
         assert "reconnect it" in examined.failure
 
@@ -278,7 +280,7 @@ class TestDoctor:
         with pytest.raises(DeviceError, match="'mouse' is none"):
             doctor_of("mouse")
         with pytest.raises(DeviceError, match="falcon-emulated can"):
-            examine("falcon", faults=("busy",), tell=str)
+            examine("falcon", faults=("busy",), progress=str)
 
     def test_ftdis_driver_is_asked_whether_it_has_the_falcon(self):
         assert ftdi_sees(D2xx(("A1", "FALCON HAPTIC"))) is True

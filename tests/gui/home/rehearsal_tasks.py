@@ -9,36 +9,36 @@ from pathlib import Path
 
 from study_app.errors import StudyError
 from study_app.session.simulated.rehearsal_worker import RehearsalOrder
-from study_app.workers.server import Stop, Tell
+from study_app.workers.server import Send, Stop
 
 
-def fail(_order: RehearsalOrder, _tell: Tell, _stop: Stop) -> Path:
+def fail(_order: RehearsalOrder, _send: Send, _stop: Stop) -> Path:
     """Refuse."""
     raise StudyError("no room left")
 
 
-def end(_order: RehearsalOrder, _tell: Tell, _stop: Stop) -> Path:
+def end(_order: RehearsalOrder, _send: Send, _stop: Stop) -> Path:
     """End the process."""
     sys.exit(7)
 
 
-def two(order: RehearsalOrder, tell: Tell, stop: Stop) -> Path:
+def two(order: RehearsalOrder, send: Send, stop: Stop) -> Path:
     """Do one participant, then, once asked to, the other."""
-    tell("R1: 8 responses (simulated)")
+    send("R1: 8 responses (simulated)")
     while not stop():
         threading.Event().wait(0.01)
-    tell("R2: 8 responses (simulated)")
+    send("R2: 8 responses (simulated)")
     return order.results
 
 
-def endless(_order: RehearsalOrder, _tell: Tell, _stop: Stop) -> Path:
+def endless(_order: RehearsalOrder, _send: Send, _stop: Stop) -> Path:
     """Wait until the process is ended."""
     threading.Event().wait()
     raise AssertionError
 
 
-def deaf(order: RehearsalOrder, tell: Tell, stop: Stop) -> Path:
+def deaf(order: RehearsalOrder, send: Send, stop: Stop) -> Path:
     """Wait until the process is killed."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    tell("deaf")
-    return endless(order, tell, stop)
+    send("deaf")
+    return endless(order, send, stop)

@@ -97,7 +97,7 @@ def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
 
 
 def test_what_was_said_goes_with_the_window(main):
-    main.tell("It did not work", "The cable is out.")
+    main.show_message("It did not work", "The cable is out.")
     assert main.notice.isVisible()
     main.close()
     assert not main.notice.isVisible()

@@ -79,7 +79,7 @@ def test_frames_are_counted_when_they_are_painted(test_page, clock):
     assert test_page.times.figures().painted == 10
     test_page.repaint()  # that nobody asked for
     assert test_page.times.figures().painted == 10
-    test_page.tell()
+    test_page.show_figures()
     assert [value.text() for value in test_page.values] == ["60.0 of 60.0 Hz", "16.67 ms", "16.67 ms", "0"]
     assert figures_words(None, 60.0) == ("–",) * 4
 

@@ -94,7 +94,7 @@ def test_one_that_is_asked_to_end_says_what_it_has(scenes):
         if "%" in line:
             ending.set()
 
-    found = soak(scenes, SHORT_H, virtual=True, ending=ending, tell=tell)
+    found = soak(scenes, SHORT_H, virtual=True, ending=ending, progress=tell)
     assert lines[-1].startswith(" 10 %")
     assert 12_000 <= found.ticks < 20_000
     assert found.verdict.startswith("sound: nothing found in the 1")

@@ -195,7 +195,7 @@ class FakeWindows:
 @pytest.mark.slow
 def test_a_race_times_every_loop_in_every_class_it_is_granted():
     lines = []
-    raced = timing(0.5, "none", FakeWindows(), tell=lines.append)
+    raced = timing(0.5, "none", FakeWindows(), progress=lines.append)
     levels = ["normal"] if granted().best is None else ["normal", granted().best.level]
     assert list(raced.levels) == levels
     assert [one.kind for one in raced.lanes][:4] == ["servo", "bare", "thread", "qt"]

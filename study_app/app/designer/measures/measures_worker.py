@@ -11,7 +11,7 @@ from study_app.protocol.checks.expected_precision import ThresholdPlan, imprecis
 from study_app.protocol.model import Protocol
 from study_app.workers.client import WorkerClient
 from study_app.workers.messages import Stopped
-from study_app.workers.server import Stop, Tell
+from study_app.workers.server import Send, Stop
 
 if TYPE_CHECKING:
     from study_app.session.simulated.trial_features import ConditionFeatures
@@ -99,7 +99,7 @@ def start_measure_worker() -> MeasureClient:
     return WorkerClient("study_app.app.designer.measures.measures_worker:carry_out", name="measures", background=True)
 
 
-def carry_out(order: MeasureOrder, tell: Tell, stop: Stop) -> None:
+def carry_out(order: MeasureOrder, send: Send, stop: Stop) -> None:
     """Answer what is wanted, one after the other.
 
     Raises
@@ -109,7 +109,7 @@ def carry_out(order: MeasureOrder, tell: Tell, stop: Stop) -> None:
     """
     try:
         for wanted in order.wanted:
-            tell((wanted, _found(wanted, stop)))
+            send((wanted, _found(wanted, stop)))
     except GivenUp as given_up:
         raise Stopped("the study was edited") from given_up
 

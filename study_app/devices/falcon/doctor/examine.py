@@ -52,7 +52,7 @@ def examine_device(
 ) -> Report:
     """Look a Falcon over as its `Doctor` does; see `examine`."""
     firmware = options.get("firmware")
-    found = examine(name, firmware=None if firmware is None else Path(firmware), faults=faults, tell=progress)
+    found = examine(name, firmware=None if firmware is None else Path(firmware), faults=faults, progress=progress)
     return Report(found.seen, findings_of(found.facts), found.failure)
 
 
@@ -61,7 +61,7 @@ def examine(
     *,
     firmware: Path | None = None,
     faults: Sequence[str] = (),
-    tell: Callable[[str], object],
+    progress: Callable[[str], object],
     seconds: float = SECONDS,
     emulator: Emulator | None = None,
 ) -> Examined:
@@ -72,7 +72,7 @@ def examine(
     name : "falcon", "falcon:SERIAL", "falcon-emulated" or "falcon-socket:PATH"
     firmware : file of its program
     faults : of an emulated one, as ``Emulator.take`` takes them
-    tell : is given what to do, a line at a time
+    progress : is given what to do, a line at a time
     seconds : how long it is run
     emulator : the emulated one; None: a new one
 
@@ -81,7 +81,7 @@ def examine(
     DeviceError
         It cannot have faults.
     """
-    device = _device(name, firmware, faults, tell, emulator)
+    device = _device(name, firmware, faults, progress, emulator)
     facts = _looked_for() if name.partition(":")[0] == "falcon" else Facts()
     try:
         device.open()
@@ -92,7 +92,7 @@ def examine(
     with device:
         facts = _merged(facts, _opened(device))
         facts = _merged(facts, Facts(replies=True, homed=ALL_HOMED, pulled_out=True))
-        tell(MOVE)
+        progress(MOVE)
         ran, failure_text = _ran(device, seconds)
         facts = _merged(facts, ran)
         return Examined(facts, failure_text, _words(device, facts))
@@ -102,7 +102,7 @@ def _device(
     name: str,
     firmware: Path | None,
     faults: Sequence[str],
-    tell: Callable[[str], object],
+    progress: Callable[[str], object],
     emulator: Emulator | None,
 ) -> FalconDevice:
     if name != "falcon-emulated":
@@ -110,11 +110,11 @@ def _device(
             raise DeviceError(
                 f"'{name}' cannot be given faults: only falcon-emulated can, or emulate-falcon at its end"
             )
-        return FalconDevice(name, firmware=firmware, tell=tell)
+        return FalconDevice(name, firmware=firmware, progress=progress)
     emulator = emulator if emulator is not None else new_emulator(None, firmware, WORKSPACE_M)
     for fault in faults:
         emulator.take(fault)
-    return EmulatedFalcon(firmware=firmware, tell=tell, emulator=emulator, patience_s=EMULATED_PATIENCE_S)
+    return EmulatedFalcon(firmware=firmware, progress=progress, emulator=emulator, patience_s=EMULATED_PATIENCE_S)
 
 
 def _looked_for() -> Facts:

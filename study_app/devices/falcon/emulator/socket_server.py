@@ -95,8 +95,8 @@ class EmulatorServer:
         """How many programs are connected."""
         return len(self._clients)
 
-    def serve(self, tell: Callable[[], None] | None = None, every_s: float = 1.0) -> None:
-        """Answer until `stop`; call ``tell`` now and then. Leaves nothing at the path, however it ends."""
+    def serve(self, progress: Callable[[], None] | None = None, every_s: float = 1.0) -> None:
+        """Answer until `stop`; call ``progress`` now and then. Leaves nothing at the path, however it ends."""
         told_s = time.monotonic()
         try:
             while True:
@@ -115,9 +115,9 @@ class EmulatorServer:
                     self._serve(client)
                 with self._changed:
                     self._changed.notify_all()
-                if tell is not None and time.monotonic() - told_s >= every_s:
+                if progress is not None and time.monotonic() - told_s >= every_s:
                     told_s = time.monotonic()
-                    tell()
+                    progress()
         finally:
             self._close()
 

@@ -88,7 +88,7 @@ class Foot(QWidget):
         self.setFixedHeight(round((72 if tight else 96) * scale))
         self._fit()
 
-    def tell(self, message: str, done: int, of: int, keys: str) -> None:
+    def show_state(self, message: str, done: int, of: int, keys: str) -> None:
         """Say what is missing, how many are answered, and which keys answer."""
         self._message.setText(message)
         self._count.setText(self._words.answered.format(done=done, of=of))

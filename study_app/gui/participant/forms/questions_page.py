@@ -275,7 +275,7 @@ class QuestionsPage(PageWidget):
         here = self.focusWidget()
         question = question_of(here) if here is not None else None
         keys = "" if question is None else question.answer_keys
-        self.foot.tell(self.message, sum(field.is_answered for field in asked), len(asked), keys)
+        self.foot.show_state(self.message, sum(field.is_answered for field in asked), len(asked), keys)
 
     def go_to(self, field: QuestionField) -> None:
         """Show the part with a field and put the keyboard on it."""

@@ -76,7 +76,7 @@ def test_a_session_of_pairs_is_attended_by_keys_alone(tmp_path: Path) -> None:
         windowed=True,
         operator="AK",
         results=results,
-        tell=lambda _line: None,
+        progress=lambda _line: None,
     )
     tanks = {trial: {id(tank) for one, tank in person.tanks if one == trial} for trial, _ in person.tanks}
     person.deleteLater()
@@ -156,7 +156,7 @@ def test_levels_are_set_by_keys_alone(tmp_path: Path) -> None:
         windowed=True,
         operator="AK",
         results=results,
-        tell=lambda _line: None,
+        progress=lambda _line: None,
     )
     person.deleteLater()
     assert code == 0

@@ -42,7 +42,7 @@ def port():
 
 def run(study, results, lines):
     return app.run(
-        study, participant="P001", seed=5, device="scripted", windowed=True, results=results, tell=lines.append
+        study, participant="P001", seed=5, device="scripted", windowed=True, results=results, progress=lines.append
     )
 
 

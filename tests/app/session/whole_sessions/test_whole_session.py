@@ -44,7 +44,7 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
                 windowed=True,
                 operator="AK",
                 results=results,
-                tell=lines.append,
+                progress=lines.append,
             )
         except StudyError:
             code = None
@@ -89,7 +89,7 @@ def test_a_signal_leaves_the_session_unfinished_and_resumable(short_demo, result
 
     person = Person(once=suspend_and_end)
     lines = []
-    code = app.run(short_demo, participant="P001", windowed=True, results=results, tell=lines.append)
+    code = app.run(short_demo, participant="P001", windowed=True, results=results, progress=lines.append)
     person.deleteLater()
     assert code == 128 + number
     assert lines[-1] == f"session not finished: {results / 'data' / 'sub-P001' / 'ses-01'}"
@@ -201,7 +201,7 @@ def test_the_preflight_is_told_before_anything_is_created(short_demo, results):
         told.append((line, results.exists()))
 
     person = Person(once=lambda _participant: os.kill(os.getpid(), signal.SIGTERM))
-    app.run(short_demo, participant="P001", windowed=True, results=results, tell=tell)
+    app.run(short_demo, participant="P001", windowed=True, results=results, progress=tell)
     person.deleteLater()
     *before, (last, _) = told
     assert last.startswith("session not finished: ")
