@@ -98,7 +98,7 @@ class LabController(QObject):
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
         self.frames = self._timer(FRAME_MS, self._frame)
         self._due = self._timer(0, self._frame, once=True)
-        self._price_due = self._timer(APPRAISE_AFTER_MS, self._ask_price, once=True)
+        self._cost_due = self._timer(APPRAISE_AFTER_MS, self._ask_price, once=True)
         self._connect()
 
     def _timer(self, interval_ms: int, slot: Callable[[], None], *, once: bool = False) -> QTimer:
@@ -148,7 +148,7 @@ class LabController(QObject):
         if not self._entered:
             return
         self._entered = False
-        for timer in (self.frames, self._due, self._price_due):
+        for timer in (self.frames, self._due, self._cost_due):
             timer.stop()
         self._opening.cancel()
         try:
@@ -195,7 +195,7 @@ class LabController(QObject):
             device=self.device,
             opening=self._opening.busy_with,
             progress=self._said or (COMPILING if self._opening.lasts_s > LONG_AFTER_S else ""),
-            price_due=self._price_due.isActive(),
+            cost_due=self._cost_due.isActive(),
             trouble=self.trouble,
             refused=self._refused,
             said=self._saving.said,
@@ -244,7 +244,7 @@ class LabController(QObject):
             return
         self.live = live
         live.feel(self.bench)
-        self._price_due.start()
+        self._cost_due.start()
 
     @guarded
     def _could_not_open(self, error: Exception) -> None:
@@ -310,7 +310,7 @@ class LabController(QObject):
         self._forget_trouble()
         if bench.in_hand.scene != before.in_hand.scene:
             self._prices.forget()
-            self._price_due.start()
+            self._cost_due.start()
         if self.live is not None:
             self.live.feel(bench, anew=anew)
             waits_s = self.live.due_in_s

@@ -26,7 +26,7 @@ def lab_view(
     device: str,
     opening: str | None,
     progress: str,
-    price_due: bool,
+    cost_due: bool,
     trouble: str,
     refused: tuple[str, str] | None,
     said: str,
@@ -41,7 +41,7 @@ def lab_view(
     liquids : the liquids that a side can be set to
     device : name of the selected device
     opening, progress : name of the device that is being opened (None without one), and its last message
-    price_due : whether an appraisal is about to be asked for
+    cost_due : whether an appraisal is about to be asked for
     trouble : what failed, "" if nothing did
     refused : name of a parameter and why its value was refused
     said : the last message about presets
@@ -77,7 +77,7 @@ def lab_view(
         cost=() if appraisal.costs is None else cost_rows(appraisal.costs),
         tick_ns=None if appraisal.costs is None else appraisal.costs.tick_ns,
         errors=() if appraisal.errors is None else error_rows(appraisal.errors),
-        measuring=appraisal.waits or price_due,
+        measuring=appraisal.waits or cost_due,
         force_on=reading is not None and reading.force_on,
         busy="" if opening is None else progress or f"Opening {title_of(opening)}",
         trouble=trouble or fault,
