@@ -34,7 +34,7 @@ class DevicesController(QObject):
 
     Parameters
     ----------
-    desk
+    workstation
         What is set for this machine.
     look
         What looks, as ``devices.backends.backends`` does.
@@ -44,28 +44,28 @@ class DevicesController(QObject):
     troubled = Signal(str, str)
     _done = Signal(object)
 
-    def __init__(self, desk: WorkstationController, look: Callable[[], Sequence[Backend]] = backends) -> None:
+    def __init__(self, workstation: WorkstationController, look: Callable[[], Sequence[Backend]] = backends) -> None:
         super().__init__()
-        self._desk, self.backends = desk, look
+        self._workstation, self.backends = workstation, look
         self.looking: threading.Thread | None = None
         self._ended = False
         self.shown: tuple[DeviceShown, ...] = ()
         self.place: DevicesPlace | None = None
         self.dialog: DiagnosisDialog | None = None
         self._done.connect(self._end, Qt.ConnectionType.QueuedConnection)
-        desk.changed.connect(self._show)
+        workstation.changed.connect(self._show)
 
     @property
     def preferred(self) -> DeviceShown:
         """The device that sessions begin with, as it was found."""
-        return device_named(self._desk.settings.device, self.shown)
+        return device_named(self._workstation.settings.device, self.shown)
 
     def make_place(self) -> DevicesPlace:
         """Return the devices' place."""
         place = self.place = DevicesPlace()
         place.look_asked.connect(self.look)
-        place.chosen.connect(lambda name: self._desk.change({"device": name}))
-        place.option_chosen.connect(lambda name, path: self._desk.change({name: path}))
+        place.chosen.connect(lambda name: self._workstation.change({"device": name}))
+        place.option_chosen.connect(lambda name, path: self._workstation.change({name: path}))
         place.diagnose_asked.connect(self.diagnose)
         place.report_asked.connect(open_here)
         place.left.connect(self.end_diagnosis)
@@ -89,7 +89,7 @@ class DevicesController(QObject):
 
     def diagnose(self, name: str) -> None:
         """Open the diagnosis of a device; a serial number that is preferred is taken along."""
-        settings = self._desk.settings
+        settings = self._workstation.settings
         asked = settings.device if settings.device.partition(":")[0] == name else name
         assert self.place is not None  # noqa: S101 - it has just asked
         self.end_diagnosis()
@@ -128,9 +128,9 @@ class DevicesController(QObject):
 
     def _show(self) -> None:
         if self.place is not None:
-            self.place.show_devices(self.shown, self._desk.settings.device)
-            self.place.show_benches(benches_shown(self._desk.settings.benches))
-            self.place.show_options(self._desk.settings.device_options)
+            self.place.show_devices(self.shown, self._workstation.settings.device)
+            self.place.show_benches(benches_shown(self._workstation.settings.benches))
+            self.place.show_options(self._workstation.settings.device_options)
 
 
 def diagnosis(

@@ -55,14 +55,14 @@ def home(results: Path | None = None, *, then: Callable[[MainController], None] 
         A window cannot be opened here.
     """
     application = application_here()
-    visit = MainController(results)
-    with collecting_here(), ended_from_outside(visit.end_by_signal):
-        visit.open()
-        then(visit)
-        visit.loop.exec()
-    visit.end()
+    controller = MainController(results)
+    with collecting_here(), ended_from_outside(controller.end_by_signal):
+        controller.open()
+        then(controller)
+        controller.loop.exec()
+    controller.end()
     application.processEvents()
-    return visit.code
+    return controller.code
 
 
 def _prepare_lab() -> InitialSettings:
@@ -107,7 +107,7 @@ class MainController(QObject):
         self.live: LiveSession | None = None
         self.help: HelpPlace | None = None
         self._called_off: list[LiveSession] = []
-        self.desk: ResultsController | None = None
+        self.results_controller: ResultsController | None = None
         self.designer: DesignerController | None = None
         self.lab: LabController | None = None
         self._for_lab: LabLiquids | None = None
@@ -116,8 +116,8 @@ class MainController(QObject):
         self.machine.changed.connect(self._machine_changed)
         self.devices.looked.connect(lambda _shown: self._show_machine())
         QShortcut(QKeySequence(QKeySequence.StandardKey.HelpContents), self.window, self.show_help)
-        for desk in (self.machine, self.devices):
-            desk.troubled.connect(self.window.show_message)
+        for controller in (self.machine, self.devices):
+            controller.troubled.connect(self.window.show_message)
 
     def open(self) -> None:
         """Show the window, no larger than the screen, and look at the machine once it stands."""
@@ -185,8 +185,8 @@ class MainController(QObject):
         if self._follows_machine and here.results != self.results and self._home_place is not None:
             self.results = here.results
             self._home_place.show_results(self.results)
-            if self.desk is not None:
-                self.desk.show_results(self.results)
+            if self.results_controller is not None:
+                self.results_controller.show_results(self.results)
             if self.designer is not None:
                 self.designer.editing.results = self.results
         self._show_machine()
@@ -199,16 +199,16 @@ class MainController(QObject):
     def _show_study(self, folder: Path) -> None:
         """Go to the results of a study."""
         self.window.place("results")
-        assert self.desk is not None  # noqa: S101 - made with its place
-        self.desk.choose(folder)
+        assert self.results_controller is not None  # noqa: S101 - made with its place
+        self.results_controller.choose(folder)
         self.window.go("results")
 
     def _results(self) -> ResultsPlace:
         from study_app.app.results_controller import ResultsController  # noqa: PLC0415 - only once it is needed
 
-        self.desk = ResultsController(self.results)
-        self.desk.place.version_asked.connect(self.show_version)
-        return self.desk.place
+        self.results_controller = ResultsController(self.results)
+        self.results_controller.place.version_asked.connect(self.show_version)
+        return self.results_controller.place
 
     def _help(self) -> HelpPlace:
         from study_app.gui.help.view import HelpPlace  # noqa: PLC0415 - only once it is needed

@@ -72,8 +72,8 @@ class Opened:
     def __init__(self, qtbot: QtBot, results: Path, start_worker: Callable[[], Any] = Here) -> None:
         self.qtbot = qtbot
         self.files: list[Path] = []
-        self.desk = ResultsController(results, opener=self.files.append, start_worker=start_worker)
-        self.place = self.desk.place
+        self.controller = ResultsController(results, opener=self.files.append, start_worker=start_worker)
+        self.place = self.controller.place
         self.window = MainWindow({"home": Place, "results": lambda: self.place})
         qtbot.addWidget(self.window)
         self.window.show()
@@ -81,7 +81,7 @@ class Opened:
         self.wait()
 
     def wait(self) -> None:
-        self.qtbot.waitUntil(lambda: not self.desk.busy, timeout=SOON_MS)
+        self.qtbot.waitUntil(lambda: not self.controller.busy, timeout=SOON_MS)
         cards = self.place.figures.cards
         self.qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.settled for card in cards))
 
@@ -130,7 +130,7 @@ def test_a_blinded_study_is_shown_by_code(shown: Opened) -> None:
     assert b">Thick<" not in drawn
     assert [one.participant for one in shown.place.sessions.rows.shown] == ["P001", "P002", "P003"]
     assert shown.place.sessions.head.text() == "3 of 3 sessions in the figures"
-    assert shown.desk.view.testing is None
+    assert shown.controller.view.testing is None
 
 
 def test_unblinding_is_recorded_and_shows_names_at_once(shown: Opened, results: Path) -> None:
@@ -208,7 +208,7 @@ def test_what_cannot_be_written_is_said_in_the_dialog(shown: Opened, tmp_path: P
 
 def test_with_no_study_there_is_one_sentence_and_the_way_home(qtbot: QtBot, tmp_path: Path) -> None:
     opened = Opened(qtbot, tmp_path / "none")
-    assert opened.desk.view.trouble is not None
+    assert opened.controller.view.trouble is not None
     assert opened.place.figures.trouble.title.text() == "No studies yet"
     opened.click(opened.place.figures.trouble.button)
     assert opened.window.here == "home"
@@ -238,10 +238,10 @@ def test_a_study_without_a_session_says_so(qtbot: QtBot, tmp_path: Path) -> None
 def test_one_participant_is_enough_for_figures(qtbot: QtBot, tmp_path: Path) -> None:
     rehearsed(tmp_path / "results", people=1)
     opened = Opened(qtbot, tmp_path / "results")
-    assert opened.desk.view.trouble is None
+    assert opened.controller.view.trouble is None
     assert all(card.drawing is not None for card in opened.place.figures.cards)
     opened.decide(opened.place.unblind, "AK", "closed")
-    assert opened.desk.view.trouble is None
+    assert opened.controller.view.trouble is None
     assert opened.titles[0] == "Agreement for each liquid"
 
 
@@ -273,11 +273,11 @@ def test_the_newest_study_is_shown_first_and_another_can_be_chosen(qtbot: QtBot,
     opened.place.study.setFocus()
     qtbot.keyClick(opened.place.study, Qt.Key.Key_Down)
     opened.wait()
-    assert opened.desk.view.chosen == results / "demo-rehearsal-1"
+    assert opened.controller.view.chosen == results / "demo-rehearsal-1"
     opened.window.go("home")
     opened.window.go("results")
     opened.wait()
-    assert opened.desk.view.chosen == results / "demo-rehearsal-1", "one comes back to where one was"
+    assert opened.controller.view.chosen == results / "demo-rehearsal-1", "one comes back to where one was"
 
 
 def test_what_is_stopped_can_be_gone_on_with(qtbot: QtBot, results: Path) -> None:
@@ -319,10 +319,10 @@ def test_a_process_that_crashes_is_said_and_looked_at_again(qtbot: QtBot, result
 
 
 def test_leaving_ends_what_reads(shown: Opened) -> None:
-    reader: Any = shown.desk.reader
+    reader: Any = shown.controller.reader
     shown.window.go("home")
     assert reader.closed
-    assert shown.desk.reader is None
+    assert shown.controller.reader is None
     shown.window.go("results")
     shown.wait()
     assert len(shown.titles) == 2
@@ -330,9 +330,9 @@ def test_leaving_ends_what_reads(shown: Opened) -> None:
 
 def test_other_results_can_be_looked_at(shown: Opened, tmp_path: Path) -> None:
     rehearsed(tmp_path / "others", people=1)
-    shown.desk.show_results(tmp_path / "others")
+    shown.controller.show_results(tmp_path / "others")
     shown.wait()
-    assert shown.desk.view.chosen == tmp_path / "others" / "demo"
+    assert shown.controller.view.chosen == tmp_path / "others" / "demo"
     assert shown.place.sessions.head.text() == "1 of 1 session in the figures"
 
 
@@ -369,9 +369,9 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
 
 def test_a_process_that_ends_by_itself_is_told_and_begun_again(qtbot: QtBot, results: Path) -> None:
     opened = Opened(qtbot, results, start_analysis_worker)
-    reader: Any = opened.desk.reader
+    reader: Any = opened.controller.reader
     psutil.Process(reader.process.pid).suspend()  # or it may answer before it is killed
-    opened.desk.look()
+    opened.controller.look()
     reader.process.kill()
     qtbot.waitUntil(lambda: "bug in the program" in opened.place.figures.trouble.title.text(), timeout=SOON_MS)
     opened.click(opened.place.figures.trouble.button)

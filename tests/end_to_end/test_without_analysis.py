@@ -28,8 +28,8 @@ from study_app.app.main_controller import home
 
 def visit_all(visit):
     def step():
-        if visit.desk is not None and visit.desk.view.trouble is not None:
-            print(visit.desk.view.trouble)
+        if visit.results_controller is not None and visit.results_controller.view.trouble is not None:
+            print(visit.results_controller.view.trouble)
             visit.window.close()
     for place in ("designer", "lab", "devices", "machine", "home", "results"):
         visit.window.go(place)

@@ -25,25 +25,25 @@ KEPT_IN: Final = "~/.config/liquid-study/machine.json"  # in place of a folder t
 
 def take_places(camera: Camera, results: Path, theme: Theme) -> None:
     """Take home with its questions, results, lab, devices with a diagnosis, and the machine with its display test."""
-    visit = MainController(results)
-    window = visit.window
+    controller = MainController(results)
+    window = controller.window
     window.show_theme(theme)
-    visit.open()
+    controller.open()
     try:
         home: Any = window.place("home")
         home.sessions.show_kind("every")
         camera.until(lambda: home.sessions.shown, "the list of sessions")
-        camera.until(lambda: visit.devices.shown, "the list of devices")
+        camera.until(lambda: controller.devices.shown, "the list of devices")
         camera.take(window, f"home-{theme.name}", HOME)
         _take_questions(camera, home, theme)
-        _take_results(camera, visit, theme)
-        _take_lab(camera, visit, theme)
-        _take_devices(camera, visit, theme)
-        _take_machine(camera, visit, theme)
-        _take_help(camera, visit, theme)
+        _take_results(camera, controller, theme)
+        _take_lab(camera, controller, theme)
+        _take_devices(camera, controller, theme)
+        _take_machine(camera, controller, theme)
+        _take_help(camera, controller, theme)
     finally:
         window.close()
-        visit.end()
+        controller.end()
 
 
 def _take_questions(camera: Camera, home: Any, theme: Theme) -> None:
@@ -55,35 +55,37 @@ def _take_questions(camera: Camera, home: Any, theme: Theme) -> None:
         home.dialog.reject()
 
 
-def _take_results(camera: Camera, visit: MainController, theme: Theme) -> None:
-    visit.window.go("results")
-    place: Any = visit.window.place("results")
-    visit.window.resize(*HOME)
+def _take_results(camera: Camera, controller: MainController, theme: Theme) -> None:
+    controller.window.go("results")
+    place: Any = controller.window.place("results")
+    controller.window.resize(*HOME)
     camera.until(lambda: place.view.studies, "the studies")
-    place.study_asked.emit(visit.results / STUDY)
+    place.study_asked.emit(controller.results / STUDY)
     camera.until(
         lambda: place.view.figures and place.view.drawing is None and place.view.testing is None, "the figures"
     )
-    camera.take(visit.window, f"results-{theme.name}", HOME)
+    camera.take(controller.window, f"results-{theme.name}", HOME)
 
 
-def _take_lab(camera: Camera, visit: MainController, theme: Theme) -> None:
-    visit.window.resize(*WIDE)
-    visit.window.go("lab")
-    lab: Any = camera.until(lambda: visit.lab, "the lab")
+def _take_lab(camera: Camera, controller: MainController, theme: Theme) -> None:
+    controller.window.resize(*WIDE)
+    controller.window.go("lab")
+    lab: Any = camera.until(lambda: controller.lab, "the lab")
     camera.until(lambda: lab.live, "the lab's device")
     lab.place.path_chosen.emit(PATH)
     camera.until(lambda: not lab.view().measuring, "the lab's costs")
     camera.wait(FELT_MS)
-    camera.take(visit.window, f"lab-{theme.name}", WIDE)
+    camera.take(controller.window, f"lab-{theme.name}", WIDE)
 
 
-def _take_devices(camera: Camera, visit: MainController, theme: Theme) -> None:
-    visit.window.go("devices")
-    camera.take(visit.window, f"devices-{theme.name}", HOME)
+def _take_devices(camera: Camera, controller: MainController, theme: Theme) -> None:
+    controller.window.go("devices")
+    camera.take(controller.window, f"devices-{theme.name}", HOME)
     over: list[bool] = []
-    visit.devices.diagnose(next(it.name for it in discover().devices if it.doctor is not None and it.moves_by_itself))
-    dialog = visit.devices.dialog
+    controller.devices.diagnose(
+        next(it.name for it in discover().devices if it.doctor is not None and it.moves_by_itself)
+    )
+    dialog = controller.devices.dialog
     assert dialog is not None  # noqa: S101 - it was just opened
     dialog.over.connect(over.append)
     camera.until(lambda: over, "the diagnosis")
@@ -91,17 +93,17 @@ def _take_devices(camera: Camera, visit: MainController, theme: Theme) -> None:
     dialog.done(QDialog.DialogCode.Rejected)
 
 
-def _take_help(camera: Camera, visit: MainController, theme: Theme) -> None:
-    visit.window.go("lab")
-    visit.show_help()
-    camera.take(visit.window, f"help-{theme.name}", HOME)
+def _take_help(camera: Camera, controller: MainController, theme: Theme) -> None:
+    controller.window.go("lab")
+    controller.show_help()
+    camera.take(controller.window, f"help-{theme.name}", HOME)
 
 
-def _take_machine(camera: Camera, visit: MainController, theme: Theme) -> None:
-    visit.window.go("machine")
-    camera.take(visit.window, f"machine-{theme.name}", HOME)
-    place: Any = visit.window.place("machine")
-    place.show_settings(visit.machine.settings, folder="~/Liquid Study", undo="", kept_in=KEPT_IN)
+def _take_machine(camera: Camera, controller: MainController, theme: Theme) -> None:
+    controller.window.go("machine")
+    camera.take(controller.window, f"machine-{theme.name}", HOME)
+    place: Any = controller.window.place("machine")
+    place.show_settings(controller.machine.settings, folder="~/Liquid Study", undo="", kept_in=KEPT_IN)
     place.open_test()
     test = camera.until(lambda: shown(DisplayTest), "the display test")
     test.showNormal()
