@@ -1,7 +1,7 @@
 """Where device, servo, store, session, analysis and windows meet: the ways to open the program.
 
-`visit` holds the main window, `live_session` one session from its choices to the closed journal, `entry` begins or goes
-on with one by command.
+`main_controller` runs the main window, `session.live_session` one session from its choices to the closed journal;
+`session.entry` starts or resumes a session by command.
 """
 
 from study_app.gui.display.display_check import missing_library

@@ -139,7 +139,7 @@ class TrialStatistics:
         }
 
     def _move(self, positions: NDArray[np.float64]) -> None:
-        """Add the path through ``positions`` (n, 3) [m]; places that are no numbers are left out."""
+        """Add the path through ``positions`` (n, 3) [m]; non-finite ones are left out."""
         finite = np.isfinite(positions).all(axis=1)
         places = positions if finite.all() else positions[finite]
         if self._last_m is not None:

@@ -43,7 +43,7 @@ def run(
     Parameters
     ----------
     protocol : file or name of a protocol
-    participant, session, operator : who, for the how-manieth time, and who runs it
+    participant, session, operator : participant's id, session number, operator's id
     seed : default: drawn, shown and recorded
     device, language : default: the mouse, the protocol's first language
     device_options : values of the device's options, by name

@@ -273,7 +273,7 @@ class LiveSession(QObject):
         return choose_screens(chosen if chosen is not None else screen_number(self.settings))
 
     def diagnose(self) -> None:
-        """Open the diagnosis of what is felt with over the operator's window; the bridge has stopped the force."""
+        """Open the diagnosis of the haptic device over the operator's window; the bridge has stopped the force."""
         assert self.bridge is not None  # noqa: S101 - it has just asked
         name = self.chosen.device
         device = descriptor_of(name)

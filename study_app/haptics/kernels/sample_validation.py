@@ -36,11 +36,11 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
     """Take the sample's position into the scene and return Δt [s], or 0 where there is nothing to take.
 
     Δt is the time since the last accepted sample, so that the next one covers any gap; the first takes the nominal
-    period. A position that is no number, lies more than 10 m off the device's middle along an axis, or is out of reach
-    of a hand of 10 m/s within Δt, is refused; so is one without the velocity, of 10 m/s at most along an axis, where
-    the device is to measure that. After five refusals in a row estimator and wakes have lost the
-    body, and the next position that a hand can have is a new beginning. A position that the device only repeats after
-    it was refused is marked as refused too.
+    period. A position is refused where it is not finite, lies more than 10 m off the device's middle along an axis, or
+    is out of reach of a hand of 10 m/s within Δt; so is one without the velocity, of 10 m/s at most along an axis,
+    where the device is to measure that. After five refusals in a row estimator and wakes have lost the body, and the
+    next position that a hand can have is a new beginning. A position that the device only repeats after it was refused
+    is marked as refused too.
     """
     if sample.fresh == 0:
         if state.rejected > 0:

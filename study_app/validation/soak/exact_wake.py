@@ -101,7 +101,7 @@ class Ledger:
 
         Returns
         -------
-        |wake - definition| at the last accepted of them, in units of Σ|e|/S; infinite where that is no number, None
+        |wake - definition| at the last accepted of them, in units of Σ|e|/S; infinite where that is not finite, None
         where there is nothing to compare
         """
         last = _last_accepted(samples)

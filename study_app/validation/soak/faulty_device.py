@@ -62,7 +62,7 @@ FAULTS = np.dtype(
         ("episodes", np.int64, (len(KINDS),)),
         ("jumped_ns", np.int64),
         ("writes", np.int64),
-        ("not_finite", np.int64),  # forces written that are no numbers
+        ("not_finite", np.int64),  # non-finite forces written
         ("most_n", np.float64),  # the greatest force written
         ("last_n", np.float64, (3,)),
     ],

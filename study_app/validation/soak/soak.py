@@ -313,7 +313,7 @@ class Soak:
 
 
 def _size(vector: Floats) -> float:
-    """Return the length of (3,), infinite where it is no number."""
+    """Return the length of (3,), infinite where it is not finite."""
     return float(np.nan_to_num(np.linalg.norm(vector), nan=np.inf))
 
 

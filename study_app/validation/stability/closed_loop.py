@@ -57,7 +57,7 @@ LOOP = np.dtype(
         ("mass_kg", np.float64),  # of the handle
         ("other_kg", np.float64),  # the same in every second stretch of `MASS_S`; 0: always the same
         ("now_s", np.float64),
-        ("broken", np.int64),  # 1 once a force or the handle's place was no number
+        ("broken", np.int64),  # 1 once a force or the handle's position was not finite
         ("was_m", np.float64, (3,)),  # where the hand is
         ("goes_m", np.float64, (3,)),  # where it will be at the next tick
         ("measured", np.int64),  # 1 where it is of this tick

@@ -1,6 +1,6 @@
 """Whether a closed loop was stable: five things that must not happen, and the numbers that say so.
 
-- *not finite*: a force or the handle's place is no number;
+- *not finite*: a force or the handle's position is not finite;
 - *limit*: the servo sent more than it may;
 - *energy*: the passivity at the handle (force that acts · true step, at most what the liquid can give back) fell below
   -1 mJ and the work of the steps under way, (1 + delay) · strongest force · longest step; or below -10 mJ, if that is
