@@ -160,8 +160,8 @@ def test_what_is_drawn_is_of_the_moment_that_was_asked_for_at_every_delay(room):
 def test_plots_and_bookkeeping_take_nothing_from_a_frame(room, monkeypatch):
     """What else a frame's turn does comes after the view was painted, so that it makes no picture older."""
     order = []
-    lookout, tank = type(room.bridge.lookout), type(room.bridge.participant.tank)
-    for kind, name in ((lookout, "look"), (lookout, "show_traces"), (lookout, "show_forces"), (tank, "show_view")):
+    monitor, tank = type(room.bridge.monitor), type(room.bridge.participant.tank)
+    for kind, name in ((monitor, "look"), (monitor, "show_traces"), (monitor, "show_forces"), (tank, "show_view")):
         plain = getattr(kind, name)
         monkeypatch.setattr(
             kind, name, lambda self, *given, plain=plain, name=name: (order.append(name), plain(self, *given))[1]

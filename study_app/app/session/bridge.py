@@ -79,7 +79,7 @@ class SessionBridge(QObject):
         self.operator = operator
         self.strip = strip
         self._called = False
-        self.lookout = OperatorMonitor(parts, refresh_hz)
+        self.monitor = OperatorMonitor(parts, refresh_hz)
         self.trouble = ""
         self.failure: BaseException | None = None
         ports = Ports(parts.servo, parts.journal, self.present, parts.clock, parts.recorder)
@@ -146,7 +146,7 @@ class SessionBridge(QObject):
         if tank is not None and videos is not None:
             videos.fit(*tank.video.size(tank.devicePixelRatioF()))
         if not isinstance(page, TaskPage):
-            self.lookout.health.frames_rest()
+            self.monitor.health.frames_rest()
 
     def start(self) -> None:
         """Begin the session."""
@@ -233,7 +233,7 @@ class SessionBridge(QObject):
         view = self.runner.view(self.parts.servo.now_ns())
         if view is not None:
             self.participant.show_view(view)
-        self.lookout.look()
+        self.monitor.look()
         now_s = self._now()
         if view is not None and self._hand is not None and self._hand.act(now_s, view):
             self._post(Continue(now_s))
@@ -243,22 +243,22 @@ class SessionBridge(QObject):
         """Keep when a frame was painted; on the servo's clock, which is not every system's monotonic one."""
         painted_ns = self.parts.servo.now_ns()
         self.runner.frame_shown(painted_ns, sample_ns)
-        self.lookout.health.frame(painted_ns)
+        self.monitor.health.frame(painted_ns)
 
     @guarded_session_slot
     def show_traces(self) -> None:
         """Draw the newest traces of the hand."""
-        self.lookout.show_traces(self.operator)
+        self.monitor.show_traces(self.operator)
 
     @guarded_session_slot
     def show_forces(self) -> None:
         """Draw the newest forces, where the operator may see them."""
-        self.lookout.show_forces(self.operator)
+        self.monitor.show_forces(self.operator)
 
     @guarded_session_slot
     def show_tiles(self) -> None:
         """Show the servo's lateness and the state of the session."""
-        self.lookout.show_lateness(self.operator)
+        self.monitor.show_lateness(self.operator)
         self._show()
 
     def _changed(self) -> None:
@@ -287,7 +287,7 @@ class SessionBridge(QObject):
 
     def view(self) -> OperatorView:
         """Return what the operator is to see now."""
-        view, again = self.lookout.view(self.trouble, self.runner.stalled), self.reconnection
+        view, again = self.monitor.view(self.trouble, self.runner.stalled), self.reconnection
         if again is None or not self.runner.state.lost_device:
             return view
         return replace(view, may_reconnect=True, reconnects=again.under_way, reconnection=again.line)

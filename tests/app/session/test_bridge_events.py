@@ -87,7 +87,7 @@ def test_painted_frames_are_counted_on_the_servos_clock(bridge, world):
     for frame in range(5):
         world.now_s = 2.0 + frame / 60
         bridge.participant.painted.emit(world.now_ns())
-    vitals = bridge.lookout.health.vitals()
+    vitals = bridge.monitor.health.vitals()
     assert (vitals.refreshes, vitals.refreshes_missed) == (4, 0)
     assert vitals.frame_rate_hz == pytest.approx(60, abs=0.1)
 

@@ -64,7 +64,7 @@ def test_force_wake_share_and_limiters_are_seen(make: Any, world: World) -> None
 
 def test_double_blind_looks_at_no_force(bridge: SessionBridge, world: World) -> None:
     looked(bridge, world)
-    assert bridge.lookout.forces is None
+    assert bridge.monitor.forces is None
     assert isinstance(bridge.operator.force, HiddenForceCard)
     assert rows(bridge)["Force, share of 6 N"] == rows(bridge)["Limiters acted"] == rows(bridge)[WITHHELD] == "hidden"
     assert bridge.operator.header.blind.word == "Double-blind"
