@@ -29,7 +29,7 @@ class Level:
         Force of its drag at the task's fastest point, and of what the limits leave of it [N]; None for a number of the
         condition.
     clipped_by : str or None
-        The "norm" (``device.force_limit_n``) or the "slope" limit of the loop (`haptics.model.limits`).
+        The "norm" (``device.force_limit_n``) or the "slope" limit of the loop (`haptics.model.slope_limits`).
     """
 
     standard: float | None

@@ -200,7 +200,7 @@ def _fade(force_n: Any, lift_n: Any, parameters: Record, safety: Record, sample:
 
 @part
 def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record, sample: Record) -> None:
-    """Limit the change of the force from tick to tick (`limits.slew_limit_n`), without pushing the hand on thereby.
+    """Limit the change of the force from tick to tick (`slope_limits.slew_limit_n`), without pushing the hand on.
 
     A loop that has shown an energy debt gets less, by the controller's gain; a fade the least. A force that is late to
     let go at a reversal would do work on the hand: what of it lies along the motion, and is not wanted there, is

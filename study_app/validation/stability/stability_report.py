@@ -192,7 +192,7 @@ def write(to: Path, swept: Swept, fidelities: Sequence[Fidelity]) -> tuple[Path,
 
 
 def write_limits(file: Path, executor: Executor, progress: Progress | None = None) -> None:
-    """Measure the table of limits that `haptics.model.limits` reads by an executor, and write it.
+    """Measure the table of limits that `haptics.model.slope_limits` reads by an executor, and write it.
 
     Raises
     ------
