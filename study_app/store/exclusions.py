@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import contextlib
 import csv
 import io
 import json
@@ -14,6 +15,7 @@ from study_app.errors import StoreError
 from study_app.store.atomic import append_line, cannot_read, read_regular, write_file
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
+from study_app.store.journals.parsing import parse_json
 from study_app.store.progress import progress_of
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.tables.column import MISSING, header
@@ -154,6 +156,33 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
     if tuple(names) != header(EXCLUSIONS):
         raise StoreError(f"{path}: its columns must be {', '.join(header(EXCLUSIONS))}, but are {', '.join(names)}")
     return tuple(_exclusion(path, number, row) for number, row in enumerate(rows, start=2))
+
+
+def reversals(folder: Path) -> tuple[Exclusion, ...]:
+    """Return the exclusions of the study in ``folder`` that were taken back, in the order of these decisions.
+
+    Raises
+    ------
+    StoreError
+        The list cannot be read, or a line of it is not a reversed exclusion.
+    """
+    path = StudyFolder(folder).reversed_exclusions
+    try:
+        lines = read_regular(path).split(b"\n")  # a reason may hold other ends of a line
+    except FileNotFoundError:
+        return ()
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    return tuple(_reversed(path, number, line) for number, line in enumerate(lines, start=1) if line.strip())
+
+
+def _reversed(path: Path, number: int, line: bytes) -> Exclusion:
+    with contextlib.suppress(ValueError, KeyError, TypeError):
+        taken = Exclusion(**parse_json(line)["exclusion"])
+        texts = (taken.participant, taken.rule_or_person, taken.reason, taken.excluded_at)
+        if all(isinstance(text, str) for text in texts) and isinstance(taken.session, int):
+            return taken
+    raise StoreError(f"{path}, line {number} is not a reversed exclusion: restore it from a copy, or remove the line")
 
 
 def without_mark(content: bytes) -> bytes:

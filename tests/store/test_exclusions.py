@@ -15,7 +15,9 @@ from typing import Any
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.exclusions import Exclusion, exclude, exclusions, include
+from study_app.store.blinded.catch_trials import RULE
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
@@ -224,6 +226,25 @@ def test_an_exclusion_is_taken_back_and_stays_on_record(folder: Path) -> None:
     found = verify(folder)
     assert found.sound
     assert "exclusions_reversed" not in str(found)
+
+
+def test_any_reason_of_a_reversal_leaves_the_rule_catch_applicable(folder: Path) -> None:
+    """Some end a line in Python's eyes, but not in the file's."""
+    exclude(folder, "P007", 1, by=RULE, reason="missed \u2028 many \x85 trials")
+    include(folder, "P007", 1, by="CD", reason="understood late \u2029 and \x0b well")
+    assert [(row.participant, row.rule_or_person) for row in reversals(folder)] == [("P007", RULE)]
+    assert unblind(folder, "CD", "to analyse").left == ()
+    assert verify(folder).sound
+
+
+@pytest.mark.parametrize("line", ["{", '{"at": "now"}', '{"exclusion": {"participant": "P007"}}', "[" * 5000])
+def test_a_damaged_reversal_is_an_error_and_decides_nothing(folder: Path, line: str) -> None:
+    path = folder / "exclusions_reversed.jsonl"
+    path.write_text(f"{line}\n")
+    said = "line 1 is not a reversed exclusion: restore it from a copy, or remove the line"
+    assert [str(one) for one in verify(folder).errors] == [f"exclusions_reversed.jsonl: {said}"]
+    (left,) = unblind(folder, "CD", "to analyse").left
+    assert left == f"the rule catch was not applied: {path}, {said}; then unblind again"
 
 
 def test_what_is_not_left_out_cannot_be_taken_back(folder: Path) -> None:

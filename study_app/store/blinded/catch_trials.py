@@ -6,7 +6,6 @@ Any earlier, the count would reveal which answers were correct.
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -14,11 +13,10 @@ from typing import Final
 from study_app.errors import StoreError
 from study_app.protocol.trials.answered import heard_in
 from study_app.store import receipt
-from study_app.store.atomic import is_there, read_regular
 from study_app.store.blinded.blinding import Key, read_key
 from study_app.store.blinded.sealing import opened
 from study_app.store.blinded.whole_protocol import whole_protocol
-from study_app.store.exclusions import Exclusion, exclude, exclusions
+from study_app.store.exclusions import Exclusion, exclude, exclusions, reversals
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
@@ -38,7 +36,8 @@ def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
         The list of exclusions cannot be read or written.
     """
     study, key = StudyFolder(folder), read_key(folder)
-    decided = {row.what[:2] for row in exclusions(folder) if row.trial is None} | _included_again(study)
+    decided = {row.what[:2] for row in exclusions(folder) if row.trial is None}
+    decided |= {row.what[:2] for row in reversals(folder) if row.rule_or_person == RULE}
     added: list[Exclusion] = []
     for session in study.sessions():
         if (session.participant, session.number) in decided or is_open(session.path):
@@ -68,11 +67,3 @@ def _missed(session: SessionFolder, key: Key) -> Iterator[str]:
                 f'block "{block.id}": {wrong} of {len(answered)} catch trials answered incorrectly, '
                 f"at most {100 * block.catch.wrong_most:g} % are permitted"
             )
-
-
-def _included_again(study: StudyFolder) -> set[tuple[str, int]]:
-    if not is_there(study.reversed_exclusions):
-        return set()
-    lines = read_regular(study.reversed_exclusions).decode("utf-8").splitlines()
-    rows = [json.loads(line)["exclusion"] for line in lines if line.strip()]
-    return {(row["participant"], row["session"]) for row in rows if row["rule_or_person"] == RULE}

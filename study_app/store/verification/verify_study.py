@@ -264,6 +264,8 @@ def _published(study: StudyFolder) -> Iterator[dict[str, Any]]:
 
 
 def _exclusions(study: StudyFolder, sessions: Sessions, found: Gathered) -> None:
+    with found.reading(study.reversed_exclusions):
+        exclusions.reversals(study.path)
     with found.reading(study.exclusions):
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
