@@ -24,6 +24,7 @@ from study_app.errors import StoreError
 from study_app.store.atomic import cannot_read, read_regular
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
+from study_app.store.journals.journal_events import holds, shortened
 from study_app.store.journals.parsing import check_study_name, parse_json
 
 MANIFEST: Final = "sites.json"
@@ -100,10 +101,13 @@ def read_merged(folder: Path) -> Merged | None:
     try:
         held = parse_json(read_regular(path))
         if held["format"] != FORMAT:
-            raise StoreError(f"{path} has format {held['format']!r}, this version reads {FORMAT}: use a newer version")
+            shown = shortened(held["format"])
+            raise StoreError(f"{path} has format {shown}, this version reads {FORMAT}: use a newer version")
         sites = tuple(Site(**site) for site in held["sites"])
-        if sites and all(map(_is_site, sites)) and isinstance(held["protocol_hash"], str):
-            return Merged(folder, check_study_name(held["study"]), held["protocol_hash"], sites)
+        if sites and all(map(_is_site, sites)) and holds("protocol_hash", held["protocol_hash"]):
+            merged = Merged(folder, check_study_name(held["study"]), held["protocol_hash"], sites)
+            _refuse_links(merged)
+            return merged
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
@@ -114,8 +118,16 @@ def read_merged(folder: Path) -> Merged | None:
 
 
 def _is_site(site: Site) -> bool:
-    texts = all(isinstance(text, str) for text in (site.name, site.merged_at, site.key_hash))
-    return texts and isinstance(site.sessions, int) and ID_PATTERN.fullmatch(site.name) is not None
+    named = isinstance(site.name, str) and ID_PATTERN.fullmatch(site.name) is not None
+    typed = holds("at", site.merged_at) and holds("key_hash", site.key_hash) and isinstance(site.sessions, int)
+    return named and typed
+
+
+def _refuse_links(merged: Merged) -> None:
+    """Refuse a folder of a site that lies elsewhere: it would be read as if it were the copy."""
+    for folder in map(merged.folder, merged.names):
+        if not folder.resolve().is_relative_to(merged.path.resolve()):
+            raise StoreError(f"{folder} leads out of {merged.path}, to {folder.resolve()}: put the folder itself there")
 
 
 def folders_of(folder: Path) -> dict[str, Path]:

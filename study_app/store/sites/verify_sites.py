@@ -14,11 +14,12 @@ from study_app.store.atomic import temporaries
 from study_app.store.blinded.blinding import sealed_hash
 from study_app.store.folders import StudyFolder
 from study_app.store.sites.merge import unlisted
-from study_app.store.sites.merged import FOLDER, Merged, read_merged
+from study_app.store.sites.merged import FOLDER, Merged, Site, read_merged
+from study_app.store.tables.study_description import described_study
 from study_app.store.verification.psychds import Issue, PsychDs
 from study_app.store.verification.verify_study import Findings, verify
 from study_app.store.verification.violations import Finding, Gathered
-from study_app.store.withdrawals.tombstones import describe_session
+from study_app.store.withdrawals.tombstones import describe_session, tombstones
 
 Placed = TypeVar("Placed", Finding, Issue)
 
@@ -80,6 +81,7 @@ def _between(merged: Merged, found: Gathered) -> None:
         if sealed_hash(folder) != site.key_hash:
             key = StudyFolder(folder).key
             found.error(key, f"is not the key that site {site.name} was merged with: restore it from a copy")
+        _compare(merged, site, found)
         for session in StudyFolder(folder).sessions():
             with contextlib.suppress(StoreError):  # said when the site is checked
                 if (other := receipt.read(session.receipt)["protocol_hash"]) != merged.protocol_hash:
@@ -92,6 +94,18 @@ def _between(merged: Merged, found: Gathered) -> None:
         found.warning(path, f"is no site that {merged.manifest.name} lists, and does not count")
     for path in temporaries(merged.path):
         found.warning(path, "is an incomplete file of a program that was ended, or is being written")
+
+
+def _compare(merged: Merged, site: Site, found: Gathered) -> None:
+    """Compare a site's folder with what the list of sites says of it; sessions are only erased there."""
+    study = StudyFolder(merged.folder(site.name))
+    if (name := described_study(study)) not in (None, merged.study):
+        found.error(study.path, f"is of study {name}, but {merged.manifest.name} lists sites of {merged.study}")
+    with contextlib.suppress(StoreError):  # said when the site is checked
+        erased = sum(len(one.sessions) for one in tombstones(study).values())
+        if (there := len(study.sessions())) + erased < site.sessions:
+            which = f"{there} of the {site.sessions} sessions that {merged.manifest.name} lists"
+            found.error(study.path, f"has {which}: restore the others from a copy")
 
 
 def _placed(site: str, found: Findings) -> Findings:

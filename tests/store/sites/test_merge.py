@@ -19,6 +19,7 @@ from study_app.store.blinded.blinding import reveals
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sites.merge import merge
 from study_app.store.sites.merged import all_exclusions, own_place, read_merged
 from study_app.store.sites.merged_rows import participants_of
@@ -254,6 +255,50 @@ def test_a_damaged_list_of_sites_is_refused(pooled: Path) -> None:
     (pooled / "sites.json").write_text('{"format": 2}')
     with pytest.raises(StoreError, match="format 2"):
         read_merged(pooled)
+
+
+def test_a_site_elsewhere_is_not_read(pooled: Path, tmp_path: Path) -> None:
+    (pooled / "sites/B").rename(tmp_path / "elsewhere")
+    (pooled / "sites/B").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(StoreError, match=r"sites/B leads out of .*pooled, to .*elsewhere: put the folder itself there"):
+        read_merged(pooled)
+
+
+def test_a_list_of_sites_that_was_changed_is_an_error(pooled: Path) -> None:
+    path = pooled / "sites.json"
+    held = json.loads(path.read_text())
+    path.write_text(json.dumps(held | {"study": "another"}))
+    found = list(map(str, verify_folder(pooled).errors))
+    assert found == [f"sites/{name}: is of study demo, but sites.json lists sites of another" for name in "AB"]
+    path.write_text(json.dumps(held | {"format": "x" * 5000}))
+    with pytest.raises(StoreError, match=r"has format 'x{199}…, this version reads 1"):
+        read_merged(pooled)
+
+
+def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[str, Path], results: Path) -> None:
+    lab = Path(shutil.copytree(labs["A"], results / "lab"))
+    session = lab / "data/sub-P002/ses-01"
+    unfinished(session)
+    assert verify(lab).sound
+    pooled = merge({"A": lab, "B": labs["B"]}, results / "pooled").path
+    assert verify_folder(pooled).sound
+    shutil.rmtree(pooled / "sites/A/data/sub-P002")
+    said = "sites/A: has 1 of the 2 sessions that sites.json lists: restore the others from a copy"
+    assert said in list(map(str, verify_folder(pooled).errors))
+
+
+def unfinished(session: Path) -> None:
+    """Take the end of a session away, and what follows from it."""
+    path = session / "journal.jsonl"
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
+    (session / "checksums.sha256").unlink()
+    receipt = json.loads((session / "receipt.json").read_text())
+    held = receipt | {"status": "unfinished", "reason": "", "ended_at": None}
+    (session / "receipt.json").write_text(json.dumps(held))
+    fingerprints = session.parents[2] / "fingerprints.txt"
+    kept = [line for line in fingerprints.read_text().splitlines(keepends=True) if session.parent.name not in line]
+    fingerprints.write_text("".join(kept))
+    rebuild(session)
 
 
 def test_keys_stay_sealed_and_are_opened_each(labs: dict[str, Path], pooled: Path) -> None:
