@@ -66,7 +66,7 @@ def _setting() -> str | None:
     """Return what the settings file says; a file that cannot be used says nothing (`store.workstation` reports it)."""
     try:
         document = json.loads(settings_file().read_bytes())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
     folder = setting_of(document) if isinstance(document, dict) else None
     return folder if isinstance(folder, str) else None

@@ -15,6 +15,7 @@ from typing import Any, Final, TypeAlias
 
 from study_app.authoring.versions.contents import file_key, keep_version, write_whole
 from study_app.errors import StoreError
+from study_app.store.journals.parsing import parse_json
 from study_app.user_folder import data_folder
 
 REST_S: Final = 0.5
@@ -137,7 +138,7 @@ def keep(file: Path, draft: Draft) -> None:
 def draft_of(file: Path) -> Draft | None:
     """Return the draft of a study's file; None where there is none that can be read."""
     try:
-        kept: Any = json.loads(_draft_file(file).read_bytes())
+        kept: Any = parse_json(_draft_file(file).read_bytes())
         selected = tuple(step for step in kept["selected"] if isinstance(step, str | int))
         draft = Draft(kept["text"], kept["base"], selected, kept["kept_at"])
     except (OSError, ValueError, KeyError, TypeError):
@@ -150,7 +151,7 @@ def drafted_files() -> tuple[Path, ...]:
     found: list[Path] = []
     for kept in (data_folder() / "drafts").glob("*.json"):
         try:
-            file = Path(json.loads(kept.read_bytes())["file"])
+            file = Path(parse_json(kept.read_bytes())["file"])
         except (OSError, ValueError, KeyError, TypeError):
             continue
         if draft_of(file) is not None:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from study_app.errors import AnalysisError
 from study_app.protocol.model import Protocol
+from study_app.store.journals.parsing import parse_json
 
 FILE: Final = "preregistration.md"
 """Its name in a study's folder."""
@@ -78,10 +79,19 @@ def read(folder: Path) -> Commitment | None:
     except (OSError, UnicodeDecodeError) as error:
         raise AnalysisError(f"{path} cannot be read ({error}): restore it from a copy") from error
     try:
-        values: dict[str, Any] = json.loads(found[-1])
-        return Commitment(**{**values, "rules": tuple(values["rules"])})
+        values: dict[str, Any] = parse_json(found[-1])
+        one = Commitment(**{**values, "rules": tuple(values["rules"])})
+        _check_types(one)
     except (IndexError, KeyError, TypeError, ValueError) as error:
         raise AnalysisError(
             f"{path} does not end with what `liquid-study preregister` writes there ({type(error).__name__}): restore "
             "it from a copy, or remove it"
         ) from error
+    return one
+
+
+def _check_types(one: Commitment) -> None:
+    """Refuse what `written` never writes (TypeError)."""
+    texts = all(isinstance(text, str) for text in (one.study, one.version, one.protocol_hash, *one.rules))
+    if not (texts and isinstance(one.participants, int | None) and isinstance(one.precision, int | float | None)):
+        raise TypeError("values of other types")

@@ -125,7 +125,7 @@ class Messages:
 def _object(text: bytes) -> dict[str, Any]:
     try:
         found = json.loads(text, parse_constant=_refuse)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise FAILURES.failure("not-json", str(error)) from None
     if not isinstance(found, dict):
         raise FAILURES.failure("not-json", "it is not an object")

@@ -44,7 +44,7 @@ def force_scale(host: str, ports: tuple[int, ...] = PORTS) -> float | None:
 def ask(host: str, path: str, ports: tuple[int, ...] = PORTS) -> Any:
     """Return what the service answers to a GET as JSON; None where nothing at these ports does."""
     for port in ports:
-        with contextlib.suppress(OSError, ValueError):
+        with contextlib.suppress(OSError, ValueError, RecursionError):
             request = f"http://{host}:{port}{path}"
             with urllib.request.urlopen(request, timeout=ANSWER_S) as answer:
                 return json.loads(answer.read(1 << 20))

@@ -102,10 +102,14 @@ def _tombstone(path: Path, number: int, line: bytes) -> Tombstone:
         held: dict[str, Any] = parse_json(line)
         sessions = tuple(ErasedSession(**one) for one in held.pop("sessions"))
         made = Tombstone(**held, sessions=sessions)
-        texts = (made.participant, made.at, made.by, made.reason, *(one.fingerprint for one in sessions))
+        proofs = (text for one in sessions for text in (one.begun, one.checksums, one.fingerprint))
+        texts = (made.participant, made.at, made.by, made.reason, *proofs)
         typed = all(isinstance(text, str) for text in texts) and all(isinstance(one.session, int) for one in sessions)
         if typed and ID_PATTERN.fullmatch(made.participant):
             return made
     except (ValueError, KeyError, TypeError, AttributeError):
         pass
-    raise StoreError(f"{path}, line {number} is not a withdrawal: restore it from a copy")
+    raise StoreError(
+        f"{path}, line {number} is not a withdrawal: restore it from a copy; if it is an incomplete last line, "
+        "remove it and withdraw again"
+    )

@@ -170,7 +170,7 @@ def load(serial: str) -> Calibration | None:
         whole = _GAINS[0] <= found.units_per_nm <= _GAINS[1] and abs(found.arm_offset_rad) <= _OFFSETS_RAD
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError, RecursionError) as error:
         raise _unusable(file) from error
     if not whole:
         raise _unusable(file)

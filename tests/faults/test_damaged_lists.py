@@ -1,0 +1,123 @@
+"""Small files besides the sessions, damaged at random with fixed seeds: whatever reads one says so, or reads values."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app import workspace
+from study_app.analysis.preregistration import commitment
+from study_app.authoring import drafts
+from study_app.devices.falcon.mechanics import calibration
+from study_app.errors import StudyError
+from study_app.store import workstation
+from study_app.store.blinded.allocation import claims
+from study_app.store.exclusions import Exclusion, reversals
+from study_app.store.folders import StudyFolder
+from study_app.store.sites.merged import Merged, Site, all_exclusions, read_merged
+from study_app.store.verification.fingerprints import listed, unreadable
+from study_app.store.withdrawals.output_log import outputs
+from study_app.store.withdrawals.tombstones import ErasedSession, Tombstone, tombstones
+from study_app.user_folder import data_folder, settings_file
+from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting
+
+SEED = int(os.environ.get("LIQUID_STUDY_DAMAGE_SEED", "5"))
+CASES = 4 * int(os.environ.get("LIQUID_STUDY_DAMAGE_CASES", "12"))
+AT = "2026-03-02T09:30:00.000+01:00"
+HASH = "0123456789abcdef" * 4
+LINE = json.dumps({"at": AT, "by": "AB", "reason": "x", "exclusion": asdict(Exclusion("P1", 1, None, "CD", "y", AT))})
+TOMBSTONE = Tombstone("P1", AT, "AB", "asked", (ErasedSession(1, HASH, HASH, "k3vq-7m2p-xw4d"),))
+MERGED = Merged(Path(), "demo", HASH, (Site("A", AT, HASH, 3), Site("B", AT, HASH, 4)))
+COMMITMENT = commitment.Commitment("demo", "1", HASH, 24, 0.1, ("catch",))
+
+
+def read_workspace(_folder: Path) -> object:
+    made = workspace.workspace()
+    return made.own_protocols(), made.results.is_dir()
+
+
+def use_commitment(folder: Path) -> object:
+    found = commitment.read(folder)
+    return found and (found.protocol_hash[:12], set(found.rules))
+
+
+KINDS: dict[str, tuple[Callable[[Path], Path], str, Callable[[Path], object]]] = {
+    "reversed exclusions": (lambda f: f / "exclusions_reversed.jsonl", f"{LINE}\n{LINE}\n", reversals),
+    "withdrawals": (
+        lambda f: f / "withdrawals.jsonl",
+        f"{json.dumps(asdict(TOMBSTONE))}\n",
+        lambda f: tombstones(StudyFolder(f)),
+    ),
+    "sites": (lambda f: f / "sites.json", MERGED.content().decode(), lambda f: (read_merged(f), all_exclusions(f))),
+    "entry": (
+        lambda f: StudyFolder(f).allocation(1),
+        json.dumps({"entry": 1, "participant": "P1", "sealed": "00ff"}),
+        lambda f: claims(StudyFolder(f)),
+    ),
+    "fingerprints": (
+        lambda f: f / "fingerprints.txt",
+        "k3vq-7m2p-xw4d  data/sub-P007/ses-01\n",
+        lambda f: (listed(f / "fingerprints.txt"), unreadable(f / "fingerprints.txt")),
+    ),
+    "preregistration": (lambda f: f / commitment.FILE, commitment.written(COMMITMENT), use_commitment),
+    "settings": (lambda _: settings_file(), workstation.DEFAULTS.model_dump_json(), lambda _: workstation.load()),
+    "workspace": (lambda _: settings_file(), '{"workspace": "/tmp", "results": "/tmp/results"}', read_workspace),
+    "outputs": (
+        lambda _: data_folder() / "outputs.jsonl",
+        '{"study": "STUDY", "to": "/tmp", "at": "now", "files": ["a.csv"]}\n',
+        lambda f: [one.paths for one in outputs(f)],
+    ),
+    "draft": (
+        lambda f: data_folder() / "drafts" / f"{drafts.file_key(f / 'x.toml')}.json",
+        '{"file": "FILE", "base": "", "selected": ["study", 1], "kept_at": "now", "text": "x"}',
+        lambda f: (drafts.draft_of(f / "x.toml"), drafts.drafted_files()),
+    ),
+    "calibration": (
+        lambda _: calibration.calibration_file("1"),
+        json.dumps(asdict(calibration.Calibration("libnifalcon", 6616.0))),
+        lambda _: calibration.load("1"),
+    ),
+}
+
+
+def damaged(content: bytes, chance: random.Random) -> Iterator[bytes]:
+    yield from (b"", bytes(len(content)), content[: len(content) // 2])
+    for _ in range(CASES):
+        yield with_a_bit_flipped(content, chance)
+    for damage in (with_an_odd_value, with_deep_nesting) if content.startswith(b"{") else ():
+        for _ in range(CASES):
+            yield damage(content, chance)
+    for depth in (900, 3000, 100_000) if b"```json" in content else ():
+        yield content.replace(b"24", b"[" * depth + b"]" * depth)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_damaged_file_is_an_error_for_people_and_never_a_traceback(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("LIQUID_STUDY_WORKSPACE", raising=False)
+    monkeypatch.chdir(tmp_path)
+    place, text, read = KINDS[kind]
+    path = place(tmp_path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    content = text.replace("STUDY", str(tmp_path)).replace("FILE", str(tmp_path / "x.toml")).encode()
+    path.write_bytes(content)
+    assert read(tmp_path), kind
+    errors: list[Any] = []
+    for change in damaged(content, random.Random(f"{SEED} {kind}")):  # noqa: S311 - a fixed choice of damage
+        path.write_bytes(change)
+        with contextlib.suppress(StudyError):
+            try:
+                read(tmp_path)
+            except StudyError as error:
+                errors.append(error)
+                raise
+    assert all(len(str(error)) < 1000 and "\n" not in str(error) for error in errors), max(map(str, errors), key=len)
