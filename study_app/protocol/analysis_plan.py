@@ -14,10 +14,11 @@ from study_app.haptics.model.ranges import within
 from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.problems import Fault, did_you_mean
 from study_app.protocol.table import Table
-from study_app.protocol.texts import Id
+from study_app.protocol.texts import Brief, Id
 
 LATER: Final = frozenset({"participants", "precision", "published"})
 """Keys that format 1 does not have."""
+Reported = Annotated[float, within(-1e9, 1e9, "thresholds are numbers of a protocol, exponents and shares less")]
 LISTS = ("primary", "names", "rising", "falling")
 
 
@@ -29,15 +30,17 @@ class Published(Table):
         description="weber: the Weber fraction; threshold: the threshold; exponent: the exponent of a power law; pse: "
         "the point of subjective equality."
     )
-    value: float = Field(description="The value; a threshold in the unit of the varied number.")
-    standard: float | None = Field(default=None, description="Its standard, in that unit; left out: of all.")
-    low: float | None = Field(default=None, description="Lower end of its interval or range.")
-    high: float | None = Field(default=None, description="Upper end of its interval or range.")
+    value: Reported = Field(description="The value; a threshold in the unit of the varied number.")
+    standard: Reported | None = Field(default=None, description="Its standard, in that unit; left out: of all.")
+    low: Reported | None = Field(default=None, description="Lower end of its interval or range.")
+    high: Reported | None = Field(default=None, description="Upper end of its interval or range.")
     percent: Annotated[float, within(0, 100, "a share of answers")] | None = Field(
         default=None, description="Percentage of correct answers at the value; left out: unknown."
     )
-    n: Annotated[int, Field(ge=1)] | None = Field(default=None, description="Number of its participants.")
-    source: str = Field(default="", description="Where it was published.")
+    n: Annotated[int, within(1, 1_000_000, "no study had more")] | None = Field(
+        default=None, description="Number of its participants."
+    )
+    source: Brief = Field(default="", description="Where it was published.")
 
     def described(self) -> str:
         """Return it in words."""

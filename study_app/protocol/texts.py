@@ -71,6 +71,10 @@ def _not_longer(most: int) -> AfterValidator:
 Description: TypeAlias = Annotated[
     str, AfterValidator(lambda text: _printable(text) if text else text), StringConstraints(max_length=MAX_BODY)
 ]
+Brief: TypeAlias = Annotated[
+    str, AfterValidator(lambda text: _printable(text) if text else text), StringConstraints(max_length=MAX_TEXT)
+]
+"""What may be left empty, and fits in a line or two."""
 Printable: TypeAlias = Annotated[str, AfterValidator(_printable), StringConstraints(max_length=MAX_TEXT)]
 _Text: TypeAlias = Annotated[
     str | dict[str, str],

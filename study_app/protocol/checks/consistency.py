@@ -34,8 +34,11 @@ from study_app.protocol.model import (
 )
 from study_app.protocol.source.document import Path, names
 from study_app.protocol.source.problems import Fault
+from study_app.protocol.trials.stimuli import OF_CONDITION
 from study_app.protocol.trials.task import Task
 
+DIGITS = 6
+"""Conditions whose delays differ by less than a nanosecond present the same."""
 _TABLES = ("liquids", "conditions", "tasks", "pages", "blocks")
 
 
@@ -184,7 +187,8 @@ def equal_conditions(parts: Draft) -> Iterator[Fault]:
         for index, condition in enumerate(() if delays and block.replicates else block.conditions):
             if (one := presented.get(condition)) is None:
                 continue
-            presents = (one.liquid_ids, one.delay_ms, one.ball, one.link(), one.view, one.overlay)
+            numbers_of = (round(getattr(one, key), DIGITS) for key in OF_CONDITION)
+            presents = (one.liquid_ids, one.ball, one.view, one.overlay, *numbers_of)
             earlier = first.setdefault(presents, condition)
             if earlier != condition:
                 message = f'"{condition}" presents the same as "{earlier}"'

@@ -6,7 +6,7 @@ These checks need a whole sound protocol, whose stimuli can be presented at the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Final
 
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override
@@ -31,6 +31,11 @@ from study_app.protocol.trials.tracks import (
     standards_of,
     tracks_of,
 )
+
+LEAST_MS: Final = 1e-3
+"""The least difference between two times that is presented [ms]: a thousandth of a tick. [choice]"""
+LEAST_SHARE: Final = 1e-6
+"""The least difference between two other numbers, as a share of the standard. [choice]"""
 
 
 def kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
@@ -189,16 +194,34 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
         )
         return
     for standard in standards_of(protocol, block):
+        if standard is not None and (fault := _standard(protocol, block, stimulus, standard, least)) is not None:
+            yield fault
+            return
         for level in (levels[-1], levels[0]):
             value = stimulus.comparison(standard, level)
             if stimulus.vary in OF_CONDITION and not 0 <= value <= OF_CONDITION[stimulus.vary]:
                 yield _beyond(block, stimulus, standard, level)
                 return
-            if (fault := _presented(protocol, stimulus, value)) is not None:
+            if (why := _presented(protocol, stimulus, value)) is not None:
                 what = f"standard {standard:g} at level {level:g} gives" if standard is not None else "the level"
-                yield Fault(("stimuli", str(block.stimulus), "levels"), f"{what} {value:g}: {fault}")
+                yield Fault(("stimuli", str(block.stimulus), "levels"), f"{what} {value:g}: {why}")
                 return
     yield from settings(protocol, block)
+
+
+def _standard(protocol: Protocol, block: Block, stimulus: Stimulus, standard: float, level: float) -> Fault | None:
+    """Return why a standard cannot be presented, or does not differ from a comparison at the smallest level."""
+    place = ("stimuli", str(block.stimulus))
+    if stimulus.vary in OF_CONDITION and not 0 <= standard <= OF_CONDITION[stimulus.vary]:
+        permitted = f"from 0 to {OF_CONDITION[stimulus.vary]:g}"
+        return Fault((*place, "standards"), f"{standard:g}: {stimulus.vary} may be {permitted}", permitted)
+    if (why := _presented(protocol, stimulus, standard)) is not None:
+        return Fault((*place, "standards"), f"{standard:g}: {why}")
+    least = LEAST_MS if stimulus.vary.endswith("_ms") else LEAST_SHARE * (abs(standard) or 1.0)
+    if level == 0 or stimulus.level_kind == "value" or abs(stimulus.comparison(standard, level) - standard) >= least:
+        return None
+    message = f"{level:g} gives the same as the standard of {standard:g}: nothing differs"
+    return Fault((*place, "levels"), message, f"the comparison must differ by at least {least:g}")
 
 
 def _beyond(block: Block, stimulus: Stimulus, standard: float | None, level: float) -> Fault:

@@ -8,8 +8,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id
+
+Weight = Annotated[float, within(-1e6, 1e6, "no instrument weights answers more")]
 
 
 class Score(Table):
@@ -23,9 +26,9 @@ class Score(Table):
     items: Annotated[tuple[Id, ...], Field(min_length=1)] = Field(description="The items that are combined.")
     reverse: tuple[Id, ...] = Field(default=(), description="Of these, the items whose answers are reversed.")
     combine: Literal["mean", "sum"] = Field(default="mean", description="mean: their mean; sum: their sum.")
-    factor: float = Field(default=1, description="What the result is multiplied by.")
-    offset: float = Field(default=0, description="What is then added.")
-    weights: dict[Id, float] = Field(default_factory=dict, description="Weight of an item; left out: 1.")
+    factor: Weight = Field(default=1, description="What the result is multiplied by.")
+    offset: Weight = Field(default=0, description="What is then added.")
+    weights: dict[Id, Weight] = Field(default_factory=dict, description="Weight of an item; left out: 1.")
     weights_from: tuple[Id, ...] = Field(
         default=(), description="Choices between items: each item's weight is how often it was chosen."
     )

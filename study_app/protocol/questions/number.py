@@ -11,7 +11,9 @@ from pydantic_core import PydanticCustomError
 
 from study_app.protocol.forms.show_if import Value
 from study_app.protocol.questions.question import (
+    MOST,
     OPINION_POINTS,
+    Bound,
     Context,
     Draw,
     ItemView,
@@ -20,8 +22,6 @@ from study_app.protocol.questions.question import (
     plain_number,
 )
 from study_app.protocol.texts import Localised
-
-MOST = 1e12
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +71,8 @@ class Number(Question):
     value_type: ClassVar[ValueType] = "number"
 
     kind: Literal["number"] = "number"
-    least: float | None = Field(default=None, alias="from", description="Smallest number; left out: any.")
-    most: float | None = Field(default=None, alias="to", description="Largest number; left out: any.")
+    least: Bound | None = Field(default=None, alias="from", description="Smallest number; left out: any.")
+    most: Bound | None = Field(default=None, alias="to", description="Largest number; left out: any.")
     whole: bool = Field(default=False, description="Whether only whole numbers are permitted.")
     unit: Localised | None = Field(default=None, description="What is counted or measured, shown behind the field.")
 

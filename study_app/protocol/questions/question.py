@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
+from study_app.haptics.model.ranges import within
 from study_app.protocol.forms.scale import Scale
 from study_app.protocol.forms.show_if import ShowIf, Value
 from study_app.protocol.table import Table
@@ -19,6 +20,10 @@ from study_app.protocol.texts import Id, Localised, text_in
 
 Draw: TypeAlias = Callable[[], float]
 ValueType: TypeAlias = Literal["integer", "number", "text"]
+
+MOST: Final = 1e12
+"""No greater number can be given as an answer."""
+Bound: TypeAlias = Annotated[float, within(-MOST, MOST, "no greater number can be given as an answer")]
 
 OPINION_POINTS = 7
 """Opinions of the simulated observer go from 1 to so many points."""

@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 from study_app.protocol.forms.show_if import Value
 from study_app.protocol.questions.question import (
     OPINION_POINTS,
+    Bound,
     Context,
     Draw,
     ItemView,
@@ -68,8 +69,8 @@ class Slider(Question):
     kind: Literal["slider"] = "slider"
     low: Localised = Field(description="Words at the lower end.")
     high: Localised = Field(description="Words at the upper end.")
-    least: float = Field(default=0, alias="from", description="The number at the lower end.")
-    most: float = Field(default=100, alias="to", description="The number at the upper end.")
+    least: Bound = Field(default=0, alias="from", description="The number at the lower end.")
+    most: Bound = Field(default=100, alias="to", description="The number at the upper end.")
     step: float = Field(default=1, gt=0, description="From one number to the next.")
 
     @model_validator(mode="after")

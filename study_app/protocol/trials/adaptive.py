@@ -8,9 +8,12 @@ from typing import Annotated
 
 from pydantic import Field
 
+from study_app.haptics.model.ranges import within
 from study_app.protocol.streams import Draw
 from study_app.protocol.trials.method import Heard, Method, TrackSetting
 from study_app.protocol.trials.stimuli import Stimulus
+
+Count = Annotated[int, within(1, 1000, "no participant answers more in one track")]
 
 
 def counted(number: int, name: str) -> str:
@@ -21,7 +24,7 @@ def counted(number: int, name: str) -> str:
 class Adaptive(Method):
     """A method that chooses each level from the answers to the levels before."""
 
-    trials: Annotated[int, Field(ge=1, le=1000)] = Field(
+    trials: Count = Field(
         default=60, description="How many trials each standard has at most, divided among its tracks."
     )
     begin: Annotated[tuple[float, ...], Field(max_length=4)] | float | None = Field(

@@ -11,7 +11,7 @@ from study_app.cli import main
 from study_app.errors import ProtocolError
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.felt import LEAST_N, force_n
-from study_app.protocol.load import load, parse, shipped
+from study_app.protocol.load import load, parse, shipped, source_bytes
 from study_app.protocol.trials.tasks.explore import Explore
 from study_app.protocol.trials.tasks.stroke import Stroke
 from tests.compiled import needs_servo
@@ -169,6 +169,37 @@ def test_an_impossible_value_is_refused_in_one_line_with_its_place(
     assert all(len(line) < 500 for line in said)
 
 
+LEARNS = 'learn = "threshold" '
+SLIDER = '[questionnaires.s]\nintro = "x"\nitems = [{ id = "a", text = "A?", short = "A", '
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("value = 0.19 ", "value = 1e308", "published.1.value"),
+        ("value = 0.19 ", "value = 0.19\nhigh = 1e308", "published.1.high"),
+        ("n = 10 ", "n = 1_000_000_000", "published.1.n"),
+        ('source = "Jones', 'source = "\\u202EJones', "published.1.source"),
+        ('source = "Jones', f'source = "{"Jones" * 1000}', "published.1.source"),
+        (LEARNS, f"{LEARNS}\nstop = {{ ratio = 1e308 }}", "stop.ratio"),
+        (LEARNS, f"{LEARNS}\nstop = {{ ratio = 1.2, after = 1_000_000_000 }}", "stop.after"),
+        (LEARNS, f"{LEARNS}\nwidths = [1e-300, 1]", "widths.1"),
+        (LEARNS, f"{LEARNS}\nwidth_prior = [0.5, 1e308]", "width_prior.2"),
+        ("[limits]", f'{SLIDER}kind = "number", from = 1e13 }}]\n[limits]', "items.1.from"),
+        ("[limits]", f'{SLIDER}kind = "slider", low = "l", high = "h", to = 1e308, step = 1e307 }}]\n[limits]', "1.to"),
+        ("[limits]", '[methods.set]\nkind = "adjustment"\nstep_size = 1e-300\n[limits]', "set.step_size"),
+        ("[limits]", '[methods.up]\nkind = "updown"\nstep_up = 1e308\n[limits]', "up.step_up"),
+        ("[limits]", '[methods.up]\nkind = "updown"\nstop = { reversals = 1001 }\n[limits]', "stop.reversals"),
+    ],
+)
+def test_an_impossible_value_of_a_study_of_levels_is_refused(old: str, new: str, place: str) -> None:
+    text = source_bytes("viscosityjnd").decode()
+    assert text.count(old) == 1, old
+    with pytest.raises(ProtocolError) as caught:
+        parse(text.replace(old, new).encode(), "file.toml")
+    assert any(one.place.endswith(place) for one in caught.value.problems), caught.value.problems
+
+
 def test_the_table_is_long() -> None:
     assert len({case[1] for case in IMPOSSIBLE}) >= 51
 
@@ -194,6 +225,8 @@ def test_equal_delays_that_are_meant_are_replicates_and_equal_liquids_are_not() 
     assert parse(meant.encode(), "file.toml").blocks["look"].replicates
     with pytest.raises(ProtocolError, match=r'presents the same as "on_time" \(change it, or use repetitions\)'):
         parse(meant.replace(DELAYED, "delay_ms = 0").encode(), "file.toml")
+    with pytest.raises(ProtocolError, match='"again" presents the same as "both"'):
+        parse(text.replace("delay_ms = 120", "delay_ms = 120.0000001", 1).encode(), "file.toml")
 
 
 @pytest.mark.parametrize(

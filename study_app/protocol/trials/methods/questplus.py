@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
+from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Table
-from study_app.protocol.trials.adaptive import Adaptive
+from study_app.protocol.trials.adaptive import Adaptive, Count
 from study_app.protocol.trials.design import Design
 from study_app.protocol.trials.method import Heard, TrackSetting
 from study_app.protocol.trials.psychometric import LAPSES, Assumed, Family, assumed_for, ratio_in_u, running_grid
@@ -22,15 +23,15 @@ if TYPE_CHECKING:
     from study_app.psychophysics.questplus import Search
     from study_app.psychophysics.simulated_tracks import Answers, Observers
 
-Positive = Annotated[float, Field(gt=0)]
+Positive = Annotated[float, within(1e-6, 1e6, "a function is neither a step nor flat")]
 Lapse = Annotated[float, Field(ge=0, lt=0.5)]
 
 
 class Precision(Table):
     """When a track ends early: once the threshold's 95 % interval is narrow enough."""
 
-    ratio: Annotated[float, Field(gt=1)] = Field(description="Its upper end over its lower end, at most.")
-    after: Annotated[int, Field(ge=1)] = Field(default=30, description="After how many answers at the earliest.")
+    ratio: Annotated[float, Field(gt=1, le=1e12)] = Field(description="Its upper end over its lower end, at most.")
+    after: Count = Field(default=30, description="After how many answers at the earliest.")
 
 
 class QuestPlus(Adaptive):
@@ -49,7 +50,7 @@ class QuestPlus(Adaptive):
     widths: tuple[Positive, Positive] | None = Field(
         default=None, description="Smallest and largest width, from 5 to 95 % [decades, or units of the level]."
     )
-    width_prior: tuple[Positive, Annotated[float, Field(gt=1)]] | None = Field(
+    width_prior: tuple[Positive, Annotated[float, Field(gt=1, le=1e6)]] | None = Field(
         default=None, description="Median and factor of the width's log-normal prior."
     )
     lapses: Annotated[tuple[Lapse, ...], Field(min_length=1, max_length=10)] = Field(

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
+from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Table
-from study_app.protocol.trials.adaptive import Adaptive
+from study_app.protocol.trials.adaptive import Adaptive, Count
 from study_app.protocol.trials.method import Answer, Heard, TrackSetting
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.updown import RATIOS, Staircase, converges_to
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 class Reversals(Table):
     """When a track ends early: after so many changes of direction."""
 
-    reversals: Annotated[int, Field(ge=1)] = Field(description="How many reversals, at least.")
-    after: Annotated[int, Field(ge=1)] = Field(default=1, description="After how many answers at the earliest.")
+    reversals: Count = Field(description="How many reversals, at least.")
+    after: Count = Field(default=1, description="After how many answers at the earliest.")
 
 
 class UpDown(Adaptive):
@@ -36,7 +37,7 @@ class UpDown(Adaptive):
         description="1down1up: a step down after each success; 2down1up: after 2 successes in a row; 3down1up: after "
         "3; 4down1up: after 4.",
     )
-    step_up: Annotated[float, Field(gt=0)] | None = Field(
+    step_up: Annotated[float, within(1e-6, 1e6, "a lesser step changes nothing")] | None = Field(
         default=None,
         description="Step after a failure: a factor on log spacing, else a difference; default: a tenth of the span.",
     )
