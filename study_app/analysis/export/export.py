@@ -27,7 +27,7 @@ def export(
     """Write the tables and the codebook of a study into the folder ``to``; return the files.
 
     Tables: responses, trials, aggregate; of a study with levels also intervals and, once its key is open, tracks
-    and thresholds, and where participants set levels their settings.
+    and thresholds, the settings of levels that participants set, and the exponents of magnitude estimation.
 
     Files that are not as they were recorded are used as they are: ``warn`` receives each, and the codebook names it.
 

@@ -1,4 +1,4 @@
-"""The tables of a study with levels: intervals and, once the key is open, its trials, thresholds and settings."""
+"""The tables of a study with levels: intervals; once the key is open, trials, thresholds, settings and exponents."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import pandas as pd
 
 from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.export.delivered import JUDGED, Delivered, delivered
-from study_app.analysis.results.level_results import LevelsFound, SettingFound
+from study_app.analysis.results.level_results import ExponentFound, LevelsFound, SettingFound
 from study_app.analysis.tables.study_tables import Study
 from study_app.analysis.tables.tracks import OF_INTERVALS, tracks
 from study_app.store.tables.column import Column, header, unsealed
 from study_app.store.tables.columns import INTERVALS, TRIALS_2, tables_of
-from study_app.store.tables.level_columns import OF_TRACKS, SETTINGS, THRESHOLDS
+from study_app.store.tables.level_columns import EXPONENTS, OF_TRACKS, SETTINGS, THRESHOLDS
 
 _OF_TRIAL: Final = ("study", "participant", "session", "simulated", "pilot", "group", "trial", "attempt", "block")
 _OF_BLOCK: Final = ("phase", "part", "index", "code")
@@ -47,20 +47,28 @@ def level_tables(study: Study) -> Iterator[Delivered]:
         found = levels_found(study, frame.rename(columns={"level_asked": "level"}))
         yield delivered("thresholds", (*_OF_PERSON, *THRESHOLDS), _thresholds(study, frame, found))
         if any(block.design.adjusts for block in study.levels):
-            yield delivered("settings", (*_OF_PERSON, *SETTINGS), _settings(study, frame, found))
+            own = [(one.block, setting) for one in found for setting in one.own_settings]
+            yield _of_people(study, frame, "settings", SETTINGS, own)
+        if any(block.design.reply == "number" for block in study.levels):
+            exponents = [(one.block, exponent) for one in found for exponent in one.own_power_exponents]
+            yield _of_people(study, frame, "exponents", EXPONENTS, exponents)
 
 
-def _settings(study: Study, tracks: pd.DataFrame, levels: Sequence[LevelsFound]) -> pd.DataFrame:
-    """Return a row per participant and standard of the main blocks whose levels participants set."""
+def _of_people(
+    study: Study,
+    tracks: pd.DataFrame,
+    name: str,
+    columns: tuple[Column, ...],
+    own: Sequence[tuple[str, SettingFound | ExponentFound]],
+) -> Delivered:
+    """Return a table of what was found for each participant in a block, named first."""
     rows = [
-        _person(study, tracks, one.participant) | {"block": found.block, **_named(one, header(SETTINGS))}
-        for found in levels
-        for one in found.own_settings
+        _person(study, tracks, one.participant) | {"block": block, **_named(one, header(columns))} for block, one in own
     ]
-    return _frame(rows, (*_OF_PERSON, *SETTINGS))
+    return delivered(name, (*_OF_PERSON, *columns), _frame(rows, (*_OF_PERSON, *columns)))
 
 
-def _named(one: SettingFound, names: Sequence[str]) -> dict[str, Any]:
+def _named(one: SettingFound | ExponentFound, names: Sequence[str]) -> dict[str, Any]:
     return {name: getattr(one, name) for name in names if hasattr(one, name)}
 
 

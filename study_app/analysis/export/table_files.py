@@ -14,7 +14,7 @@ from study_app.analysis.export.wide_table import Cells, QuestionCells
 from study_app.analysis.tables.study_tables import Study
 
 Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
-OPENED: Final = ("tracks", "thresholds", "settings")
+OPENED: Final = ("tracks", "thresholds", "settings", "exponents")
 """Tables of levels that SPSS files are made of."""
 NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
 

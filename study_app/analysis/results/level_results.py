@@ -312,6 +312,12 @@ class LevelsFound:
         return tuple(one for one in self.settings if one.participant is not None)
 
     @property
+    def own_power_exponents(self) -> tuple[ExponentFound, ...]:
+        """The participants' exponents of magnitude estimation."""
+        power_law = self.summary == "geometric mean"
+        return tuple(one for one in self.exponents if power_law and one.participant is not None)
+
+    @property
     def people(self) -> tuple[str, ...]:
         """The participants who answered."""
         answered = {one.participant for one in self.answers} | {one.participant for one in self.settings}

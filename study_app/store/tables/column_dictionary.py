@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.tables.column import MISSING, Column
 from study_app.store.tables.columns import EXCLUSIONS, INTERVALS, PARTICIPANTS, RESPONSES, RESPONSES_2, TRIALS, TRIALS_2
-from study_app.store.tables.level_columns import OF_TRACKS, SETTINGS, THRESHOLDS
+from study_app.store.tables.level_columns import EXPONENTS, OF_TRACKS, SETTINGS, THRESHOLDS
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
 
 SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
@@ -53,6 +53,12 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
         "study-…_description-settings_data.csv",
         "one row per participant and standard of a block whose levels participants set, after unblinding",
         SETTINGS,
+    ),
+    (
+        "Exponents",
+        "study-…_description-exponents_data.csv",
+        "one row per participant of a block of magnitude estimation, after unblinding",
+        EXPONENTS,
     ),
     ("Exclusions", "exclusions.csv", "one row per excluded session or trial", EXCLUSIONS),
     ("Samples", "recordings/trial-….parquet", "one row per tick of the servo", SAMPLES),

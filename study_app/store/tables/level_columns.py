@@ -1,4 +1,4 @@
-"""Columns of what is known of blocks of levels once the key is open: of tracks, and of thresholds."""
+"""Columns of what is known of blocks of levels once the key is open: of tracks, thresholds, settings and exponents."""
 
 from __future__ import annotations
 
@@ -73,6 +73,17 @@ SETTINGS: Final[tuple[Column, ...]] = (
     ),
 )
 """Of one row per participant and standard of a block whose levels participants set."""
+
+EXPONENTS: Final[tuple[Column, ...]] = (
+    Column("block", "text", "Id of the block."),
+    Column("n", "integer", "Levels with answers that count.", minimum=2),
+    Column(
+        "exponent",
+        "number",
+        "Exponent of the power law: the slope of the mean ln answer at each level on ln level, at delivered levels.",
+    ),
+)
+"""Of one row per participant of a block of magnitude estimation."""
 
 THRESHOLDS: Final[tuple[Column, ...]] = (
     Column("block", "text", "Id of the block."),

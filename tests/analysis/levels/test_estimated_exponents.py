@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from dataclasses import replace
@@ -14,6 +15,7 @@ from scipy import stats
 
 from study_app.analysis.designs.estimated_exponents import estimate_slope, estimated_exponents
 from study_app.analysis.designs.level_summaries import levels_found
+from study_app.analysis.export.export import export
 from study_app.analysis.report.answers import level_section
 from study_app.analysis.report.answers.level_findings import level_findings
 from study_app.analysis.report.answers.level_methods import level_methods
@@ -22,6 +24,8 @@ from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
+from study_app.store.tables.column import header
+from study_app.store.tables.level_columns import EXPONENTS
 from tests.analysis.levels.test_sensitivities import block
 from tests.analysis.report.read_report import numbers, run_in_r
 
@@ -117,6 +121,20 @@ def test_group_intervals_leave_out_the_units_that_participants_chose(thickness: 
         assert one.low is not None
         assert other.low / other.value == pytest.approx(one.low / one.value)
     assert scaled.exponents[0].exponent == pytest.approx(found.exponents[0].exponent)
+
+
+@pytest.mark.slow
+def test_the_export_has_the_exponents_of_the_report(thickness: Path, tmp_path: Path) -> None:
+    files = export(thickness, tmp_path, extras={"sav", "parquet"})
+    with (tmp_path / "study-thickness_description-exponents_data.csv").open(newline="", encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    (found,) = levels_found(load_study(thickness))
+    assert [(row["participant"], row["block"], int(row["n"]), float(row["exponent"])) for row in table] == [
+        (one.participant, "thickness", one.n, pytest.approx(one.exponent, rel=1e-12)) for one in found.exponents[1:]
+    ]
+    assert list(table[0])[5:] == list(header(EXPONENTS))
+    assert {path.suffix for path in files if "exponents" in path.name} == {".csv", ".sav", ".parquet"}
+    assert not [path for path in files if "settings" in path.name]
 
 
 @pytest.mark.slow

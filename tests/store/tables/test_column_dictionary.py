@@ -7,7 +7,7 @@ import pytest
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.tables.column_dictionary import SECTIONS, dictionary_markdown
 from study_app.store.tables.columns import EXCLUSIONS, GROUP, INTERVALS, RESPONSES_2, TABLES, TRIALS_2, VIDEO
-from study_app.store.tables.level_columns import OF_TRACKS, SETTINGS, THRESHOLDS
+from study_app.store.tables.level_columns import EXPONENTS, OF_TRACKS, SETTINGS, THRESHOLDS
 from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
 
 OF_FORMAT_2 = tuple(column for column in TRIALS_2 if column not in TABLES["trials"])
@@ -21,7 +21,7 @@ def test_every_column_of_every_file_has_its_line() -> None:
     outcome, *video, intervals, group = OF_FORMAT_2
     assert tuple(video) == VIDEO
     assert (outcome.levels[-1][0], intervals.name, group) == ("invalid", "intervals", GROUP)
-    opened = (OF_TRACKS, THRESHOLDS, SETTINGS)
+    opened = (OF_TRACKS, THRESHOLDS, SETTINGS, EXPONENTS)
     assert list(sections.values()) == [*tables, OF_FORMAT_2, *opened, EXCLUSIONS, SAMPLES, FRAMES]
     parts = re.split(r"^## ([\w, ]+)$", text, flags=re.MULTILINE)
     assert parts[1::2] == [*sections, "Journal"]
