@@ -60,8 +60,8 @@ def _trials(_context: click.Context, _option: click.Parameter, value: str | None
     "--trials",
     callback=_trials,
     metavar="N,N,…",
-    help="Trials of each standard or comparison, for studies of thresholds, d′ or magnitude estimation; default: the "
-    "protocol's.",
+    help="Trials of each standard, comparison or rated level, for studies of thresholds, d′, ratings or magnitude "
+    "estimation; default: the protocol's.",
 )
 @click.option(
     "--studies",
@@ -85,9 +85,10 @@ def power(
     """Estimate the power of the protocol's own tests on simulated studies, and the smallest detectable difference.
 
     Four sessions are rehearsed to obtain the features of each condition; then thousands of participants answer with
-    the rehearsals' answer model, which is plausible but not measured. Of a study of thresholds, d′ or magnitude
-    estimation: the standard deviation of one participant, half the group's 95 % interval, and how many studies reach
-    analysis.precision, for each number of participants and of --trials. Ctrl-C ends with the results so far.
+    the rehearsals' answer model, which is plausible but not measured. Of a study of thresholds, d′, ratings or
+    magnitude estimation: the standard deviation of one participant, half the group's 95 % interval, and how many
+    studies reach analysis.precision, for each number of participants and of --trials. Ctrl-C ends with the results so
+    far.
     """
     if engine == "processes":
         workers = Workers(workers.count)
@@ -102,7 +103,7 @@ def power(
     planned = plans(study, trials)
     if trials and not planned:
         raise click.UsageError(
-            f"--trials: {study.study.name} has no main block of thresholds, d′ or magnitude estimation"
+            f"--trials: {study.study.name} has no main block of thresholds, d′, ratings or magnitude estimation"
         )
     if to is not None:
         make_folder(to)

@@ -171,12 +171,12 @@ def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
         The ratings of the lowest level, and of another one. AUC is the Mann–Whitney share of pairs in which the
         second is higher, ties counting half, with the log-linear correction over the pairs.
     """
-    low, high = np.asarray(noise, float), np.asarray(signal, float)
+    low, high = np.sort(np.asarray(noise, float)), np.asarray(signal, float)
     if not low.size or not high.size:
         return None
-    higher = np.sign(high[:, None] - low[None, :])
-    wins = float((higher > 0).sum() + 0.5 * (higher == 0).sum())
-    return Sensitivity(math.sqrt(2.0) * NORMAL.inv_cdf(rate(wins, higher.size)))
+    below, not_above = np.searchsorted(low, high, "left"), np.searchsorted(low, high, "right")
+    wins = float((below + not_above).sum()) / 2.0
+    return Sensitivity(math.sqrt(2.0) * NORMAL.inv_cdf(rate(wins, low.size * high.size)))
 
 
 def _inverse(proportion_of: Callable[[float], float], proportion: float) -> float:

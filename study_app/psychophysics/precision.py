@@ -68,12 +68,12 @@ def estimated(grid: Grid, levels: ArrayLike, successes: Floats, failures: Floats
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What one participant's threshold at one standard, d′ or exponent is expected to show.
+    """What one participant's threshold at one standard, d′, d_a or exponent is expected to show.
 
     Attributes
     ----------
     spacing : {"log", "linear"}
-        Of u: decades, or units of the level; "linear" for d′ and exponents.
+        Of u: decades, or units of the level; "linear" for d′, d_a and exponents.
     trials : int
         Of one standard.
     standards : int
@@ -83,7 +83,7 @@ class Expected:
     spread : float
         Standard deviation of the estimate's error, in u.
     threshold : float
-        About where the thresholds lie, as a level; or the d′ or exponent that is assumed.
+        About where the thresholds lie, as a level; or the d′, d_a or exponent that is assumed.
     """
 
     spacing: Literal["log", "linear"]

@@ -1,8 +1,8 @@
-"""Simulated studies of thresholds, d′ and exponents: how precisely one participant's and a group's mean are known.
+"""Simulated studies of thresholds, d′, d_a and exponents: how precisely one participant's and a group's mean are known.
 
 The observers answer through the block's method; what they show is estimated as in the report. The people of a study
-differ by a factor of 1.2: in their thresholds about a mean that is drawn from the middle half of the levels, in d′ and
-exponents about the value that `check` assumes.
+differ by a factor of 1.2: in their thresholds about a mean that is drawn from the middle half of the levels, in d′, d_a
+and exponents about the value that `check` assumes.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Found:
     ----------
     errors : list of array
         Of each study the errors of the participants' thresholds, (people, standards), in natural logarithms; as shares
-        of the threshold on linear spacing, of the mean d′ or of the mean exponent.
+        of the threshold on linear spacing, of the mean d′, d_a or exponent.
     halves : list of array
         Of each study half the group's 95 % interval as a share of the mean, (sizes,); NaN below three participants.
     """
@@ -84,7 +84,7 @@ class Found:
 
 
 def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
-    """Return for each block of thresholds, d′ or exponents the plan for each number of trials.
+    """Return for each block of thresholds, d′, d_a or exponents the plan for each number of trials.
 
     Without numbers it is the protocol's.
 
@@ -147,7 +147,7 @@ def study_batch(case: Case, sizes: Sequence[int]) -> Found:
 
 
 def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Found:
-    """Return what the studies of a batch find of d′ or exponents: their means have Student's interval."""
+    """Return what the studies of a batch find of d′, d_a or exponents: their means have Student's interval."""
     people, found = sizes[-1], Found()
     truth = plan.value * np.exp(math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people)))
     estimates = plan.estimates(truth.reshape(-1), rng).reshape(BATCH, people)

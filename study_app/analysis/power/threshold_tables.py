@@ -1,4 +1,4 @@
-"""The precision of thresholds, d′ and exponents as tables: CSV with a row for each pair of sizes, and Markdown."""
+"""The precision of thresholds, d′, d_a and exponents as tables: CSV with a row for each pair of sizes, and Markdown."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from study_app import __version__
 from study_app.analysis.power.power_curves import interval
 from study_app.analysis.power.threshold_studies import Found, Plan, plans
 from study_app.analysis.tables.compared_blocks import spoken
-from study_app.protocol.checks.expected_means import SensitivityPlan
+from study_app.protocol.checks.expected_means import RatingPlan, SensitivityPlan
 from study_app.protocol.checks.expected_precision import ThresholdPlan
 from study_app.protocol.model import Protocol
 from study_app.protocol.texts import text_in
@@ -23,13 +23,19 @@ COLUMNS: Final = (
     Column("study", "text", "Short name of the study, from its protocol."),
     Column("simulated", "flag", "true: all of these answers come from a model, none from people."),
     Column("block", "text", "Id of the block of trials."),
-    Column("trials", "integer", "Trials of each standard or comparison; of magnitude estimation, all.", minimum=1),
+    Column(
+        "trials",
+        "integer",
+        "Trials of each standard, comparison or rated level; of magnitude estimation, all.",
+        minimum=1,
+    ),
     Column("participants", "integer", "Participants of each study.", minimum=2),
     Column("studies", "integer", "Simulated studies.", minimum=1),
     Column(
         "spread",
         "number",
-        "Standard deviation of the logarithm of one participant's threshold; of d′ and exponents, as a share of them.",
+        "Standard deviation of the logarithm of one participant's threshold; of d′, d_a and exponents, as a share of "
+        "them.",
         minimum=0,
     ),
     optional(
@@ -138,6 +144,11 @@ def _assumed(plans_of_block: Mapping[int, Plan]) -> str:
     group = "The group's interval is that of the mean (Student)."
     if isinstance(plan, SensitivityPlan):
         return f"Observers are unbiased, with a mean d′ of {plan.value:g}; SD as a share of it. {group}"
+    if isinstance(plan, RatingPlan):
+        return (
+            f"Observers have a mean d_a of {plan.value:g} between a level and the lowest, and use all {plan.points} "
+            f"points of the scale about equally often; SD as a share of d_a. {group}"
+        )
     return (
         f"Observers follow a power law with a mean exponent of {plan.value:g}; ln answers have a standard deviation of "
         f"{ESTIMATE_NOISE:g}; SD as a share of the exponent. {group}"

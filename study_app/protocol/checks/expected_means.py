@@ -1,4 +1,4 @@
-"""How precise d′ and the exponents of magnitude estimation are expected to be.
+"""How precise d′, d_a of ratings and the exponents of magnitude estimation are expected to be.
 
 Simulated participants answer the block's trials, and the estimates are those of the report. People differ by a factor
 of `BETWEEN_PEOPLE`, as their thresholds do, and the group's interval is that of the mean by Student's t.
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Final, TypeAlias
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.design import Design
+from study_app.protocol.trials.designs.rating_of_interval import Rated
 from study_app.protocol.trials.psychometric import rises
 from study_app.protocol.trials.tracks import (
     design_of,
@@ -154,11 +155,65 @@ class EstimationPlan:
         return np.asarray((means @ (x - x.mean())) / ((x - x.mean()) ** 2).sum(), float)
 
 
-MeanPlan: TypeAlias = SensitivityPlan | EstimationPlan
+@dataclass(frozen=True)
+class RatingPlan:
+    """What decides how precise d_a of one level against the lowest is.
+
+    Attributes
+    ----------
+    points : int
+        Of the scale.
+    trials : int
+        Ratings of each level.
+    """
+
+    points: int
+    trials: int
+    per: ClassVar[str] = " per level"
+    value: ClassVar[float] = D_PRIME
+
+    @property
+    def words(self) -> str:
+        """What is assumed, in words."""
+        return f"at d_a = {self.value:g}: "
+
+    def with_trials(self, trials: int) -> RatingPlan:
+        """Return the plan with so many trials."""
+        return replace(self, trials=trials)
+
+    def estimates(self, truth: Floats, random: Generator) -> Floats:
+        """Return d_a as the report estimates it, of observers who use all points of the scale about equally often.
+
+        A rating is the number of criteria that a normal observation exceeds. The criteria divide a normal distribution
+        with the mean and the standard deviation of both levels' observations at `value` into equal shares.
+
+        Parameters
+        ----------
+        truth : (observers,) array
+            Their d_a.
+        random : random.Generator
+            Where answers are drawn from.
+        """
+        import numpy as np  # noqa: PLC0415
+
+        from study_app.psychophysics.detection import NORMAL, rating  # noqa: PLC0415
+
+        spread = math.sqrt(1.0 + (self.value / 2.0) ** 2)
+        shares = [point / self.points for point in range(1, self.points)]
+        criteria = [self.value / 2.0 + spread * NORMAL.inv_cdf(share) for share in shares]
+        found = []
+        for d_a in truth:
+            lowest, level = (np.searchsorted(criteria, random.normal(mean, 1.0, self.trials)) for mean in (0.0, d_a))
+            sensitivity = rating(lowest, level)
+            found.append(math.nan if sensitivity is None else sensitivity.d_prime)
+        return np.array(found)
+
+
+MeanPlan: TypeAlias = SensitivityPlan | EstimationPlan | RatingPlan
 
 
 def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
-    """Return what decides how precise the d′ or the exponents of a block are; None where it has neither."""
+    """Return what decides how precise the d′, d_a or exponents of a block are; None where it has none of them."""
     if block.design is None or block.phase != "main":
         return None
     design = design_of(protocol, block).model_copy(update={"question": None})  # a dictionary has no hash
@@ -171,6 +226,9 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
         levels = tuple(sorted({one for one in method.asked(stimulus) if one > 0}))
         repetitions = method.tracks * method.presentations(stimulus) // len(method.asked(stimulus))
         return EstimationPlan(levels, repetitions, _published(protocol, block)) if len(levels) > 1 else None
+    if isinstance(design, Rated) and len(method.asked(stimulus)) > 1 and len(standards_of(protocol, block)) == 1:
+        repetitions = method.tracks * method.presentations(stimulus) // len(method.asked(stimulus))
+        return RatingPlan(protocol.scales[design.scale].points, repetitions)
     if design.reply == "choice" and has_correct_answer(design, stimulus) and not rises(stimulus, design):
         roving = len(standards_of(protocol, block)) > 1 and method.order == "interleaved"
         return SensitivityPlan(design, slots * method.tracks, roving, of_each="standard")
@@ -184,7 +242,7 @@ def _published(protocol: Protocol, block: Block) -> float:
 
 
 def expected_mean(plan: MeanPlan) -> Expected:
-    """Return how precise the d′ or the exponent of one participant, and their mean, are expected to be."""
+    """Return how precise the d′, d_a or exponent of one participant, and their mean, are expected to be."""
     import numpy as np  # noqa: PLC0415
 
     from study_app.psychophysics.precision import Expected  # noqa: PLC0415

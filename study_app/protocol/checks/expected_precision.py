@@ -222,7 +222,7 @@ def _affordable(plan: ThresholdPlan) -> tuple[ThresholdPlan, int]:
 
 
 def precision_plan(protocol: Protocol, block: Block) -> ThresholdPlan | MeanPlan | None:
-    """Return what decides how precise a block's thresholds, d′ or exponents are; None where it has none of them."""
+    """Return what decides how precise a block's thresholds, d′, d_a or exponents are; None: it has none of them."""
     return threshold_plan(protocol, block) or mean_plan(protocol, block)
 
 

@@ -118,6 +118,28 @@ def test_exponents_and_d_primes_have_the_spread_that_check_expects() -> None:
         assert f"| {'trials' if block == 'thickness' else 'trials per comparison'} | participants |" in said
 
 
+@pytest.mark.slow
+def test_ratings_have_the_spread_that_check_expects() -> None:
+    text = (
+        TEXT.replace('"2ifc"', '"rated"')
+        .replace("[0.02, 0.6], standards = [4, 8]", '[1, 12], level = "value"')
+        .replace('kind = "questplus", trials = 20', 'kind = "constant", levels = 4')
+    ) + 'designs.rated = { kind = "rating", scale = "five" }\nscales.five.labels.en = ["a", "b", "c", "d", "e"]\n'
+    protocol = parse(text.encode(), "rated.toml")
+    found = swept(protocol, (15, 60), (5, 20), 2 * BATCH)
+    for trials in (15, 60):
+        plan = mean_plan(protocol, protocol.blocks["thicker"])
+        assert plan is not None
+        alone, of = expected_mean(plan.with_trials(trials)), found.found["thicker", trials]
+        assert of.spread == pytest.approx(alone.spread, rel=0.15)
+        assert of.half(1) == pytest.approx(alone.of_group(20), rel=0.15)
+        assert of.half(0) > 1.5 * of.half(1)
+    said = threshold_markdown(found)
+    assert "mean d_a of 1" in said
+    assert "all 5 points of the scale" in said
+    assert "| trials per level | participants |" in said
+
+
 def test_two_participants_have_no_interval() -> None:
     found = swept(study(), (10,), (2,), 2)
     assert math.isnan(found.found["thicker", 10].half(0))

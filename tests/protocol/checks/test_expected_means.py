@@ -1,14 +1,20 @@
-"""What check expects of d′ and of exponents, against closed forms and simulated answers through the program."""
+"""What check expects of d′, d_a and exponents, against closed forms and simulated answers through the program."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.stats import norm
 
+from study_app.analysis.designs.sensitivities import sensitivities
+from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.protocol.checks.expected_means import (
     EstimationPlan,
+    MeanPlan,
+    RatingPlan,
     SensitivityPlan,
     expected_mean,
     mean_plan,
@@ -17,7 +23,10 @@ from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
+from study_app.protocol.trials.designs.rating_of_interval import Rated
 from study_app.protocol.trials.kinds import default_design
+from study_app.protocol.trials.methods.constant import Constant
+from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.detection import NORMAL, two_intervals
 from study_app.psychophysics.precision import ESTIMATE_NOISE
 from study_app.validation.thresholds.estimated_exponents import planted_exponent, simulate_estimates
@@ -31,6 +40,17 @@ liquids.thick.drag = { law = "linear", damping_nspm = 9 }
 tasks.stir.kind = "follow"
 blocks.pairs = { conditions = ["thin", "thick"], standard = "thin", design = "DESIGN", repetitions = REPEATED }
 """
+RATED = """
+format = 2
+study.name = "rated"
+liquids.thin.drag = { law = "linear", damping_nspm = 8 }
+tasks.stir.kind = "follow"
+scales.five.labels.en = ["very thin", "thin", "medium", "thick", "very thick"]
+designs.rated = { kind = "rating", scale = "five" }
+methods.few = { kind = "constant", levels = 4, repetitions = 12 }
+blocks.rate = { stimulus = "damping", design = "rated", method = "few" }
+stimuli.damping = { vary = "damping_nspm", STIMULUS }
+"""
 PLANNED = "analysis = { participants = 10, precision = 0.1 }\n"
 
 
@@ -38,7 +58,11 @@ def compared(design: str = "2ifc", repetitions: int = 40, more: str = "") -> Pro
     return parse((COMPARED.replace("DESIGN", design).replace("REPEATED", str(repetitions)) + more).encode(), "x.toml")
 
 
-def plan_of(protocol: Protocol, block: str = "pairs") -> SensitivityPlan | EstimationPlan:
+def rated(more: str = "", stimulus: str = 'level = "value", levels = [1, 12]') -> Protocol:
+    return parse((RATED.replace("STIMULUS", stimulus) + more).encode(), "x.toml")
+
+
+def plan_of(protocol: Protocol, block: str = "pairs") -> MeanPlan:
     plan = mean_plan(protocol, protocol.blocks[block])
     assert plan is not None
     return plan
@@ -99,6 +123,75 @@ def test_the_spread_is_that_of_exponents_from_simulated_answers() -> None:
     assert means.std(ddof=1) == pytest.approx(expected.spread / math.sqrt(10), rel=0.4)  # equal people
 
 
+def exact_spread(value: float, ratings: int) -> float:
+    """Return the standard deviation of d_a from ungrouped normal observations, by that of the area under the ROC curve.
+
+    The area's variance is that of Mann and Whitney's statistic (Hanley & McNeil 1982, Radiology 143, 29), with the
+    shares of pairs that share an observation from 10⁶ draws.
+    """
+    area, draw = NORMAL.cdf(value / math.sqrt(2)), np.random.default_rng(4)
+    signal, noise = draw.normal(value, 1, 10**6), draw.normal(0, 1, 10**6)
+    both = [float(np.mean(_cdf(one) ** 2)) - area**2 for one in (signal, value - noise)]
+    variance = (area * (1 - area) + (ratings - 1) * sum(both)) / ratings**2
+    return math.sqrt(2 * variance) / NORMAL.pdf(NORMAL.inv_cdf(area))
+
+
+def _cdf(x: np.ndarray) -> np.ndarray:
+    return np.asarray(norm.cdf(x), float)
+
+
+@pytest.mark.parametrize("ratings", [40, 160])
+def test_the_spread_of_d_a_is_that_of_the_area_under_the_roc_curve(ratings: int) -> None:
+    found = expected_mean(RatingPlan(11, ratings))
+    assert (found.trials, found.threshold) == (ratings, 1.0)
+    assert found.spread == pytest.approx(exact_spread(1.0, ratings), rel=0.08)
+    assert found.half == pytest.approx(1.96 * found.spread, rel=1e-4)
+
+
+def test_many_ratings_recover_d_a_less_what_few_points_hide() -> None:
+    shown = [RatingPlan(points, 200_000).estimates(np.array([1.0]), np.random.default_rng(2))[0] for points in (2, 11)]
+    assert shown[0] == pytest.approx(0.707, abs=0.01)  # two points: z of the share of one answer, 0.691, is ½
+    assert 0.97 < shown[1] < 1.0
+
+
+@pytest.mark.slow
+def test_the_spread_of_d_a_is_that_of_ratings_that_the_report_analyses() -> None:
+    """People name the nearest of seven points, whatever the program assumes of criteria."""
+    draw, people, ratings = np.random.default_rng(3), 400, 30
+    points = [np.clip(np.round(4 + 1.6 * (draw.normal(mean, 1, (people, ratings)) - 0.5)), 1, 7) for mean in (0, 1)]
+    rows = pd.concat(
+        pd.DataFrame({"participant": np.repeat(np.arange(people), ratings), "value": some.ravel(), "level": level})
+        for level, some in zip((1.0, 2.0), points, strict=True)
+    ).assign(block="b", response="rated", analysed=True)
+    stimulus = Stimulus(vary="damping_nspm", level="value", levels=(1, 2))
+    block = LevelBlock("b", "Block", "main", Rated(scale="seven"), stimulus, (), Constant())
+    found = [one.d_prime for one in sensitivities(block, rows) if one.participant is not None]
+    assert len(found) == people
+    expected = expected_mean(RatingPlan(7, ratings))
+    assert np.std([one for one in found if one is not None]) == pytest.approx(expected.spread, rel=0.12)
+
+
+def test_a_block_of_ratings_has_the_points_of_its_scale_and_the_ratings_of_each_level() -> None:
+    plan = plan_of(rated(), "rate")
+    assert plan == RatingPlan(points=5, trials=12)
+    assert plan.with_trials(40).trials == 40
+    found = expected_mean(plan)
+    said = " ".join(describe(rated(PLANNED)).split())
+    assert (
+        f"Expected precision at d_a = 1: one participant ±{found.half:.2g}; 10 participants "
+        f"±{100 * found.of_group(10):.0f} % (95 % intervals)" in said
+    )
+    (sentence,) = imprecise(rated(PLANNED), rated().blocks["rate"])
+    assert sentence.startswith("methods.few.repetitions: 12 trials per level give ±")
+
+
+def test_one_level_or_standards_that_levels_are_added_to_have_no_expected_d_a() -> None:
+    one, weber = rated().model_copy(), rated(stimulus="levels = [0.1, 0.6], standards = [4, 8]")
+    alone = {"few": Constant(levels=(2.0,), repetitions=12)}
+    assert mean_plan(one.model_copy(update={"methods": alone}), one.blocks["rate"]) is None
+    assert mean_plan(weber, weber.blocks["rate"]) is None
+
+
 def test_check_prints_the_intervals() -> None:
     said = " ".join(describe(load("thickness")).split())
     found = expected_mean(plan_of(load("thickness"), "thickness"))
@@ -136,7 +229,7 @@ def test_an_exponent_that_was_not_published_is_one_half_and_a_modulus_is_no_tria
     assert (plan.trials, plan.value) == (36, 0.5)
 
 
-def test_blocks_of_statements_thresholds_and_ratings_have_neither() -> None:
+def test_blocks_of_statements_and_thresholds_have_neither() -> None:
     for name, block in (("rek2024", "delays"), ("viscosityjnd", "viscosity")):
         protocol = load(name)
         assert mean_plan(protocol, protocol.blocks[block]) is None
