@@ -39,7 +39,12 @@ if TYPE_CHECKING:
 )
 @click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
 @click.option("--cases", type=click.IntRange(1), metavar="N", help="Only N cases of each group.")
-@click.option("--group", metavar="TEXT", help='Only groups with this text in their name, such as "non-Newtonian".')
+@click.option(
+    "--group",
+    "--only",
+    metavar="TEXT",
+    help='Only groups with this text in their name, such as "non-Newtonian".',
+)
 @takes_workers
 def stability(
     to: Path | None,

@@ -316,7 +316,7 @@ def test_the_command_judges_only_the_groups_that_are_named():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--group", "mercury"), "no group has 'mercury' in its name: there are second plant, held, "),
+        (("--only", "mercury"), "no group has 'mercury' in its name: there are second plant, held, "),
         (("--group", "lost", "--withheld"), "--withheld and --group exclude each other"),
         (("--group", "lost", "--velocity"), "--velocity and --group exclude each other"),
         (("--withheld", "--to", "shares"), "--to and --withheld exclude each other"),
