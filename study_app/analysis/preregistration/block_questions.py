@@ -103,6 +103,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
                 f"Block {block.id}: answers at each level, as means of participants' (of logarithms, where numbers are "
                 "estimated; the exponent is the slope over the logarithm of the level) with Student's 95 % interval."
             )
+            if design_of(protocol, block).reply == "rating":
+                yield f"Block {block.id}: d_a of each level against the lowest, from the area under the ROC curve."
         elif block.design is not None:
             yield f"Block {block.id}: d′ of each participant, from rates with the log-linear correction."
     asked = [block for block in protocol.main_blocks if block.design is None and block.questionnaire is not None]

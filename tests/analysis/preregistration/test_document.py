@@ -11,6 +11,7 @@ from study_app.analysis.preregistration import commitment
 from study_app.analysis.preregistration.document import preregistration
 from study_app.cli import commands
 from study_app.protocol.load import load, protocol_hash, shipped, source_bytes
+from tests.protocol.trials.level_studies import FIVE_POINTS, study
 
 HEADS = (
     "Hypotheses and questions",
@@ -60,6 +61,15 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     assert "presented again, up to 3 times" in text
     assert "Hartung–Knapp" in text
     assert "No power was computed" not in preregistration(load("thickness"), "0" * 64)
+
+
+def test_a_study_of_ratings_states_d_a_and_how_precise_it_is_expected_to_be() -> None:
+    more = FIVE_POINTS + '\n[blocks.rate]\ntask = "stir"\nstimulus = "value"\ndesign = "rated"\nmethod = "few"\n'
+    edits = [('sequence = ["viscosity"]', 'sequence = ["viscosity", "rate"]'), ("[0.2, 0.4, 0.8]", "[0.5, 0.6, 0.8]")]
+    text = preregistration(study(*edits, ("part = 1\n", ""), ('code_prefix = "V"\n', ""), more=more), "0" * 64)
+    assert "- Block rate: d_a of each level against the lowest, from the area under the ROC curve." in text
+    assert "Block viscosity: d_a" not in text
+    assert "at d_a = 1: one participant ±" in text
 
 
 def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
