@@ -80,8 +80,27 @@ def test_a_session_killed_at_random_bytes_of_its_journal_equals_one_that_was_not
     for outcome in killed:
         study = Path(outcome["folder"])
         assert outcome["resumed"] == 0, outcome
-        assert told(study) == whole, outcome["folder"]
         (session,) = StudyFolder(study).sessions()
         assert session.journal.read_text(encoding="utf-8").startswith(outcome["held"].rpartition("\n")[0])
-        assert reproduced(session.path).differences == []
-        assert verify(study, None).errors == ()
+        equals(study, whole)
+
+
+def equals(study: Path, whole: dict[tuple[Any, ...], Any]) -> None:
+    """Assert that a study's only session says what an uninterrupted one does, and that nothing is wrong with it."""
+    assert told(study) == whole, study
+    (session,) = StudyFolder(study).sessions()
+    assert reproduced(session.path).differences == []
+    assert verify(study, None).errors == ()
+
+
+@pytest.mark.nightly
+def test_one_session_killed_again_and_again_equals_one_that_was_not(tmp_path: Path) -> None:
+    protocol = tmp_path / "levels.toml"
+    protocol.write_text(short_text().replace(CONSTANT, ADAPTIVE).replace('method = "few"', CATCH))
+    (outcome,) = outcomes_of("killer", protocol, tmp_path, KILLS, 3, "again", limit_s=240 + 50 * KILLS)
+    assert outcome["kills"] > 0.8 * KILLS
+    study = Path(outcome["folder"])
+    (session,) = StudyFolder(study).sessions()
+    events = [line["event"] for line in journal.read(session.journal)]
+    assert events.count("session_resumed") > 0.5 * KILLS
+    equals(study, told(tmp_path / "whole"))

@@ -3,7 +3,7 @@
 Everything is loaded and compiled once; then each session is a fork that is killed with SIGKILL, and each going on
 another one (a rebuilding, where only files that follow from the journal were missing, or the session's beginning, where
 it had not begun). For every session it writes a line of JSON: the folder, after how long it was killed, what its
-journal held then, and how the going on ended.
+journal held then, and how the going on ended. Or it kills one session again and again, whenever its journal has grown.
 """
 
 from __future__ import annotations
@@ -48,35 +48,75 @@ def session(protocol: str, folder: Path) -> None:
 
 
 def grown(path: Path, size: int) -> None:
-    """Wait until a file has this size."""
-    while not path.exists() or path.stat().st_size < size:
+    """Wait until a journal has this size, or its session has ended."""
+    while size_of(path) < size and not has_ended(path):
         time.sleep(0.0002)
 
 
+def size_of(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0
+
+
+def has_ended(journal: Path) -> bool:
+    """Return whether the last lines of a journal say that the session has ended."""
+    if not journal.exists():
+        return False
+    with journal.open("rb") as file:
+        file.seek(max(0, size_of(journal) - 2000))
+        return b'"session_ended"' in file.read()
+
+
+def going_on(protocol: str, folder: Path) -> Callable[[], object]:
+    """Return what completes a session that was killed."""
+    place = folder / "data" / "sub-P001" / "ses-01"
+    journal = place / "journal.jsonl"
+    if has_ended(journal):
+        return partial(rebuild, place)
+    if journal.exists() and b"\n" in journal.read_bytes():
+        return partial(rehearsal.resume, place, protocol=protocol)
+    return partial(session, protocol, folder)
+
+
+def kill_again_and_again(protocol: str, folder: Path, count: int, size: int, draw: random.Random) -> int:
+    """Kill a session up to ``count`` times, let it go on to its end, and return how many kills it took.
+
+    On average size/count bytes are written from one kill to the next.
+    """
+    journal, kills = folder / "data" / "sub-P001" / "ses-01" / "journal.jsonl", 0
+    while kills < count and not has_ended(journal):
+        more = 1 + round(2 * draw.random() * size / count)
+        code = forked(going_on(protocol, folder), partial(grown, journal, size_of(journal) + more))
+        assert code in (0, -signal.SIGKILL)
+        kills += code != 0
+    assert forked(going_on(protocol, folder)) == 0
+    return kills
+
+
 def main(protocol: str, folder: str, count: str, seed: str, at: str = "moments") -> None:
-    """Kill sessions at random moments, or where their journals have grown to random sizes (``at`` is "bytes")."""
+    """Kill sessions at random moments, or where their journals have grown to random sizes (``at`` is "bytes").
+
+    With "again" it is one session that is killed ``count`` times.
+    """
     whole, scratch = Path(folder) / "whole", Path(folder) / "scratch"
     session(protocol, whole)
+    size = (whole / "data" / "sub-P001" / "ses-01" / "journal.jsonl").stat().st_size
+    draw = random.Random(int(seed))  # noqa: S311 - moments, not secrets
+    if at == "again":
+        killed = Path(folder) / "killed"
+        kills = kill_again_and_again(protocol, killed, int(count), size, draw)
+        sys.stdout.write(json.dumps({"folder": str(killed), "kills": kills}) + "\n")
+        return
     began = time.perf_counter()
     assert forked(lambda: session(protocol, scratch)) == 0
     lasts_s = time.perf_counter() - began
-    size = (whole / "data" / "sub-P001" / "ses-01" / "journal.jsonl").stat().st_size
-    draw = random.Random(int(seed))  # noqa: S311 - moments, not secrets
     for number in range(int(count)):
         killed = Path(folder) / f"killed-{number:02d}"
-        place = killed / "data" / "sub-P001" / "ses-01"
-        journal, share = place / "journal.jsonl", draw.random()
+        journal, share = killed / "data" / "sub-P001" / "ses-01" / "journal.jsonl", draw.random()
         after_s = share * lasts_s
         until = partial(grown, journal, round(share * size)) if at == "bytes" else partial(time.sleep, after_s)
         code = forked(lambda killed=killed: session(protocol, killed), until)
         held = journal.read_text(encoding="utf-8") if journal.exists() else ""
-        resumed = None
-        if code == -signal.SIGKILL and '"session_ended"' in held:
-            resumed = forked(lambda place=place: rebuild(place))
-        elif code == -signal.SIGKILL and "\n" in held:
-            resumed = forked(lambda place=place: rehearsal.resume(place, protocol=protocol))
-        elif code == -signal.SIGKILL:
-            resumed = forked(lambda killed=killed: session(protocol, killed))
+        resumed = forked(going_on(protocol, killed)) if code == -signal.SIGKILL else None
         became = {"folder": str(killed), "after_s": after_s, "code": code, "held": held, "resumed": resumed}
         sys.stdout.write(json.dumps(became) + "\n")
         sys.stdout.flush()
