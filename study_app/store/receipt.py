@@ -121,7 +121,17 @@ def other_format(receipt: Mapping[str, Any], start: Mapping[str, Any]) -> bool:
 
 def _holds(name: str, value: object) -> bool:
     """Return whether ``value`` is what a receipt's field called ``name`` holds."""
-    if name in ("versions", "device", "screens", "clock", "protocol", "motors_masked", "outlets", "video"):
+    if name in (
+        "versions",
+        "device",
+        "screens",
+        "clock",
+        "protocol",
+        "motors_masked",
+        "outlets",
+        "outlets_lost",
+        "video",
+    ):
         return isinstance(value, dict)
     if name == "resumed":
         return isinstance(value, list)

@@ -205,6 +205,8 @@ class SessionStore:
         if not self.journal.closed:
             with contextlib.suppress(StoreError):  # `reopen` finds the files that no line tells of
                 self._keep_recordings()
+                if self._outlets_lost:
+                    self._write_receipt()
         try:
             self.journal.close()
         finally:
@@ -222,6 +224,10 @@ class SessionStore:
         self._write_receipt()
 
     def _write_receipt(self) -> None:
+        """Write the receipt, with why outlets failed: of samples the last count, where the journal has the first."""
+        if self.outlets is not None and (lost := self.outlets.lost):
+            since = (self._receipt, *self._receipt.get("resumed", ()))[-1]
+            since["outlets_lost"] = dict(lost)
         receipt.write(self.folder.receipt, self._receipt)
 
     def _write_participants(self) -> None:

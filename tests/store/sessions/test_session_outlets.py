@@ -10,6 +10,7 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
+from study_app.store import receipt
 from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.store.sessions.open_session import SessionStore
@@ -90,6 +91,31 @@ def test_an_outlet_that_fails_is_journalled_once(store: SessionStore, outlets: C
     assert progress_of(lines).outlets_lost == dict(lost)
 
 
+def test_the_receipt_has_the_last_count_of_lost_samples(store: SessionStore, outlets: Collector) -> None:
+    outlets.lost = {"LSL samples": "12 samples were not sent in time"}
+    store.write_tables()
+    outlets.lost = {"LSL samples": "3400 samples were not sent in time"}
+    store.finish("completed")
+    assert receipt.read(store.folder.receipt)["outlets_lost"] == outlets.lost
+    lost = [line["reason"] for line in journal.read(store.folder.journal) if line["event"] == "outlet_lost"]
+    assert lost == ["12 samples were not sent in time"]
+
+
+def test_the_receipt_of_a_resumed_session_has_the_lost_samples_of_each_part(
+    start: Start, protocol: Protocol, outlets: Collector
+) -> None:
+    with start() as store:
+        store.attach(outlets)
+        outlets.lost = {"LSL samples": "12 samples were not sent in time"}
+    with reopen(store.folder.path, protocol, SOURCE, operator="AB", device={"name": "scripted"}, screens={}) as again:
+        again.attach(Collector())
+        again.outlets.lost = {"Serial port": "it was unplugged"}
+        again.finish("completed")
+    found = receipt.read(store.folder.receipt)
+    assert found["outlets_lost"] == {"LSL samples": "12 samples were not sent in time"}
+    assert found["resumed"][-1]["outlets_lost"] == {"Serial port": "it was unplugged"}
+
+
 def test_the_receipt_says_what_was_sent_where(start: Start) -> None:
     sent = {"Serial port": {"address": "serial:/dev/ttyUSB0", "codes": {"trial_started": 10}}}
     with start(outlets=sent) as store:
@@ -105,8 +131,7 @@ def test_a_resumed_session_begins_with_its_resumption(start: Start, protocol: Pr
     with again:
         again.attach(outlets)
         assert outlets.events == ["session_resumed"]
-        receipt = json.loads(again.folder.receipt.read_text(encoding="utf-8"))
-        assert receipt["resumed"][-1]["outlets"] == {"a": {}}
+        assert receipt.read(again.folder.receipt)["resumed"][-1]["outlets"] == {"a": {}}
 
 
 def test_an_outlet_that_failed_before_a_session_was_resumed_is_lost_no_more(
