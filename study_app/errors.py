@@ -90,7 +90,7 @@ class ServoFault(StudyError):
 
 
 class VideoError(StudyError):
-    """A camera or footage cannot be shown, or stopped; unlike a haptic device it is not reconnected in a session."""
+    """A camera or footage cannot be shown, or stopped; like a haptic device it can be reconnected in a session."""
 
 
 class OutletError(StudyError):

@@ -45,17 +45,18 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
     if load.is_scene_file(protocol):
         click.echo(describe.describe_scenes(load.load_scenes(protocol)))
     else:
+        import time
+
+        from study_app.protocol.source.files import find
+        from study_app.store import workstation
+        from study_app.video.sources import missing_here
+
         study = load.load(protocol, delay_ticks=delay_ticks)
-        if any(condition.shows_video for condition in study.conditions.values()):
-            import time
-
-            from study_app.protocol.source.files import find
-            from study_app.store import workstation
-            from study_app.video.sources import refuse_unusable
-
-            camera = workstation.load_or_default()[0].camera
-            refuse_unusable(study, find(protocol).parent, camera, time.monotonic_ns)
+        camera = workstation.load_or_default()[0].camera
+        missing = missing_here(study, find(protocol).parent, camera, time.monotonic_ns)
         click.echo(describe.describe(study, delay_ticks))
+        if missing:
+            click.echo(f"\nNote: {missing}. Sessions of this study do not start on this computer.")
 
 
 @click.command()

@@ -72,6 +72,15 @@ class Camera:
             raise VideoError(f"the camera {without_login(source)} cannot be used: {failure}")
 
     @property
+    def works(self) -> bool:
+        """Whether frames still come."""
+        return self.thread.is_alive() and not self._stalls
+
+    @property
+    def _stalls(self) -> bool:
+        return self._now_ns() - self.newest.due_ns > STALLS_S * SECOND_NS
+
+    @property
     def newest(self) -> VideoFrame:
         """The frame that came last."""
         return self._frames[-1]
@@ -96,7 +105,7 @@ class Camera:
         """
         with self._changed:
             failure, held = self._failure, tuple(self._frames)
-        if not failure and self._now_ns() - held[-1].due_ns > STALLS_S * SECOND_NS:
+        if not failure and self._stalls:
             failure = f"no picture for {STALLS_S:g} s"
         if failure:
             raise stopped(failure)

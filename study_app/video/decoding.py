@@ -6,6 +6,7 @@ import os
 import sys
 import threading
 from contextlib import suppress
+from importlib.util import find_spec
 from typing import Any, Final, NamedTuple
 
 from study_app.errors import VideoError
@@ -27,6 +28,11 @@ class Pixels(NamedTuple):
     height: int
     stride: int
     content: Any
+
+
+def installed() -> bool:
+    """Return whether PyAV is installed."""
+    return find_spec("av") is not None
 
 
 def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **options: str) -> Any:

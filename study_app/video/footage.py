@@ -58,6 +58,11 @@ class Footage:
         self.thread.start()
 
     @property
+    def works(self) -> bool:
+        """Whether it can be read on."""
+        return self.thread.is_alive()
+
+    @property
     def rate_hz(self) -> float:
         """Frames per second."""
         return SECOND_NS / self._period_ns

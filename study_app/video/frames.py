@@ -10,7 +10,7 @@ from study_app.errors import VideoError
 
 def stopped(why: str) -> VideoError:
     """Return the error of a source that fails in a trial: it names no source, which would tell the condition."""
-    return VideoError(f"a video of the study stopped ({why}): check camera and files, then resume the session")
+    return VideoError(f"a video of the study stopped ({why}): check camera and files")
 
 
 @dataclass(frozen=True, slots=True)

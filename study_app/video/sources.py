@@ -10,8 +10,10 @@ from typing import Any
 
 from study_app.errors import VideoError
 from study_app.protocol.model import Protocol
+from study_app.protocol.source.liquid_files import file_hash
 from study_app.protocol.trials.stimuli import DELAY, MOST_DELAY_MS
 from study_app.video.camera import USUAL, Camera, without_login
+from study_app.video.decoding import EXTRA, installed
 from study_app.video.footage import Footage
 
 CAMERA = "camera"
@@ -43,7 +45,7 @@ class Videos:
     def __init__(self, protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> None:
         shown = [one for one in protocol.conditions.values() if one.shows_video]
         self.views = tuple(sorted({one.view for one in shown}))
-        self._hashes = sorted({one.footage_sha256 for one in shown if one.footage_sha256})
+        self._hashes = {one.view: one.footage_sha256 for one in shown if one.footage_sha256}
         self._folder, self._camera, self._now_ns = folder, camera or USUAL, now_ns
         varied = any(stimulus.vary == DELAY for stimulus in protocol.stimuli.values())
         self._holds_s = MOST_DELAY_MS / 1000 if varied else max((one.delay_ms for one in shown), default=0.0) / 1000
@@ -57,13 +59,26 @@ class Videos:
         with self._opening:
             for view in self.views:
                 before = self._open.get(view)
-                if before is not None and before.thread.is_alive():
+                if before is not None and before.works:
                     continue
                 try:
+                    if before is not None:
+                        before.close()
                     self._keep(view, self._opened(view))
                 except VideoError as error:
                     return VideosFound("every video of the study must open", str(error))
         return VideosFound("; ".join(self._words()))
+
+    def reopen(self) -> None:
+        """Open what failed in a session.
+
+        Raises
+        ------
+        VideoError
+            It cannot be opened; the source is not named, which would tell the condition.
+        """
+        if self.open().fault:
+            raise VideoError("a video of the study cannot be opened: check camera and files")
 
     def source(self, view: str) -> Camera | Footage:
         """Return the open source of a condition's view."""
@@ -76,7 +91,7 @@ class Videos:
 
     def describe(self) -> dict[str, Any]:
         """Return what the receipt records: nothing that tells which condition shows what."""
-        found: dict[str, Any] = {"footage_sha256": list(self._hashes)} if self._hashes else {}
+        found: dict[str, Any] = {"footage_sha256": sorted(set(self._hashes.values()))} if self._hashes else {}
         if isinstance(camera := self._open.get(CAMERA), Camera):
             age_ns = camera.newest.age_ns
             found["camera"] = {
@@ -106,7 +121,12 @@ class Videos:
             raise VideoError("the videos were closed meanwhile")
 
     def _opened(self, view: str) -> Camera | Footage:
-        return Camera(self._camera, self._now_ns, self._holds_s) if view == CAMERA else Footage(self._folder / view)
+        if view == CAMERA:
+            return Camera(self._camera, self._now_ns, self._holds_s)
+        path = self._folder / view
+        if file_hash(path) not in (None, self._hashes.get(view)):
+            raise VideoError(f"{path} is not the file that the study began with: restore it")
+        return Footage(path)
 
     def _words(self) -> Iterable[str]:
         for view, one in self._open.items():
@@ -118,17 +138,22 @@ class Videos:
             yield f"footage, {count} file{'' if count == 1 else 's'}"
 
 
-def refuse_unusable(protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> None:
-    """Refuse a study whose videos cannot be shown on this machine.
+def missing_here(protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> str:
+    """Return why this machine cannot show the study's videos, "" where it can.
 
     Raises
     ------
     VideoError
-        Why, in one line.
+        Why footage cannot be shown on any machine, in one line.
     """
-    videos = Videos(protocol, folder, camera, now_ns)
+    views = {one.view for one in protocol.conditions.values() if one.shows_video}
+    if views and not installed():
+        return f"a video {EXTRA}"
+    for view in sorted(views - {CAMERA}):
+        Footage(folder / view).close()
     try:
-        if fault := videos.open().fault:
-            raise VideoError(fault)
-    finally:
-        videos.close()
+        if CAMERA in views:
+            Camera(camera or USUAL, now_ns, holds_s=0.0).close()
+    except VideoError as error:
+        return str(error)
+    return ""

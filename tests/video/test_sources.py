@@ -7,15 +7,20 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
+from study_app.cli.study import check
 from study_app.errors import VideoError
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.session.transitions.events import Broke, broken
+from study_app.store import workstation
+from study_app.store.workstation import MachineSettings
 from study_app.video import sources
 from study_app.video.camera import without_login
 from study_app.video.frames import VideoFrame, stopped
 from study_app.video.sources import Videos
+from tests.video.clips import write_clip
 
 
 class FakeCamera:
@@ -23,13 +28,16 @@ class FakeCamera:
 
     opens: threading.Event
     made: list[FakeCamera]
+    fault = ""
 
     def __init__(self, source: str, *_: Any) -> None:
+        if self.fault:
+            raise VideoError(f"the camera {source} cannot be used: {self.fault}")
         self.made.append(self)
+        self.works = True
         assert self.opens.wait(10)
         self.source, self.size, self.closed = source, (640, 480), False
         self.newest = VideoFrame(0, 2, 2, 8, bytes(16), 0, None, 33_333_333)
-        self.thread = threading.current_thread()
 
     def close(self) -> None:
         self.closed = True
@@ -39,16 +47,29 @@ class FakeCamera:
 def camera(monkeypatch: pytest.MonkeyPatch) -> type[FakeCamera]:
     monkeypatch.setattr(FakeCamera, "opens", threading.Event(), raising=False)
     monkeypatch.setattr(FakeCamera, "made", [], raising=False)
+    monkeypatch.setattr(FakeCamera, "fault", "")
     monkeypatch.setattr(sources, "Camera", FakeCamera)
     return FakeCamera
 
 
-@pytest.fixture
-def study() -> Protocol:
+def with_camera() -> bytes:
+    """Return the demo in format 2, with a condition that shows the camera."""
     text = source_bytes("demo").decode().replace("format = 1", "format = 2", 1)
     head = "[conditions.thick]\n"
     assert head in text
-    return parse(text.replace(head, f'{head}view = "camera"\n').encode(), "demo.toml")
+    return text.replace(head, f'{head}view = "camera"\n').encode()
+
+
+@pytest.fixture
+def study() -> Protocol:
+    return parse(with_camera(), "demo.toml")
+
+
+@pytest.fixture
+def camera_study(tmp_path: Path) -> Path:
+    file = tmp_path / "demo.toml"
+    file.write_bytes(with_camera())
+    return file
 
 
 def videos(study: Protocol, camera: str = "v4l2:/dev/video0") -> Videos:
@@ -74,7 +95,55 @@ def test_the_receipt_has_neither_name_nor_password_of_a_camera(study: Protocol, 
     assert without_login("dshow:video=NAME") == "dshow:video=NAME"
 
 
-def test_a_video_that_stops_is_no_haptic_device_to_be_reconnected() -> None:
+def test_check_notes_that_this_machine_has_no_camera(camera_study: Path) -> None:
+    workstation.save(MachineSettings(camera="tcp://127.0.0.1:9"))
+    checked = CliRunner().invoke(check, [str(camera_study)])
+    assert checked.exit_code == 0, checked.output
+    assert "Statements" in checked.output
+    note = checked.output.splitlines()[-1]
+    assert note.startswith("Note: the camera tcp://127.0.0.1:9 cannot be used: Connection refused. Sessions of this")
+
+
+def test_check_notes_that_the_extra_is_not_installed(camera_study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sources, "installed", lambda: False)
+    checked = CliRunner().invoke(check, [str(camera_study)])
+    assert checked.exit_code == 0, checked.output
+    assert "pip install 'liquid-study[video]'" in checked.output.splitlines()[-1]
+
+
+def test_a_video_that_failed_is_opened_again_without_its_name(study: Protocol, camera: type[FakeCamera]) -> None:
+    camera.opens.set()
+    every = videos(study)
+    every.open()
+    every.reopen()
+    assert len(camera.made) == 1
+    camera.made[0].works = False
+    every.reopen()
+    assert [one.closed for one in camera.made] == [True, False]
+    camera.made[1].works = False
+    camera.fault = "no such device"
+    with pytest.raises(VideoError, match=r"^a video of the study cannot be opened: check camera and files$"):
+        every.reopen()
+
+
+def test_footage_that_was_replaced_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("av", reason="the optional extra video is not installed")
+    clip = tmp_path / "waves.mp4"
+    write_clip(clip, frames=2, size=(64, 48))
+    file = tmp_path / "demo.toml"
+    file.write_bytes(with_camera().replace(b'"camera"', b'"waves.mp4"'))
+    every = Videos(parse(source_bytes(file), str(file)), tmp_path, "", lambda: 0)
+    try:
+        assert every.open().fault == ""
+    finally:
+        every.close()
+    write_clip(clip, frames=3, size=(64, 48))
+    again = Videos(parse(source_bytes(file), str(file)), tmp_path, "", lambda: 0)
+    write_clip(clip, frames=4, size=(64, 48))
+    assert again.open().fault == f"{clip} is not the file that the study began with: restore it"
+
+
+def test_a_video_that_stops_can_be_reconnected() -> None:
     error = stopped("it ended")
     assert isinstance(error, VideoError)
-    assert broken(1.0, error) == Broke(1.0, str(error), "program")
+    assert broken(1.0, error) == Broke(1.0, str(error), "device")

@@ -24,7 +24,7 @@ from study_app.app.session.operator_requests import OperatorRequests
 from study_app.app.session.parts import Parts
 from study_app.app.session.reconnection import Reconnection
 from study_app.app.session.thread_priority import ThreadPriority
-from study_app.errors import DeviceError, ServoFault, StudyError
+from study_app.errors import DeviceError, ServoFault, StudyError, VideoError
 from study_app.gui.display.frame_clock import Frames
 from study_app.gui.operator.strip import Strip
 from study_app.gui.operator.window import OperatorWindow
@@ -323,7 +323,7 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def _reconnected(self, described: dict[str, Any]) -> None:
-        if isinstance(self.failure, DeviceError | ServoFault):
+        if isinstance(self.failure, DeviceError | ServoFault | VideoError):
             self.trouble, self.failure = "", None
         log.info("the device was reconnected")
         self._post(Reconnected(self._now(), described))

@@ -29,7 +29,7 @@ class Parts:
     reason. ``aim_m`` gives where hand or pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse
     on, None where the device is not the mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
     ``outlets`` send its events to other programs; ``videos`` are those of the study, None where it shows none.
-    ``reconnect`` opens a device that failed again and starts the servo at zero force; it may take minutes.
+    ``reconnect`` opens a device or video that failed again, with the servo at zero force; it may take minutes.
     """
 
     session: Session

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.parts import Parts
@@ -96,7 +96,7 @@ def open_windows(
         outlets=store.outlets,
         start=start,
         exclude=_excluder(chosen),
-        reconnect=rig.reconnect,
+        reconnect=_reconnecting(rig, videos),
         videos=videos,
         aim_m=_aim(hand, servo),
         point_to=getattr(device, "point_to", None) if described.pointer else None,
@@ -110,6 +110,19 @@ def open_windows(
         operator.show()
     participant.open_on(shown_on)
     return bridge
+
+
+def _reconnecting(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any]]:
+    """Return what opens again what failed: device and servo, or videos and not a device that is well."""
+
+    def reconnect() -> dict[str, Any]:
+        if videos is None or rig.servo.fault is not None:
+            rig.reconnect()
+        if videos is not None:
+            videos.reopen()
+        return rig.described
+
+    return reconnect
 
 
 def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-from study_app.errors import DeviceError, ServoFault, StudyError
+from study_app.errors import DeviceError, ServoFault, StudyError, VideoError
 from study_app.protocol.forms.show_if import Value
 from study_app.session.transitions.commands import Command
 
@@ -134,7 +134,7 @@ class EndAsked(_Timed):
 class Broke(_Timed):
     """Device, servo or program failed; ``what`` is for the operator and the journal, not for the participant.
 
-    After a failure ``by`` the device (or its servo) the session can go on, see `Reconnected`.
+    After a failure ``by`` the device (its servo, or a video) the session can go on, see `Reconnected`.
     """
 
     what: str
@@ -143,7 +143,7 @@ class Broke(_Timed):
 
 @dataclass(frozen=True, slots=True)
 class Reconnected(_Timed):
-    """The device that failed is open and homed again, its servo runs at zero force; the journal keeps ``described``."""
+    """What failed is open again and the servo runs at zero force; the journal keeps ``described``, of the device."""
 
     described: dict[str, Any]
 
@@ -194,4 +194,4 @@ Event: TypeAlias = (
 def broken(at_s: float, error: BaseException) -> Broke:
     """Return that ``error`` broke the session."""
     what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
-    return Broke(at_s, what, "device" if isinstance(error, DeviceError | ServoFault) else "program")
+    return Broke(at_s, what, "device" if isinstance(error, DeviceError | ServoFault | VideoError) else "program")

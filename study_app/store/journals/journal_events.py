@@ -111,7 +111,8 @@ EVENTS: tuple[Event, ...] = (
     Event("broke", "Device, servo or program failed.", ("what",)),
     Event(
         "device_reconnected",
-        "The failed device was opened and homed again, as `described`; the force stayed off until `resumed`.",
+        "The failed device, or video, was opened again; `described` is the device from then on. The force stayed off "
+        "until `resumed`.",
         ("device", "described"),
     ),
     Event("session_ended", "The session ended: always the last line.", ("status", "reason")),

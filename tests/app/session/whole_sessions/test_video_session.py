@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import subprocess
 import sys
@@ -11,15 +12,24 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 
 from study_app import app
 from study_app.app.session.bridge import SessionBridge
+from study_app.devices.rig import Rig
 from study_app.errors import SessionError, VideoError
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.session.pages import PausePage, TroublePage
+from study_app.store import workstation
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.recording_files import read_frames
 from study_app.store.verification.verify_study import verify
-from tests.app.people import Person, events, receipt_of, rows
+from study_app.store.workstation import MachineSettings
+from study_app.video.decoding import Scaler
+from tests.app.people import Person, events, receipt_of, rows, window
 from tests.compiled import needs_servo
 
 pytest.importorskip("av", reason="the optional extra video is not installed")
@@ -99,6 +109,80 @@ def test_footage_that_cannot_be_read_is_refused_and_nothing_is_created(study: Pa
     assert f"{NAME} cannot be shown" in line
 
 
+def test_a_camera_that_is_not_there_is_refused(study: Path, run: Any, results: Path) -> None:
+    study.write_text(study.read_text().replace(f'view = "{NAME}"', 'view = "camera"'))
+    workstation.save(MachineSettings(camera="tcp://127.0.0.1:9"))
+    with pytest.raises(
+        SessionError, match=r"video: the camera tcp://127\.0\.0\.1:9 cannot be used: Connection refused"
+    ):
+        run()
+    assert not results.exists()
+
+
+class Operator(Person):
+    """Reconnects what failed as soon as that is offered, and resumes; ``forces`` says whether one was on meanwhile."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.bridge: SessionBridge | None = None
+        self.forces: list[bool] = []
+
+    def look(self) -> None:
+        participant, operator = window(ParticipantWindow), window(OperatorWindow)
+        page = None if participant is None else participant.page
+        if not isinstance(page, TroublePage | PausePage):
+            super().look()
+            return
+        self.forces.append(self.bridge.parts.servo.force_is_on)
+        if isinstance(page, PausePage):
+            operator.resume_asked.emit()
+        elif operator.banner.reconnect.isVisible() and operator.banner.reconnect.isEnabled():
+            QTest.mouseClick(operator.banner.reconnect, Qt.MouseButton.LeftButton)
+
+
+def test_footage_that_stops_is_opened_again_by_the_operator(
+    study: Path, results: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The haptic device is well, and is left as it is; the trial is presented again, with the video."""
+    write_clip(study.parent / NAME, frames=20, size=(320, 180))
+    reconnected: list[Rig] = []
+    monkeypatch.setattr(Rig, "reconnect", reconnected.append)
+    scale, scaled, fail = Scaler.pixels, itertools.count(), SessionBridge.fail
+
+    def pixels(scaler: Scaler, frame: Any) -> Any:
+        if next(scaled) == 20:  # 15 wait decoded before the first trial
+            raise OSError("the file is gone")
+        return scale(scaler, frame)
+
+    monkeypatch.setattr(Scaler, "pixels", pixels)
+    operator = Operator()
+
+    def failed(bridge: SessionBridge, error: BaseException) -> None:
+        operator.bridge = bridge
+        fail(bridge, error)
+
+    monkeypatch.setattr(SessionBridge, "fail", failed)
+    code = app.run(
+        str(study), participant="P001", seed=5, device="scripted", windowed=True, operator="AK", results=results
+    )
+    operator.deleteLater()
+    assert code == 0
+    lines = events(results)
+    (broke,) = [line for line in lines if line["event"] == "broke"]
+    (again,) = [line for line in lines if line["event"] == "device_reconnected"]
+    assert broke["what"] == "a video of the study stopped (the file is gone): check camera and files"
+    assert again["device"] == "scripted"
+    assert reconnected == []
+    assert lines[-1]["status"] == "completed"
+    assert operator.forces
+    assert not any(operator.forces)
+    first, second = [row for row in rows(results, "trials") if row["notes"] != "n/a"]
+    assert (first["outcome"], second["outcome"]) == ("interrupted", "complete")
+    assert first["notes"] == f"the device failed and was connected again ({broke['what']})"
+    assert "the file is gone" in caplog.text
+    caplog.clear()
+
+
 def test_a_source_that_fails_in_a_trial_ends_in_zero_force(
     study: Path, run: Any, results: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -118,7 +202,7 @@ def test_a_source_that_fails_in_a_trial_ends_in_zero_force(
     with pytest.raises(Exception, match="the session was stopped: the file is gone"):
         run()
     assert forces[0] is False
-    assert offers[0] is False  # to connect the haptic device again would not bring the video back
+    assert offers[0] is True
     assert "broke" in {event["event"] for event in events(results)}
     assert json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())["status"] == "unfinished"
     assert "the file is gone" in caplog.text
