@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any, Final
 
 from study_app import __version__
 from study_app.analysis.export.codebook import codebook_bytes
+from study_app.analysis.export.materials import materials
 from study_app.analysis.tables.compared_blocks import spoken
 from study_app.analysis.tables.study_tables import Study
-from study_app.errors import ProtocolError
-from study_app.protocol.source.files import at_hand, find, protocol_hash, source_bytes
-from study_app.protocol.source.liquid_files import unbundled
 from study_app.protocol.texts import text_in
 from study_app.store.tables.cells import variable
 from study_app.store.tables.column import Column
@@ -37,11 +35,12 @@ def dataset_files(
     """
     shown = {name: content for name, content in report.items() if name not in tables and name != SCRIPT}
     description = _description(study, columns)
+    own = materials(study)
     files = {
         "dataset_description.json": _json(description),
         "data/file_metadata.json": _json({key: description[key] for key in description if key != VARIABLES}),
         **{f"data/{PurePosixPath(name).stem}.json": _sidecar(name, columns[name]) for name in tables},
-        "README.md": _readme(study, tables, report),
+        "README.md": _readme(study, tables, report, own.missing),
         "CHANGES.md": f"# Changes\n\n- {study.version}: exported by liquid-study {__version__}\n".encode(),
         ".psychds-ignore": b".psychds-ignore\n",
         **{f"data/{name}": content for name, content in tables.items()},
@@ -50,7 +49,7 @@ def dataset_files(
         **({f"analysis/{SCRIPT}": report[SCRIPT]} if SCRIPT in report else {}),
         **{f"results/{name}": content for name, content in shown.items() if name != "codebook.json"},
         "materials/protocol.json": _json(study.protocol),
-        **{f"materials/{name}": content for name, content in _own_files(study)},
+        **{f"materials/{name}": content for name, content in own.files.items()},
     }
     return {f"{FOLDER}/{name}": content for name, content in files.items()}
 
@@ -59,24 +58,6 @@ def _sidecar(name: str, columns: tuple[Column, ...]) -> bytes:
     """Return what describes the columns of one table alone."""
     head = {"@context": CONTEXT, "@type": "Dataset", "name": PurePosixPath(name).stem}
     return _json({**head, VARIABLES: [variable(column) for column in columns]})
-
-
-def _own_files(study: Study) -> Iterator[tuple[str, bytes]]:
-    """Yield the study's file and its liquid files where this machine has them, once the key was opened."""
-    if not study.revealed:
-        return
-    hashes = set(study.participants["protocol_hash"])
-    for name in at_hand():
-        try:
-            file, source = find(name), source_bytes(name)
-        except ProtocolError:  # of another study, perhaps: what cannot be read cannot be shared
-            continue
-        if protocol_hash(source) in hashes:
-            content, liquids = unbundled(source)
-            yield file.name, content
-            inside = {name: text for name, text in liquids.items() if ".." not in PurePosixPath(name).parts}
-            yield from ((name, text.encode()) for name, text in inside.items() if not PurePosixPath(name).is_absolute())
-            return
 
 
 def _credits(study: Study) -> dict[str, Any]:
@@ -108,7 +89,7 @@ def _json(content: Any) -> bytes:
     return f"{json.dumps(content, indent=2, ensure_ascii=False)}\n".encode()
 
 
-def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, bytes]) -> bytes:
+def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, bytes], missing: Sequence[str]) -> bytes:
     simulated = "**All participants are simulated.** " if study.simulated else ""
     blinded = "Settings are named." if study.revealed else "Settings are codes: the key is sealed."
     stated = _credits(study)
@@ -121,6 +102,7 @@ def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, byte
         "",
         *(f"- `data/{name}`" for name in tables),
         *([f"- `results/report.html`: the report{script}"] if "report.html" in report else []),
+        *(["", f"Missing in `materials`: {', '.join(missing)}. Add them."] if missing else []),
         "",
         f"Authors: {', '.join(stated.get('authors', [])) or 'not stated'}.",
         f"Licence: {stated.get('license', 'not stated; ask the authors before you use the data')}.",

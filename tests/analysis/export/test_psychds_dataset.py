@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 import subprocess
@@ -27,16 +28,21 @@ OF_SCHEMA_ORG = {"@type", "name", "description", "unitText", "minValue", "maxVal
 CREDITS = 'credits = { authors = ["A. Kox", "B. Lam"], license = "CC-BY-4.0", citation = "Kox and Lam (2026)" }\n'
 
 
+FOOTAGE = b"waves"
+"""A rehearsal shows no video."""
+
+
 @pytest.fixture
 def kitchen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Results of a study of the workspace, whose file states authors and licence; the key is open."""
+    """Results of a study with footage in the workspace, whose file states authors and licence; the key is open."""
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     text = shipped_file("demo").read_text(encoding="utf-8").replace("format = 1", "format = 2", 1)
     file = tmp_path / "protocols" / "kitchen.toml"
     file.parent.mkdir()
-    file.write_text(
-        text.replace("[study]\n", f"[study]\n{CREDITS}", 1).replace('"demo"', '"kitchen"', 1), encoding="utf-8"
-    )
+    text = text.replace("[study]\n", f"[study]\n{CREDITS}", 1).replace('"demo"', '"kitchen"', 1)
+    text = text.replace("[conditions.thick]\n", '[conditions.thick]\nview = "waves.mp4"\n', 1)
+    file.write_text(text, encoding="utf-8")
+    file.with_name("waves.mp4").write_bytes(FOOTAGE)
     folder = rehearse_answers("kitchen", participants=4, seed=1, results=tmp_path / "results" / "kitchen")
     reveal(folder, by="AK", reason="to share it")
     return folder
@@ -56,6 +62,8 @@ def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path,
     assert said.errors == ()
     assert {issue.code for issue in said.warnings} <= {"JSON_KEY_RECOMMENDED"}
     assert (folder / "materials" / "kitchen.toml").read_bytes() == (tmp_path / "protocols/kitchen.toml").read_bytes()
+    assert (folder / "materials" / "waves.mp4").read_bytes() == FOOTAGE
+    assert "Missing" not in (folder / "README.md").read_text(encoding="utf-8")
     assert "questionnaires" in json.loads((folder / "materials" / "protocol.json").read_bytes())
     assert (folder / "results" / "report.html").is_file()
     assert not [path for path in (folder / "results").iterdir() if path.name.endswith("_data.csv")]
@@ -63,6 +71,19 @@ def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path,
         ran = subprocess.run([rscript, "analysis/report.R", "data"], cwd=folder, check=False, capture_output=True)
         assert ran.returncode == 0, ran.stdout
         assert b"every number that R computes is the report's" in ran.stdout
+
+
+def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -> None:
+    digest = hashlib.sha256(FOOTAGE).hexdigest()
+    footage = tmp_path / "protocols" / "waves.mp4"
+    for change in (lambda: footage.write_bytes(b"other waves"), footage.unlink):
+        change()
+        export(kitchen, tmp_path / "out", extras=["psych-ds"])
+        folder = tmp_path / "out" / FOLDER
+        assert (folder / "materials" / "kitchen.toml").is_file()
+        assert not (folder / "materials" / "waves.mp4").exists()
+        readme = (folder / "README.md").read_text(encoding="utf-8")
+        assert f"Missing in `materials`: waves.mp4 (SHA-256 {digest}). Add them." in readme
 
 
 def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path, tmp_path: Path) -> None:
