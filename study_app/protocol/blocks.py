@@ -15,7 +15,7 @@ from study_app.protocol.texts import Id, Localised
 
 Phase: TypeAlias = Literal["main", "practice", "baseline"]
 Order: TypeAlias = Literal["fixed", "shuffled", "constrained", "williams", "latin"]
-Compared: TypeAlias = Literal["liquids", "delays"]
+Compared: TypeAlias = Literal["liquids", "delays", "views"]
 Kind: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_]*$", max_length=MAX_ID)]
 
 
@@ -119,7 +119,8 @@ class Block(Table):
     compares: Compared | None = Field(
         default=None,
         description="liquids: the conditions of a main block differ in their liquids; delays: in their delays, the "
-        "default where all have one liquid and their delays differ.",
+        "default where all have one liquid and their delays differ; views: in what is seen, the default where all have "
+        "one liquid and their views differ. Written as views, their delays may differ, too.",
     )
     replicates: bool = Field(
         default=False,

@@ -159,9 +159,11 @@ class SceneDefaults(Table):
 
 
 def compared(conditions: Sequence[Condition]) -> Compared:
-    """Return what these conditions differ in: delays where they have one liquid and several delays."""
-    liquids, delays = ({getattr(one, name) for one in conditions} for name in ("liquid_ids", "delay_ms"))
-    return "delays" if len(liquids) == 1 and len(delays) > 1 else "liquids"
+    """Return what these conditions differ in: where they have one liquid, views or else delays if these differ."""
+    liquids, delays, views = ({getattr(one, name) for one in conditions} for name in ("liquid_ids", "delay_ms", "seen"))
+    if len(liquids) > 1:
+        return "liquids"
+    return "views" if len(views) > 1 else "delays" if len(delays) > 1 else "liquids"
 
 
 class PageText(Table):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Final
 
 from matplotlib.figure import Figure
 
@@ -15,8 +14,6 @@ from study_app.analysis.tables.compared_blocks import Block, Kind
 from study_app.analysis.tables.measures import by_participant
 from study_app.analysis.tables.study_tables import Study
 from study_app.errors import AnalysisError
-
-KINDS: Final[tuple[Kind, ...]] = ("liquids", "delays")
 
 
 def liquids(study: Study, block: Block | None = None, *, fonts: Sequence[str] | None = None) -> Figure:
@@ -96,9 +93,9 @@ def render(study: Study, block: Block, form: str, lowest: Mapping[str, float] = 
     """
     fonts = style.fonts_for(form)
     drawn = (
-        liquids(study, block, fonts=fonts)
-        if block.kind == "liquids"
-        else delays(study, block, fonts=fonts, lowest=lowest)
+        delays(study, block, fonts=fonts, lowest=lowest)
+        if block.kind == "delays"
+        else liquids(study, block, fonts=fonts)
     )
     return style.file_bytes(drawn, form, f"{study.name}: {captions.title(block)}")
 

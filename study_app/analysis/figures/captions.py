@@ -26,7 +26,7 @@ def title(block: Block) -> str:
     """Return the heading of a block's figure."""
     if block.kind == "delays":
         return "Answers over added delay" if block.revealed else "Answers by delay setting"
-    return "Agreement for each liquid" if block.revealed else "Agreement for each setting"
+    return f"Agreement for each {_noun(block)}"
 
 
 def counts(study: Study, block: Block) -> list[str]:
@@ -81,7 +81,7 @@ def _sentences(study: Study, block: Block) -> list[str]:
     simulated = "SIMULATED participants, no people; " if study.simulated else ""
     start = f"{'Pilot. ' if study.pilot else ''}Agreement with {statements} on {settings}"
     head = f"{start} ({simulated}{counts(study, block)[0]})."
-    drawn = _bars(block) if block.kind == "liquids" else _plots(study, block)
+    drawn = _plots(study, block) if block.kind == "delays" else _bars(block)
     gone = [_left_out(study), _excluded_sessions(study), _excluded_trials(study, block)]
     return [
         head,
@@ -198,7 +198,7 @@ def _counted_trials(study: Study, block: Block) -> pd.DataFrame:
 
 
 def _noun(block: Block) -> str:
-    return "setting" if not block.revealed else "liquid" if block.kind == "liquids" else "delay"
+    return block.kind.removesuffix("s") if block.revealed else "setting"
 
 
 def _number(count: int) -> str:

@@ -10,11 +10,12 @@ from study_app import figure_style as style
 from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.designs.question_measures import questions_found
 from study_app.analysis.figures import captions
-from study_app.analysis.figures.answer_figures import KINDS, render
+from study_app.analysis.figures.answer_figures import render
 from study_app.analysis.figures.levels.level_pictures import level_pictures
 from study_app.analysis.figures.picture import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.results.section_failures import Failures
+from study_app.analysis.tables.compared_blocks import KINDS
 from study_app.analysis.tables.study_tables import Study, load_study
 from study_app.errors import AnalysisError
 from study_app.store.withdrawals.output_log import write_output

@@ -1,4 +1,4 @@
-"""The first page's answer to which liquids were distinguished."""
+"""The first page's answer to which liquids, or views, were distinguished."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def given(named: RecognitionResult, label: str) -> float:
 
 
 def distinguished(found: BlockFound, decided: Decided) -> Answer:
-    """Return which liquids were recognised by name, and which were rated differently."""
+    """Return which liquids were recognised by name, and which of them, or of the views, were rated differently."""
     apart = {pair: tests for pair, tests in _compared(found).items() if tests}
     differing = [one for one in OMNIBUS.of(found) if one.verdict in FOUND]
     decisive = [one for tests in apart.values() for one in tests] or differing
@@ -162,7 +162,7 @@ def _of_pairs(
         items = listed([f"“{short(found, one.item)}”{_mark([one], mark)}" for one in differing])
         out_of_reach = smallest_of_pairs(len(found.settings), found.n) > decided.alpha
         rest = f"cannot be shown with {counted(found.n, 'participant')}" if out_of_reach else "is not shown"
-        return f"The liquids were rated differently in {items}; which ones {rest}."
+        return f"The {found.kind} were rated differently in {items}; which ones {rest}."
     if not yes:
         return "In no statement were two of them shown to be rated differently."
     rest = f"; not shown to be: {listed(no)}" if no else ""
@@ -309,6 +309,6 @@ FINDING: Final[Finding[None]] = Finding(
     key=KEY,
     place=20,
     empty=None,
-    kinds=("liquids",),
-    question=Question(words="Which liquids were distinguished?", answer=distinguished, picture=_picture),
+    kinds=("liquids", "views"),
+    question=Question(words="Which {kind} were distinguished?", answer=distinguished, picture=_picture),
 )

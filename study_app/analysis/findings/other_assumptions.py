@@ -35,9 +35,9 @@ class OtherAssumptions:
 
 
 def _tested(answers: Asked, _found: BlockFound) -> tuple[OtherAssumptions, tuple[NotTested, ...]]:
-    if answers.block.kind == "liquids":
-        return asked_again(answers, None, "the settings")
-    return asked_again(answers, np.array(answers.block.delays_ms)[:, None] / 100, "the delay")
+    if answers.block.kind == "delays":
+        return asked_again(answers, np.array(answers.block.delays_ms)[:, None] / 100, "the delay")
+    return asked_again(answers, None, "the settings")
 
 
 def asked_again(answers: Asked, columns: Array | None, what: str) -> tuple[OtherAssumptions, tuple[NotTested, ...]]:

@@ -19,6 +19,7 @@ from study_app.analysis.results.words import settings_noun, test_name
 from study_app.analysis.statistics.friedman import Friedman, friedman
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.paired import paired
+from study_app.analysis.tables.compared_blocks import KINDS
 from study_app.analysis.tables.measures import Array
 from study_app.analysis.tables.planned_analysis import Decided
 
@@ -82,8 +83,8 @@ FINDING: Final[Finding[tuple[Tested, ...]]] = Finding(
     what=OMNIBUS,
     empty=(),
     tests=lambda answers, _found: compared(answers),
-    kinds=("liquids",),
-    sealed=("liquids", "delays"),
+    kinds=("liquids", "views"),
+    sealed=KINDS,
     statements=True,
     row_place=2,
     rows=lambda found: (judged_row(found, "settings differ", one) for one in FINDING.of(found)),

@@ -118,8 +118,11 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             "equivalence to no delay by two one-sided tests, where a bound is given; the detection threshold from "
             "agreement."
         )
-    if kinds - {"delays"}:
-        yield "Liquids: Friedman's permutation test of each statement, signed ranks where two conditions are compared."
+    if others := kinds - {None, "delays"}:
+        yield (
+            f"{' and '.join(sorted(map(str, others))).capitalize()}: Friedman's permutation test of each statement, "
+            "signed ranks where two conditions are compared."
+        )
     yield (
         f"α = {decided.alpha:g}; primary statements ({', '.join(decided.primary) or 'all'}) are corrected by Holm, the "
         "others, exploratory, by Benjamini and Hochberg."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Generic, Literal, TypeAlias, TypeVar, cast
+from typing import Any, Generic, Literal, TypeAlias, TypeVar, cast
 
 from study_app.analysis.designs.block_tests import Asked
 from study_app.analysis.figures.page_layout import Sheet
@@ -12,15 +12,13 @@ from study_app.analysis.figures.picture import Drawing, Picture
 from study_app.analysis.report.first_page.answer import Answer
 from study_app.analysis.results.block_results import BlockFound, Results
 from study_app.analysis.results.not_tested import NotTested
-from study_app.analysis.tables.compared_blocks import Kind
+from study_app.analysis.tables.compared_blocks import KINDS, Kind
 from study_app.analysis.tables.planned_analysis import Decided
 
 R = TypeVar("R")
 Tests: TypeAlias = Callable[[Asked, BlockFound], tuple[R, tuple[NotTested, ...]]]
 Section: TypeAlias = Callable[[BlockFound, Results, Mapping[str, Picture]], Iterable[str]]
 Row: TypeAlias = dict[str, Any]
-
-BOTH: Final[tuple[Kind, ...]] = ("liquids", "delays")
 
 
 def nothing(*_context: object) -> tuple[()]:
@@ -30,7 +28,7 @@ def nothing(*_context: object) -> tuple[()]:
 
 @dataclass(frozen=True, kw_only=True)
 class Question:
-    """A question of the report's first page: its words, its answer, and its picture.
+    """A question of the report's first page: its words ("{kind}": what is compared), its answer, and its picture.
 
     ``picture`` draws on a sheet and returns what it shows in words, or None where there is nothing to show.
     """
@@ -87,7 +85,7 @@ class Finding(Generic[R]):
     empty: R
     what: str = ""
     tests: Tests[R] | None = None
-    kinds: tuple[Kind, ...] = BOTH
+    kinds: tuple[Kind, ...] = KINDS
     sealed: tuple[Kind, ...] = ()
     waits: tuple[Kind, ...] = ()
     about: Literal["settings", "sessions"] = "settings"

@@ -89,9 +89,7 @@ def ms(delay_ms: float) -> str:
 
 def settings_noun(found: BlockFound | Block) -> str:
     """Return what the settings of a block are called."""
-    if not found.revealed:
-        return "setting"
-    return "delay" if found.kind == "delays" else "liquid"
+    return found.kind.removesuffix("s") if found.revealed else "setting"
 
 
 def short(found: BlockFound, item: str) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, get_args
 
 from study_app.protocol.blocks import Compared
 from study_app.protocol.orders.block_orders import every_step_of
@@ -18,6 +18,8 @@ from study_app.protocol.trials.stimuli import OF_LINK
 from study_app.store.blinded.blinding import Key
 
 Kind: TypeAlias = Compared
+
+KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 
 DELAY_PREFIX: Final = "D"
 """Codes of delay settings are D1, D2 …: what tells a block of delays in sealed receipts of earlier versions."""
@@ -36,8 +38,8 @@ class Item:
 class Setting:
     """What was presented under a code; all but the code is None until the key is opened.
 
-    ``label`` is the item that names what was felt, where one does, ``link`` how its force was sent if not promptly. A
-    track ("8/1") has neither liquid nor delay.
+    ``label`` is the item that names what was felt, where one does, ``link`` how its force was sent if not promptly,
+    ``view`` what was seen. A track ("8/1") has neither liquid nor delay.
     """
 
     code: str
@@ -46,6 +48,7 @@ class Setting:
     delay_ms: float | None = None
     label: str | None = None
     link: str = ""
+    view: str = "tank"
 
     @property
     def standard(self) -> str | None:
@@ -118,7 +121,8 @@ def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
         return Setting(code, presented)
     liquids = " + ".join(key.liquids(block, code))
     link = ", ".join(link_words(*(condition.get(name, 0.0) for name in OF_LINK)))
-    return Setting(code, presented, liquids, key.delay_ms(block, code), condition.get("label"), link)
+    view = condition.get("view", "tank") + (" alone" if condition.get("overlay") == "hidden" else "")
+    return Setting(code, presented, liquids, key.delay_ms(block, code), condition.get("label"), link, view)
 
 
 def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
@@ -181,17 +185,18 @@ def settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tup
 
 
 def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
-    """Return what a figure calls a setting: its code, or its liquid and, where delays differ, its delay."""
+    """Return what a figure calls a setting: its code, or its liquid and, where they differ, its view and delay."""
     if setting.liquid is None or setting.delay_ms is None:
         return setting.code if setting.standard is None else f"Standard {setting.standard}"
     liquid = setting.liquid.replace("_", " ")
     named = liquid[:1].upper() + liquid[1:]
+    named = f"{named}, {setting.view}" if len({other.view for other in others}) > 1 else named
     named = f"{named}, {setting.delay_ms:g} ms" if len({other.delay_ms for other in others}) > 1 else named
     return f"{named}, {setting.link}" if setting.link else named
 
 
 def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tuple[tuple[Setting, ...], Kind]:
-    """Return the settings by name: delays ascending, liquids in the order of the protocol's conditions.
+    """Return the settings by name: delays ascending, others in the order of the protocol's conditions.
 
     Without ``kind``, in receipts of earlier versions, one liquid under several delays is a block of delays.
     """
@@ -205,4 +210,4 @@ def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tu
     order = list(key.tables["conditions"])
     if any(setting.condition not in order for setting in settings):  # tracks, by their standards
         return tuple(sorted(settings, key=lambda one: float((one.condition or "").partition("/")[0] or 0))), "liquids"
-    return tuple(sorted(settings, key=lambda setting: order.index(setting.condition))), "liquids"
+    return tuple(sorted(settings, key=lambda setting: order.index(setting.condition))), kind

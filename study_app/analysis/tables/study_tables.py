@@ -144,7 +144,7 @@ class Study:
             warn(f"warning: {doubt}; used here as it is")
 
     def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
-        """Return the blocks that compare liquids, or delays."""
+        """Return the blocks that compare liquids, delays or views."""
         return tuple(block for block in self.blocks if block.kind == kind)
 
     def answers(self, block: Block) -> pd.DataFrame:

@@ -39,6 +39,9 @@ from study_app.protocol.trials.task import Task
 
 DIGITS = 6
 """Conditions whose delays differ by less than a nanosecond present the same."""
+VARIED = {"liquids": "liquid_ids", "delays": "delay_ms", "views": "seen"}
+"""What a block compares, and the attribute of its conditions that then varies."""
+
 _TABLES = ("liquids", "conditions", "tasks", "pages", "blocks")
 
 
@@ -206,16 +209,22 @@ def codes(parts: Draft) -> Iterator[Fault]:
 
 
 def compares(parts: Draft) -> Iterator[Fault]:
-    """Check that the conditions of a main block differ in one thing, which is what the block says that it compares."""
+    """Check that the conditions of a main block differ in one thing, which is what the block says that it compares.
+
+    Where it says views, delays may differ as well: those that make the views equally late.
+    """
     for name, block in parts.blocks.items():
         presented = [parts.conditions[one] for one in block.conditions if one in parts.conditions]
         if block.phase != "main" or block.design is not None or len(presented) < len(block.conditions):
             continue
-        liquids, delays = len({one.liquid_ids for one in presented}), len({one.delay_ms for one in presented})
-        if liquids > 1 and delays > 1:
-            message = "its conditions differ in liquid and in delay, whose effects the analysis cannot tell apart"
+        varied = [of for of, key in VARIED.items() if len({getattr(one, key) for one in presented}) > 1]
+        if block.compares == "views" and "delays" in varied:
+            varied.remove("delays")
+        if len(varied) > 1:
+            differ = " and in ".join(one.removesuffix("s") for one in varied)
+            message = f"its conditions differ in {differ}, whose effects the analysis cannot tell apart"
             yield Fault(("blocks", name, "conditions"), message, "vary one of them, or use a block for each")
-        elif block.compares is not None and {"liquids": delays, "delays": liquids}[block.compares] > 1:
+        elif block.compares is not None and varied not in ([], [block.compares]):
             message = f'is "{block.compares}", and its conditions differ in {compared(presented)}'
             yield Fault(("blocks", name, "compares"), message, "correct it, or leave it out")
 

@@ -100,6 +100,11 @@ class Condition(Table):
         """Whether a video is seen, live or from a file, and not the drawn tank."""
         return self.view != "tank"
 
+    @property
+    def seen(self) -> tuple[str, str]:
+        """What is seen: the view, and whether ball and targets are drawn over it."""
+        return self.view, self.overlay
+
     def link(self, seed: int = 0) -> ForceLink:
         """Return the link between force model and hand; ``seed`` is that of jitter and loss."""
         return ForceLink(

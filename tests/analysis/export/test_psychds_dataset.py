@@ -40,7 +40,8 @@ def kitchen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     file = tmp_path / "protocols" / "kitchen.toml"
     file.parent.mkdir()
     text = text.replace("[study]\n", f"[study]\n{CREDITS}", 1).replace('"demo"', '"kitchen"', 1)
-    text = text.replace("[conditions.thick]\n", '[conditions.thick]\nview = "waves.mp4"\n', 1)
+    head = '[conditions.thick]\nliquid = "thick"'
+    text = text.replace(head, '[conditions.thick]\nliquid = "thin"\nview = "waves.mp4"', 1)
     file.write_text(text, encoding="utf-8")
     file.with_name("waves.mp4").write_bytes(FOOTAGE)
     folder = rehearse_answers("kitchen", participants=4, seed=1, results=tmp_path / "results" / "kitchen")
@@ -63,6 +64,10 @@ def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path,
     assert {issue.code for issue in said.warnings} <= {"JSON_KEY_RECOMMENDED"}
     assert (folder / "materials" / "kitchen.toml").read_bytes() == (tmp_path / "protocols/kitchen.toml").read_bytes()
     assert (folder / "materials" / "waves.mp4").read_bytes() == FOOTAGE
+    report = (folder / "results" / "report.html").read_text(encoding="utf-8")
+    assert "Which views were distinguished?" in report
+    assert "Do the views differ, statement by statement?" in report
+    assert "Thin, waves.mp4" in report
     assert "Missing" not in (folder / "README.md").read_text(encoding="utf-8")
     assert "questionnaires" in json.loads((folder / "materials" / "protocol.json").read_bytes())
     assert (folder / "results" / "report.html").is_file()

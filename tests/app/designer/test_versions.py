@@ -315,7 +315,8 @@ def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_pat
     (elsewhere / "syrup.toml").write_text(f"[liquids.syrup]{liquid}\n")
     text = designer.file.read_text().replace(f"[liquids.thick]{liquid}", '[liquids.thick]\nfile = "syrup.toml"')
     text = text.replace("format = 1", "format = 2", 1)
-    text = text.replace("[conditions.thick]\n", '[conditions.thick]\nview = "sea/waves.mp4"\n')
+    for name in ("thin", "thick"):
+        text = text.replace(f"[conditions.{name}]\n", f'[conditions.{name}]\nview = "sea/waves.mp4"\n')
     (elsewhere / "sea").mkdir()
     (elsewhere / "sea" / "waves.mp4").write_bytes(b"copied, not decoded")
     (elsewhere / "kitchen.toml").write_text(text)

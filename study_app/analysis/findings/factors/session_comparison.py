@@ -19,6 +19,7 @@ from study_app.analysis.results.not_tested import NotTested
 from study_app.analysis.statistics.friedman import Friedman, friedman
 from study_app.analysis.statistics.multiple_comparisons import false_discovery
 from study_app.analysis.statistics.paired import paired
+from study_app.analysis.tables.compared_blocks import KINDS
 from study_app.analysis.tables.measures import medians
 
 COMPARISON: Final = "comparison of sessions"
@@ -74,7 +75,7 @@ FINDING: Final[Finding[tuple[Tested, ...]]] = Finding(
     what=COMPARISON,
     empty=(),
     tests=lambda answers, found: compared_sessions(answers, found.sessions),
-    sealed=("liquids", "delays"),
+    sealed=KINDS,
     about="sessions",
     row_place=4,
     rows=lambda found: (judged_row(found, "sessions differ", one) for one in FINDING.of(found)),

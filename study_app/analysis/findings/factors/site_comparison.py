@@ -27,6 +27,7 @@ from study_app.analysis.results.not_tested import NotTested
 from study_app.analysis.results.words import listed, settings_noun, test_name
 from study_app.analysis.statistics.independent_groups import GroupsDiffer, groups_differ
 from study_app.analysis.statistics.multiple_comparisons import false_discovery
+from study_app.analysis.tables.compared_blocks import KINDS
 from study_app.analysis.tables.measures import Array
 from study_app.analysis.tables.planned_analysis import Decided
 
@@ -132,7 +133,7 @@ FINDING: Final[Finding[SiteTests]] = Finding(
     what=COMPARISON,
     empty=SiteTests(),
     tests=lambda answers, _found: compared_sites(answers),
-    sealed=("liquids", "delays"),
+    sealed=KINDS,
     about="sessions",
     numbers=_numbers,
     row_place=4.5,

@@ -45,7 +45,7 @@ def _shown(answer: Answer, found: BlockFound, failures: Failures) -> dict[str, A
     )
     png, alt = (b"", "") if isinstance(drawn, Failure) or drawn is None else drawn
     return {
-        "question": question.words,
+        "question": question.words.format(kind=found.kind),
         "title": answer.title,
         "text": _kept_together(answer.text),
         "exploratory": answer.exploratory,

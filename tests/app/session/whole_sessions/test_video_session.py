@@ -43,12 +43,12 @@ NAME = "zanzibar.mp4"
 
 @pytest.fixture
 def study(short_demo: str) -> Path:
-    """Return a short demo in format 2 whose condition ``thick`` shows footage."""
+    """Return a short demo in format 2 whose condition ``thick`` shows footage, and differs in nothing else."""
     path = Path(short_demo)
     text = path.read_text().replace("format = 1", "format = 2", 1)
     head = '[conditions.thick]\nliquid = "thick"\n'
     assert head in text
-    path.write_text(text.replace(head, f'{head}view = "{NAME}"\n'))
+    path.write_text(text.replace(head, f'[conditions.thick]\nliquid = "thin"\nview = "{NAME}"\n'))
     return path
 
 
