@@ -67,6 +67,7 @@ def open_windows(
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
         reach_m=max(device.workspace_m),
         pointer=described.pointer,
+        felt=described.kind != "seen",
         force_limit_n=protocol.device.force_limit_n if protocol.study.blinding == "single" else None,
         theme=theme,
     )

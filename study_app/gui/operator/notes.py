@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPlainTextEdit, QVBoxLayout, QWidget
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.labels import Elided, figures, label
+from study_app.gui.widgets.labels import Clamped, Elided, figures, label
 from study_app.viewmodels.number_words import minutes
 from study_app.viewmodels.operator import NOTES_SHOWN, OperatorView
 
@@ -55,7 +55,7 @@ class NotesCard(Card):
         head.addWidget(label("Notes and marks", "card"))
         head.addStretch()
         head.addWidget(label("stored in the journal", "small", "text2"))
-        self.lines = [_NoteRow() for _ in range(NOTES_SHOWN)]
+        self.lines = [_NoteRow(newest=number == 0) for number in range(NOTES_SHOWN)]
         self.none = label("No notes yet.", "label", "text2")
         self._list = QWidget()
         rows = QVBoxLayout(self._list)
@@ -82,9 +82,9 @@ class NotesCard(Card):
         self.mark.clicked.connect(self.mark_set)
 
     def show_lines(self, most: int) -> None:
-        """Show so many notes at most; the hint goes before the first of them, the heading with the last."""
+        """Show so many notes at most; heading and hint go with the first that is left out."""
         self._shown = most
-        self._head.setVisible(most > 0)
+        self._head.setVisible(most == NOTES_SHOWN)
         self._list.setVisible(most > 0)
         self.hint.setVisible(most == NOTES_SHOWN)
         self.field.setToolTip("" if most == NOTES_SHOWN else self.hint.text())
@@ -118,19 +118,19 @@ class NotesCard(Card):
 
 
 class _NoteRow(QWidget):
-    """One line: sign, time, text; a long text ends in "…" and is whole in the tip."""
+    """Sign, time and text, of the newest note in two lines; a long text ends in "…" and is whole in the tip."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, newest: bool) -> None:
         super().__init__()
         self.sign = Icon("pen", "text2", 16)
         self.time = figures("", "label", "text2")
-        self.text = Elided("label")
+        self.text = Clamped("", 2, "label", steady=False) if newest else Elided("label")
         self.text.setFont(font("label", weight=400))
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(8)
-        row.addWidget(self.sign)
-        row.addWidget(self.time)
+        row.addWidget(self.sign, 0, Qt.AlignmentFlag.AlignTop)
+        row.addWidget(self.time, 0, Qt.AlignmentFlag.AlignTop)
         row.addWidget(self.text, 1)
 
     def show_note(self, kind: str, at: str, text: str) -> None:

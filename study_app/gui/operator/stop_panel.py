@@ -53,15 +53,22 @@ class StopButton(Themed, QPushButton):
 
 
 class StopPanel(Card):
-    """The button under a line that says whether there is force, with the way back after a stop."""
+    """The button under a line that says whether there is force, with the way back after a stop.
+
+    Parameters
+    ----------
+    felt
+        Whether the device exerts force; of one that is only seen the line says so.
+    """
 
     stop_asked = Signal()
     fade_in_asked = Signal()
 
-    def __init__(self) -> None:
+    def __init__(self, *, felt: bool = True) -> None:
         super().__init__(padding=12, gap=10)
+        self._felt = felt
         self.sign = Icon("check", "ok", 18)
-        self.word = label("Force is on", "strong")
+        self.word = label("", "strong")
         self.fade_in = ActionButton("", "Fade in again", height=36)
         self.stop = StopButton()
         # Pressed, not clicked: the force goes with the finger's first touch.
@@ -85,8 +92,10 @@ class StopPanel(Card):
         """Say whether the force is on."""
         if view.over:
             self._say("minus", "text2", "Force is off")
-        elif view.force_on:
+        elif view.force_on and self._felt:
             self._say("check", "ok", "Force is on")
+        elif view.force_on:
+            self._say("minus", "text2", "Visual only, no force")
         else:
             self._say("stop", "warn", "Force is off")
         self.fade_in.setVisible(not view.force_on and view.may_resume)

@@ -48,6 +48,8 @@ class OperatorWindow(QMainWindow):
         Half of the longest edge of the tank [m], for the scale of the position plot.
     pointer
         Whether positions are of the mouse pointer.
+    felt
+        Whether the device exerts force.
     force_limit_n
         Largest force on the hand [N] in a single-blind study; None where the force is hidden.
     """
@@ -74,6 +76,7 @@ class OperatorWindow(QMainWindow):
         lateness_limit_s: float,
         reach_m: float,
         pointer: bool,
+        felt: bool = True,
         force_limit_n: float | None = None,
         theme: Theme = LIGHT,
     ) -> None:
@@ -92,7 +95,7 @@ class OperatorWindow(QMainWindow):
         self.position = PositionCard(reach_m, pointer=pointer)
         self.device = DeviceCard()
         self.notes = NotesCard()
-        self.stop = StopPanel()
+        self.stop = StopPanel(felt=felt)
         self.buttons = Actions()
         self.panels = Panels(
             {

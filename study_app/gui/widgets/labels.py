@@ -77,17 +77,24 @@ class Elided(QLabel):
 
 
 class Clamped(QLabel):
-    """A label of at most so many lines, which ends in "…" where they are too few; the whole text is in its tip."""
+    """A label of at most so many lines, which ends in "…" where they are too few; the whole text is in its tip.
 
-    def __init__(self, text: str, lines: int, role: TypeRole = "body", ink: Ink = "text") -> None:
+    A ``steady`` one is as high as all its lines, however few the text needs.
+    """
+
+    def __init__(
+        self, text: str, lines: int, role: TypeRole = "body", ink: Ink = "text", *, steady: bool = True
+    ) -> None:
         super().__init__()
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setFont(font(role))
         self.setProperty("role", ink)
-        self.setWordWrap(True)
+        self.setWordWrap(steady)
+        if not steady:  # a column with a label that wraps is as high as it would like to be, where it can scroll
+            self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.setAccessibleName(text)
-        self.whole, self._most = text, lines
+        self.whole, self._most, self._steady = text, lines, steady
         self.setFixedHeight(lines * self.fontMetrics().lineSpacing() + 2)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
@@ -109,6 +116,8 @@ class Clamped(QLabel):
             rest = self.fontMetrics().elidedText(rest, Qt.TextElideMode.ElideRight, self.width())
             lines = [*lines[: self._most - 1], rest]
         self.setText("\n".join(lines))
+        if not self._steady:
+            self.setFixedHeight(max(1, len(lines)) * self.fontMetrics().lineSpacing() + 2)
         self.setToolTip(self.whole if lines and lines[-1].endswith("…") else "")
 
     def _broken(self, width: int) -> list[str]:

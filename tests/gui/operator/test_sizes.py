@@ -31,6 +31,7 @@ SIZES = (
     (1366, 768),
     (1499, 869),
     (1500, 870),
+    (1600, 750),
     (1600, 900),
     (1920, 1080),
 )
@@ -168,7 +169,9 @@ def cut(window: OperatorWindow) -> list[str]:
             metrics = widget.fontMetrics()
             if widget.wordWrap() and widget.height() < widget.heightForWidth(widget.width()):
                 found.append(f"{words}: too low")
-            if not widget.wordWrap() and widget.width() < metrics.horizontalAdvance(widget.text()):
+            if not widget.wordWrap() and widget.width() < max(
+                map(metrics.horizontalAdvance, widget.text().split("\n"))
+            ):
                 found.append(f"{words}: too narrow")
             if widget.text() and widget.height() < metrics.height():
                 found.append(f"{words}: lower than a line")
@@ -244,6 +247,14 @@ def test_notes_give_way_first_and_come_back(window: OperatorWindow, told: Any, h
         settle(window, size)
         seen.append(sum(line.isVisible() for line in window.notes.lines))
     assert seen == [2, 2, 0, 2]
+
+
+def test_the_newest_note_has_two_lines_on_a_small_screen(window: OperatorWindow, told: Any, health: Any) -> None:
+    filled(window, told, health, running)
+    settle(window, (1356, 709))  # 1366 × 768 less frame and task bar
+    newest = window.notes.lines[0].text
+    assert newest.text().count("\n") == 1
+    assert newest.text().replace("\n", " ") == newest.whole
 
 
 def test_the_shape_of_the_window_does_not_tell_whether_the_force_is_hidden(qtbot: Any, told: Any, health: Any) -> None:

@@ -56,6 +56,17 @@ def test_a_view_becomes_texts(running, told, health):
     assert running.stop.word.text() == "Force is on"
 
 
+def test_without_force_on_the_hand_the_cockpit_says_so(qtbot, told):
+    window = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=True, felt=False)
+    qtbot.addWidget(window)
+    told.welcome()
+    window.show_view(told.view())
+    assert window.stop.word.text() == "Visual only, no force"
+    window.show_view(told.view(force_on=False))
+    assert window.stop.word.text() == "Force is off"
+    window.may_close = True
+
+
 @pytest.mark.parametrize("done", range(5))
 def test_the_bar_is_filled_as_far_as_the_line_below_it_says(window, told, done):
     told.welcome()
