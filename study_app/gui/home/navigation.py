@@ -17,6 +17,7 @@ from study_app.gui.widgets.controls import PressedByEnter
 from study_app.gui.widgets.labels import label
 
 WIDE_RAIL, NARROW_RAIL = 216, 72
+WIDE_MARGIN, NARROW_MARGIN = 12, 4
 FOCUS_RING = 2  # px
 
 
@@ -63,7 +64,7 @@ class RailButton(Themed, PressedByEnter):
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the room for icon and word; a fixed height would not outlast a change of theme."""
-        return QSize(NARROW_RAIL - 24, 58) if self._narrow else QSize(WIDE_RAIL - 24, 42)
+        return QSize(NARROW_RAIL - 2 * NARROW_MARGIN, 58) if self._narrow else QSize(WIDE_RAIL - 2 * WIDE_MARGIN, 42)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the same room."""
@@ -135,14 +136,12 @@ class Rail(Themed, QWidget):
         self.buttons: dict[str, RailButton] = {}
         self.switch = RailButton("moon", "Dark theme", "Dark")
         self.switch.clicked.connect(self.theme_asked)
-        head = QHBoxLayout()
+        self._head = head = QHBoxLayout()
         head.setSpacing(10)
-        head.setContentsMargins(8, 0, 0, 0)
         head.addWidget(Logo())
         head.addWidget(self.name)
         head.addStretch()
-        column = QVBoxLayout(self)
-        column.setContentsMargins(12, 20, 12, 16)
+        self._column = column = QVBoxLayout(self)
         column.setSpacing(6)
         column.addLayout(head)
         column.addSpacing(22)
@@ -166,6 +165,9 @@ class Rail(Themed, QWidget):
     def narrow(self, yes: bool) -> None:
         """Take less room in a small window."""
         self.setFixedWidth(NARROW_RAIL if yes else WIDE_RAIL)
+        margin = NARROW_MARGIN if yes else WIDE_MARGIN
+        self._column.setContentsMargins(margin, 20, margin, 16)
+        self._head.setContentsMargins(20 - margin, 0, 0, 0)
         self.name.setVisible(not yes)
         for button in (*self.buttons.values(), self.switch):
             button.narrow(yes)
