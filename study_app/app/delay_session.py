@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.garbage_collection import collecting_here
-from study_app.app.session.session_windows import open_windows
+from study_app.app.session.session_windows import make_cockpit, open_windows
 from study_app.app.session.termination import ended_from_outside
 from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import SessionError, StudyError
@@ -164,8 +164,9 @@ class _Showing:
         schedule = self._chosen.schedule(self._protocol)
         try:
             with open_store(self._chosen, self._protocol, self._source, rig, {}) as store:
+                operator = make_cockpit(self._chosen, self._protocol, rig, LIGHT)
                 bridge = open_windows(
-                    self._chosen, self._protocol, schedule, store, rig, LIGHT, refresh_hz=self._refresh_hz
+                    self._chosen, self._protocol, schedule, store, rig, operator, refresh_hz=self._refresh_hz
                 )
                 self._size(bridge)
                 self._run(bridge)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Mapping
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -69,17 +70,21 @@ def without_conditions(protocol: Protocol) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Return the versions of the program, of Python, of the system and of the libraries that shape a session."""
-    found = {
+    return {
         "liquid-study": study_app.__version__,
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        **{library: library_version(library) for library in _LIBRARIES},
     }
-    for library in _LIBRARIES:
-        try:
-            found[library] = metadata.version(library)
-        except metadata.PackageNotFoundError:
-            found[library] = "not installed"
-    return found
+
+
+@cache
+def library_version(library: str) -> str:
+    """Return the version of a library; its description is read from the disk once."""
+    try:
+        return metadata.version(library)
+    except metadata.PackageNotFoundError:
+        return "not installed"
 
 
 def write(path: Path, receipt: Mapping[str, Any]) -> None:

@@ -11,7 +11,6 @@ import json
 import re
 import zipfile
 from collections.abc import Iterator
-from importlib import metadata
 from pathlib import Path
 from typing import Final
 
@@ -60,7 +59,7 @@ def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
     settings, trouble = workstation.load_or_default()
     log = kept_log()
     yield "README.txt", ABOUT
-    yield "versions.json", _json(receipt.versions() | {name: _version(name) for name in _DRIVERS})
+    yield "versions.json", _json(receipt.versions() | {name: receipt.library_version(name) for name in _DRIVERS})
     yield "settings.json", _json(_settings(settings) | ({"problem": "the file cannot be used"} if trouble else {}))
     yield "log.txt", log
     yield "last-error.txt", last_error(log)
@@ -87,13 +86,6 @@ def _crashes(results: Path) -> Iterator[str]:
     for _, trace in sorted(found, reverse=True)[:CRASHES]:
         lines = [line for line in trace.splitlines() if _PLACE.match(line) or _HEADING.match(line)]
         yield re.sub(r'(?<=File ")[^"]*', lambda path: source_place(path[0]), "\n".join(lines))
-
-
-def _version(library: str) -> str:
-    try:
-        return metadata.version(library)
-    except metadata.PackageNotFoundError:
-        return "not installed"
 
 
 def _json(value: object) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -73,9 +73,9 @@ def run_session(chosen: NewSession, progress: Callable[[str], object] | None) ->
 
 def load_windows() -> None:
     """Load the modules of a session's windows while the note is shown: a third of a second; no object is made."""
-    import study_app.app.session.preflight_controller  # noqa: PLC0415
-    import study_app.app.session.session_windows  # noqa: PLC0415
-    import study_app.store.recording_writer  # noqa: F401, PLC0415 - and pyarrow, which the recorder is made with
+    from study_app.store import receipt, recording_writer  # noqa: F401, PLC0415 - and pyarrow, for the recorder
+
+    receipt.versions()  # read from the disk once
 
 
 class LiveSession(QObject):
@@ -112,6 +112,7 @@ class LiveSession(QObject):
         self._closed = False
         self._ending = threading.Event()
         self._working = False
+        self._steps: Iterator[None] | None = None
         self.patience_s = OPENING_PATIENCE_S
         self._opening: threading.Thread | None = None
         self._ready.connect(self._begin, Qt.ConnectionType.QueuedConnection)
@@ -198,7 +199,18 @@ class LiveSession(QObject):
             ready = made
             self._go_on(lambda: self._ask(ready))
         else:
-            self._go_on(lambda: self.open_windows(made))
+            self._open_windows(made)
+
+    def _open_windows(self, made: object) -> None:
+        """Open the windows, step by step, with other events between the steps."""
+        if self._steps is None or not isinstance(made, Ready):
+            self._steps = self.open_windows(made)
+            self._go_on(self._step)
+
+    def _step(self) -> None:
+        """Take the next step, unless the session was closed meanwhile."""
+        if not self._closed and self._steps is not None and next(self._steps, self) is None:
+            QTimer.singleShot(0, self, lambda: self._go_on(self._step))
 
     def _go_on(self, step: Callable[[], None]) -> None:
         """Take a step toward the first page; whatever it meets ends in order."""
@@ -218,18 +230,18 @@ class LiveSession(QObject):
 
         shown_on, _ = self.screens()
         asked = Preflight(self.chosen, self.chosen.read_protocol(), made, shown_on, self.chosen.who, self.theme)
-        asked.started.connect(lambda ready: self._go_on(lambda: self.open_windows(ready)))
-        asked.failed.connect(lambda error: self._go_on(lambda: self.open_windows(error)))
+        asked.started.connect(self._open_windows)
+        asked.failed.connect(self._open_windows)
         asked.cancelled.connect(self.cancel)
         self.preflight = asked
         self._close_note()
         asked.open()
 
-    def open_windows(self, made: object) -> None:
-        """Go on with what the thread made ready, or raise what it met."""
+    def open_windows(self, made: object) -> Iterator[None]:
+        """Go on with what the thread made ready, or raise what it met; what comes up to a yield takes a few frames."""
         if not isinstance(made, Ready):
             raise made if isinstance(made, Exception) else TypeError(made)
-        from study_app.app.session.session_windows import open_windows  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.app.session.session_windows import make_cockpit, open_windows  # noqa: PLC0415 - pyqtgraph: once needed
 
         chosen, rig = self.chosen, made.rig
         source = chosen.read_source()
@@ -238,6 +250,9 @@ class LiveSession(QObject):
         found = checks(made.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()), protocol)
         self._pass_checks(found)
         screens = described(self.settings, shown_on, operated_on)
+        yield
+        operator = make_cockpit(chosen, protocol, rig, self.theme)
+        yield  # the last one: no session is on the disk without its windows
         self._store = open_store(chosen, protocol, source, rig, screens, made.masking, made.outlets, made.videos)
         self._crash_trace = CrashTrace(self._store.folder.crash)
         self._store.append("preflight", checks=[one.entry for one in found])
@@ -248,16 +263,15 @@ class LiveSession(QObject):
         start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, lines, key, exactly=chosen.played)
         if descriptor_of(chosen.device).kind == "seen":
             protocol = without_force(protocol)
-        text_scale = text_scale_on(self.settings, shown_on)
         self.bridge = open_windows(
             chosen,
             protocol,
             schedule,
             self._store,
             rig,
-            self.theme,
+            operator,
             start,
-            text_scale=text_scale,
+            text_scale=text_scale_on(self.settings, shown_on),
             photodiode=self.settings.photodiode,
             videos=made.videos,
         )

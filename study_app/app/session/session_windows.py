@@ -39,13 +39,27 @@ if TYPE_CHECKING:
     from study_app.video.sources import Videos
 
 
+def make_cockpit(chosen: NewSession, protocol: Protocol, rig: Rig, theme: Theme) -> OperatorWindow:
+    """Return the operator's window, not shown yet."""
+    described = descriptor_of(chosen.device)
+    return OperatorWindow(
+        protocol.study.name,
+        lateness_limit_s=protocol.limits.lateness_ms / 1000,
+        reach_m=max(rig.device.workspace_m),
+        pointer=described.pointer,
+        felt=described.kind != "seen",
+        force_limit_n=protocol.device.force_limit_n if protocol.study.blinding == "single" else None,
+        theme=theme,
+    )
+
+
 def open_windows(
     chosen: NewSession,
     protocol: Protocol,
     schedule: Schedule,
     store: SessionStore,
     rig: Rig,
-    theme: Theme,
+    operator: OperatorWindow,
     start: Start = FIRST,
     *,
     text_scale: float = 1.0,
@@ -55,22 +69,14 @@ def open_windows(
 ) -> SessionBridge:
     """Open the operator's and the participant's window; the bridge returned is to be started.
 
-    ``start`` is where a resumed session goes on, ``text_scale`` how much larger than designed the participant's words
-    must be at least, ``photodiode`` whether the tank has a corner for one. With ``refresh_hz`` there are so many
-    frames a second by the clock, at any refresh rate of the screen. ``videos`` are open.
+    ``operator`` is the cockpit, made before; ``start`` is where a resumed session goes on, ``text_scale`` how much
+    larger than designed the participant's words must be at least, ``photodiode`` whether the tank has a corner for one.
+    With ``refresh_hz`` there are so many frames a second by the clock, at any refresh rate of the screen. ``videos``
+    are open.
     """
     clock, device, servo = store.clock.seconds, rig.device, rig.servo
     journal = WatchedJournal(store, progress_of(opened(store.lines, store.key)), clock)
     described = descriptor_of(chosen.device)
-    operator = OperatorWindow(
-        protocol.study.name,
-        lateness_limit_s=protocol.limits.lateness_ms / 1000,
-        reach_m=max(device.workspace_m),
-        pointer=described.pointer,
-        felt=described.kind != "seen",
-        force_limit_n=protocol.device.force_limit_n if protocol.study.blinding == "single" else None,
-        theme=theme,
-    )
     shown_on, operated_on = choose_screens(chosen.screen)
     strip = Strip() if shown_on is operated_on and not chosen.played else None
     participant = ParticipantWindow(

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from PySide6.QtCore import QTimer
 
 from study_app.app.session import live_session
 from study_app.app.session.live_session import LiveSession
 from study_app.errors import SessionError
 from study_app.gui.theme.theme import LIGHT
 from study_app.session.request import NewSession
+from study_app.session.start import Ready
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "scripted", True, None, Path("nowhere"))
 
@@ -60,3 +63,49 @@ def test_the_force_is_zero_first_and_a_part_that_fails_leaves_no_other_open(
     session._make_ready()
     assert closed == ["rig", "videos", "outlets"]
     assert [str(error) for error in made] == ["the device sends nothing"]
+
+
+class Stepped(LiveSession):
+    """A session whose windows open in three steps, which it keeps."""
+
+    def __init__(self) -> None:
+        super().__init__(CHOSEN, LIGHT)
+        self.taken: list[object] = []
+
+    def open_windows(self, made: object) -> Iterator[None]:
+        if isinstance(made, Exception):
+            raise made
+        for step in range(3):
+            self.taken.append(step)
+            yield
+
+
+READY: Any = Ready(SimpleNamespace(), SimpleNamespace())
+
+
+def test_other_events_are_handled_while_windows_open_which_are_opened_once(qtbot: Any) -> None:
+    session = Stepped()
+    QTimer.singleShot(0, lambda: session.taken.append("another event"))
+    session._open_windows(READY)
+    session._open_windows(READY)  # Start was pressed twice
+    qtbot.waitUntil(lambda: 2 in session.taken)
+    qtbot.wait(20)
+    assert session.taken == [0, "another event", 1, 2]
+
+
+def test_a_session_called_off_between_two_steps_opens_nothing_more(qtbot: Any) -> None:
+    session = Stepped()
+    session._open_windows(READY)
+    session.cancel()
+    qtbot.wait(20)
+    assert session.taken == [0]
+
+
+def test_a_device_that_fails_between_two_steps_ends_the_session(qtbot: Any) -> None:
+    session = Stepped()
+    ended: list[bool] = []
+    session.over.connect(lambda: ended.append(True))
+    session._open_windows(READY)
+    session._open_windows(SessionError("the device sends nothing"))
+    qtbot.wait(20)
+    assert (session.taken, ended, str(session.error)) == ([0], [True], "the device sends nothing")

@@ -7,6 +7,7 @@ failure end the force first, then the session, then the window; the journal has 
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from typing import Final
 
 from PySide6.QtCore import QEvent, QObject, QTimer
@@ -24,9 +25,9 @@ STOPPED: Final = "stopped while it was played in the study designer"
 class PlayedSession(LiveSession):
     """A session that is played from the designer; ``over`` comes once, as of every session."""
 
-    def open_windows(self, made: object) -> None:
+    def open_windows(self, made: object) -> Iterator[None]:
         """Open the participant's window alone, and go on without a question."""
-        super().open_windows(made)
+        yield from super().open_windows(made)
         assert self.bridge is not None  # noqa: S101 - just made
         participant, runner = self.bridge.participant, self.bridge.runner
         participant.installEventFilter(self)
