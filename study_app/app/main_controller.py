@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEventLoop, QObject, QTimer
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
+from PySide6.QtWidgets import QWidget
 
 from study_app.app.devices_controller import DevicesController
 from study_app.app.session.garbage_collection import collecting_here
@@ -66,12 +68,16 @@ def home(results: Path | None = None, *, then: Callable[[MainController], None] 
 
 
 def _prepare_lab() -> InitialSettings:
-    """Load the lab's modules and its initial settings."""
+    """Load the modules of lab and designer, and the lab's initial settings."""
     import study_app.app.lab.controller  # noqa: PLC0415 - loads pyqtgraph here, not in the window's thread
-    import study_app.lab.live  # noqa: F401, PLC0415 - and the compiler
+    import study_app.lab.live  # noqa: PLC0415 - and the compiler
     from study_app.app.lab.initial_settings import prepare_initial_settings  # noqa: PLC0415
 
-    return prepare_initial_settings()
+    first = prepare_initial_settings()
+    import study_app.app.designer.controller  # noqa: F401, PLC0415
+
+    gc.freeze()  # the windows' thread need not look through all that was loaded here
+    return first
 
 
 class MainController(QObject):
@@ -285,11 +291,22 @@ class MainController(QObject):
         if self.designer is not None:
             self.designer.feeling.put_back(side, setting)
 
-    def _prepare_lab(self) -> bool:
-        """Load the lab in the background, from when home stands; return whether that is done."""
+    def _prepare_lab(self) -> Iterator[None] | None:
+        """Load the lab in the background, from when home stands; return the steps to it once that is done."""
         if self._lab_first is None and not self._preparing.busy:
             self._preparing.run(_prepare_lab)
-        return self._lab_first is not None
+        return None if self._lab_first is None else self._fill_lab()
+
+    def _fill_lab(self) -> Iterator[None]:
+        """Make the lab's form, then its styles: where it is first shown, it is only laid out and painted."""
+        yield
+        lab = self.lab
+        assert lab is not None  # noqa: S101 - made with its place
+        lab.place.show_view(lab.view())
+        yield
+        for part in lab.place.findChildren(QWidget):
+            part.ensurePolished()
+        yield
 
     def _lab_prepared(self, first: InitialSettings) -> None:
         self._lab_first = first

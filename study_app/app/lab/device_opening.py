@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -95,6 +96,7 @@ class LabOpening(QObject):
 
                 self._open_live = partial(open_live, options=self._options)
             made: object = self._open_live(name, progress=self.said.emit, cancelled=cancelled.is_set)
+            gc.freeze()  # the windows' thread need not look through all that was loaded here
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
         self._done.emit((made, cancelled))

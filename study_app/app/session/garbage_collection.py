@@ -3,18 +3,24 @@
 Python collects in whichever thread allocates. A widget caught in a cycle would then be destroyed outside Qt's thread,
 by the one that opens a device or writes a recording, and the program would crash. While windows are open automatic
 collection is therefore off, and a timer of their own thread collects as often as it would have.
+
+A collection of everything takes as long as ten frames. Collections therefore pass over (``gc.freeze``) what a thread
+has loaded, all there was when a session began, until its end, and what made a collection of everything take long, until
+the next session has ended.
 """
 
 from __future__ import annotations
 
 import gc
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from PySide6.QtCore import QTimer
 
 PERIOD_MS = 200
-YOUNG = 1  # the older of the two generations that take no time to collect
+YOUNG, OLDEST = 1, 2  # generations; collecting up to the first takes no time
+LONG_S = 0.02
 
 
 def collect_if_due() -> int | None:
@@ -25,6 +31,13 @@ def collect_if_due() -> int | None:
     oldest = max(generation for generation, is_due in enumerate(due) if is_due)
     gc.collect(oldest)
     return oldest
+
+
+def _collect() -> None:
+    """Collect what is due; pass over all there is once that took long."""
+    began_s = time.thread_time()
+    if collect_if_due() == OLDEST and time.thread_time() - began_s > LONG_S:
+        gc.freeze()
 
 
 def freeze_garbage() -> None:
@@ -47,12 +60,13 @@ def collecting_here() -> Iterator[None]:
     before = gc.isenabled()
     gc.disable()
     timer = QTimer()
-    timer.timeout.connect(collect_if_due)
+    timer.timeout.connect(_collect)
     timer.start(PERIOD_MS)
     try:
         yield
     finally:
         timer.stop()
+        gc.unfreeze()
         if before:
             gc.collect()
             gc.enable()

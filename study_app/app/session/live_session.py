@@ -7,6 +7,7 @@ be resumed. Nothing is created on the disk before device and servo are ready.
 
 from __future__ import annotations
 
+import gc
 import threading
 import traceback
 from collections.abc import Callable, Iterator
@@ -180,6 +181,7 @@ class LiveSession(QObject):
                 videos = videos_of(self.chosen, study, self.settings.camera, rig)
                 facts = measured(rig, self.chosen, videos, sleep=self._ending.wait)
                 made: object = Ready(rig, facts, outlets=outlets, videos=videos)
+            gc.freeze()  # the windows' thread need not look through all that was loaded here
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
             with suppress(Exception):  # what came first says why

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
@@ -20,7 +20,7 @@ from study_app.gui.widgets.main_view import Place
 FULL = QSize(1440, 900)
 LEAST = QSize(1024, 640)
 NARROW_BELOW = 1400
-NONE: Mapping[str, Callable[[], bool]] = MappingProxyType({})
+NONE: Mapping[str, Callable[[], Iterator[None] | None]] = MappingProxyType({})
 
 
 def _waiting_place() -> Place:
@@ -39,8 +39,9 @@ class MainWindow(QMainWindow):
     makers
         What makes each place, by its name; the first is where one begins.
     prepares
-        For a place that takes long to make, what prepares it outside the window's thread and returns whether that is
-        done; until `prepared` is called, a line stands in its place.
+        For a place that takes long to make, what prepares it outside the window's thread and, once that is done,
+        returns the steps by which it is filled before it is seen; until `prepared` is called, a line stands in its
+        place.
 
     ``closed`` comes when the operator is done, ``theme_changed`` with the `Theme` that was asked for here.
     """
@@ -53,7 +54,7 @@ class MainWindow(QMainWindow):
         makers: Mapping[str, Callable[[], Place]],
         *,
         theme: Theme = LIGHT,
-        prepares: Mapping[str, Callable[[], bool]] = NONE,
+        prepares: Mapping[str, Callable[[], Iterator[None] | None]] = NONE,
     ) -> None:
         super().__init__()
         self.setWindowTitle("Liquid Study")
@@ -106,16 +107,23 @@ class MainWindow(QMainWindow):
     def go(self, name: str) -> None:
         """Leave the place one is at and show another.
 
-        A place that was prepared is made now and shown by the next event: each of the two takes some 40 ms.
+        A place that was prepared is made and filled in steps, with other events between them: no step takes 50 ms.
         """
         self._asked = name
         if name in self._places or name not in self._prepares:
             self._show(name, self.place(name))
-        elif self._prepares[name]():
-            self.place(name)
-            QTimer.singleShot(0, self, lambda: self.prepared(name))
+        elif (steps := self._prepares[name]()) is not None:
+            self._fill(name, steps)
         else:
             self._show(name, self._waiting)
+
+    def _fill(self, name: str, steps: Iterator[None]) -> None:
+        """Take the next step to a place; show it after the last."""
+        self.place(name)
+        for _ in steps:
+            QTimer.singleShot(0, self, lambda: self._fill(name, steps))
+            return
+        self.prepared(name)
 
     def _show(self, name: str, asked: Place) -> None:
         if self.stack.currentWidget() is asked and name == self._here and asked.isVisible():

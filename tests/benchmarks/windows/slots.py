@@ -1,8 +1,10 @@
 """How long the main window does not answer: run me, I print a table.
 
 Each row is the longest time that the window's thread spent in one round of events [ms], and the longest processor time
-of its own, which other programs do not change: home with many sessions, keys in New session, the first entry of the
-liquid lab once home has stood for some seconds, and the second. A round may hold two slots.
+of its own, which other programs change less: home with many sessions, keys in New session, the first entry of the
+liquid lab once home has stood for some seconds, and the second, of the study designer, and a session from *Start* to
+its first page, in a trial, when it is ended while the trial is recorded, and when its windows go. A round may hold two
+slots.
 """
 
 from __future__ import annotations
@@ -16,9 +18,15 @@ from pathlib import Path
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from study_app.app.main_controller import MainController
+from study_app.app.session.garbage_collection import collecting_here
+from study_app.app.session.live_session import LiveSession
 from study_app.gui.application import application_here
 from study_app.gui.home.new_session_dialog import NewSessionDialog
+from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load, source_bytes
+from study_app.session.pages import TaskPage
+from study_app.session.request import NewSession
+from study_app.session.transitions.events import Continue, EndAsked
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.viewmodels.home import study_facts
 
@@ -63,10 +71,38 @@ def timed(act: Callable[[], object]) -> tuple[float, float]:
     return 1e3 * (time.perf_counter() - wall_s), 1e3 * (time.thread_time() - own_s)
 
 
+def session(results: Path) -> dict[str, tuple[float, float]]:
+    """Hold a session, which is ended in its first trial, and return its rows."""
+    chosen = NewSession("demo", "P001", 1, 1, "", "en", "scripted", True, None, results)
+    live = LiveSession(chosen, LIGHT)
+    made: list[object] = []
+    live._ready.disconnect()
+    live._ready.connect(made.append)
+    worst(live.open, 0.0)
+    while not made:
+        timed(application_here().processEvents)
+        time.sleep(0.002)
+    rows = {"a session, Start to first page": worst(lambda: live._begin(made[0]), 1.0)}
+    bridge = live.bridge
+    assert bridge is not None
+
+    def go_on() -> None:
+        bridge.runner.post(Continue(bridge.parts.clock()))
+
+    while not isinstance(bridge.participant.page, TaskPage):
+        worst(go_on, 0.5)
+    rows["a session, in a trial"] = worst(lambda: None, 5.0)
+    ends = EndAsked(bridge.parts.clock(), "aborted", "measured")
+    rows["a session, its end"] = worst(lambda: bridge.runner.post(ends), 1.0)
+    rows["a session, its windows go"] = worst(bridge.operator.close_asked.emit, 2.0)
+    assert live.code == 0
+    return rows
+
+
 def main() -> None:
     """Measure and print."""
     application_here()
-    with tempfile.TemporaryDirectory() as kept:
+    with tempfile.TemporaryDirectory() as kept, collecting_here():
         results = Path(kept) / "results"
         hold(results / "demo", SESSIONS)
         visit = MainController(results)
@@ -79,6 +115,8 @@ def main() -> None:
         rows["lab, first entry"] = worst(lambda: visit.window.go("lab"), 3.0)
         visit.window.go("home")
         rows["lab, second entry"] = worst(lambda: visit.window.go("lab"), 2.0)
+        rows["designer, first entry"] = worst(lambda: visit.window.go("designer"), 2.0)
+        rows |= session(Path(kept) / "session")
         visit.window.close()
         visit.end()
     for name, (wall_ms, own_ms) in rows.items():

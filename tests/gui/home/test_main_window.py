@@ -119,7 +119,7 @@ def test_the_rail_gives_way(main, size, place, width):
 
 
 def test_whoever_goes_on_before_a_prepared_place_is_shown_gets_where_they_asked_to(qtbot):
-    window = MainWindow({"home": Place, "lab": Place, "devices": Place}, prepares={"lab": lambda: True})
+    window = MainWindow({"home": Place, "lab": Place, "devices": Place}, prepares={"lab": lambda: iter((None,))})
     qtbot.addWidget(window)
     window.show()
     window.go("lab")
@@ -147,7 +147,7 @@ def test_a_place_that_is_not_prepared_never_freezes_the_window(qtbot):
         made.append("lab")
         return Place()
 
-    window = MainWindow({"home": Place, "lab": make}, prepares={"lab": lambda: bool(ready)})
+    window = MainWindow({"home": Place, "lab": make}, prepares={"lab": lambda: iter((None,)) if ready else None})
     qtbot.addWidget(window)
     window.show()
     window.go("lab")

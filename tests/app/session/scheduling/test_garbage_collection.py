@@ -8,7 +8,15 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QObject
 
-from study_app.app.session.garbage_collection import collect_if_due, collecting_here, freeze_garbage, unfreeze_garbage
+from study_app.app.session import garbage_collection
+from study_app.app.session.garbage_collection import (
+    OLDEST,
+    PERIOD_MS,
+    collect_if_due,
+    collecting_here,
+    freeze_garbage,
+    unfreeze_garbage,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -105,3 +113,25 @@ def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
         unfreeze_garbage()
     gc.collect()
     assert len(freed_in) == 3
+
+
+def test_what_made_a_collection_take_long_is_passed_over_until_a_session_has_ended(
+    qtbot: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(garbage_collection, "LONG_S", -1.0)
+    monkeypatch.setattr(garbage_collection, "collect_if_due", lambda: OLDEST)
+    freed_in: list[int] = []
+    held = [Cycle(freed_in)]
+    with collecting_here():
+        qtbot.wait(2 * PERIOD_MS + 100)
+        held.clear()
+        gc.collect()
+        assert freed_in == []
+        unfreeze_garbage()
+        gc.collect()
+        assert freed_in == [threading.get_ident()]
+        held.append(Cycle(freed_in))
+        qtbot.wait(2 * PERIOD_MS + 100)
+        held.clear()
+    gc.collect()
+    assert len(freed_in) == 2, "where no windows are open all is looked at"
