@@ -94,7 +94,7 @@ def session(results: Path) -> dict[str, tuple[float, float]]:
         worst(go_on, 0.5)
     rows["a session, in a trial"] = worst(application_here, 5.0)
     ends = EndAsked(bridge.parts.clock(), "aborted", "measured")
-    rows["a session, its end"] = worst(lambda: bridge.runner.post(ends), 1.0)
+    rows["a session, its end"] = worst(partial(bridge.runner.post, ends), 1.0)
     rows["a session, its windows go"] = worst(bridge.operator.close_asked.emit, 2.0)
     assert live.code == 0
     return rows
