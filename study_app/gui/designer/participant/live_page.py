@@ -289,7 +289,7 @@ class LivePage(Themed, QGraphicsView):
         """Stop everything that moves."""
         super().hideEvent(event)
         self._frames.stop()
-        if self._proxy is not None:
+        if self._proxy is not None and isValid(self._proxy):  # the scene is freed before a view that is still shown
             self._proxy.hide()
 
 

@@ -212,18 +212,31 @@ from pathlib import Path
 from PySide6.QtWidgets import QApplication
 from study_app.app.designer.controller import DesignerController
 from study_app.gui.application import application_here
+from study_app.gui.home.main_window import MainWindow
+from study_app.gui.widgets.main_view import Place
 
 application = application_here()
-designer = DesignerController(Path(sys.argv[1]))
-designer.place.resize(1400, 900)
-designer.place.show()
-designer.open("demo")
-QApplication.processEvents()
-assert designer.preview.tab.page.page_window.isVisible()
+
+
+def show():
+    designer = DesignerController(Path(sys.argv[1]))
+    window = MainWindow({"home": Place, "designer": lambda: designer.place})
+    window.show()
+    window.go("designer")
+    designer.open("demo")
+    QApplication.processEvents()
+    assert designer.preview.tab.page.page_window.isVisible()
+    return designer, window
+
+
 """
 
 
-def test_a_program_that_ends_with_a_page_open_ends_without_a_crash(tmp_path: Path) -> None:
+@pytest.mark.parametrize("ends", ["shown = show()", "show()"], ids=["shown at the end", "freed while shown"])
+def test_a_program_that_ends_with_a_page_open_ends_without_an_error(tmp_path: Path, ends: str) -> None:
     here = {**os.environ, "LIQUID_STUDY_WORKSPACE": str(tmp_path), "QT_QPA_PLATFORM": "offscreen"}
-    ended = subprocess.run([sys.executable, "-c", SCRIPT, str(tmp_path)], env=here, capture_output=True, check=False)
+    ended = subprocess.run(
+        [sys.executable, "-c", SCRIPT + ends, str(tmp_path)], env=here, capture_output=True, check=False
+    )
     assert ended.returncode == 0, ended.stderr.decode()
+    assert b"Error" not in ended.stderr
