@@ -24,8 +24,13 @@ class Comment(NamedTuple):
 
 
 def comments_naming(text: str, name: str) -> tuple[Comment, ...]:
-    """Return the comments that mention a name as a word of its own."""
-    word = re.compile(rf"(?<![\w.-]){re.escape(name)}(?![\w-])")
+    """Return the comments that mention a name as a whole word.
+
+    A name of letters alone may be a common word, so it counts only in quotes, after "[" or ".", or as a key before "=".
+    """
+    plain = re.escape(name)
+    as_code = rf"([`\"']){plain}\1|(?<=[\[.]){plain}(?![\w-])|(?<![\w.-]){plain}\s*="
+    word = re.compile(as_code if name.isalpha() else rf"(?<![\w-]){plain}(?![\w-])")
     return tuple(
         Comment(text.count("\n", 0, found.start()) + 1, found["comment"].rstrip())
         for found in _PIECES.finditer(text)

@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 
 def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(designer: Any, qtbot: Any) -> None:
     text = designer.file.read_text()
-    designer.file.write_text(f"{text}# The pages thanks and thanks_2 are short.\n")
+    designer.file.write_text(f"{text}# No thanks to common words.\n# The pages `thanks` and `thanks_2` are short.\n")
     designer.controller.open("kitchen")
     designer.editing.select(("pages", "thanks"))
     head = designer.place.form.head
@@ -23,9 +23,9 @@ def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(d
     card = designer.place.prompt
     lines = [line.accessibleName() for line in card.lines]
     count = len(designer.text.splitlines())
-    assert lines == [f"Go to line {count}: # The pages thanks and thanks_2 are short."]
+    assert lines == [f"Go to line {count}: # The pages `thanks` and `thanks_2` are short."]
     qtbot.mouseClick(card.lines[0], Qt.MouseButton.LeftButton)
     assert designer.place.file.editor.textCursor().blockNumber() == count - 1
-    assert designer.text.endswith("# The pages thanks and thanks_2 are short.\n")
+    assert designer.text.endswith("# The pages `thanks` and `thanks_2` are short.\n")
     designer.editing.select(("pages", "welcome"))
     assert not head.comments.isVisible()
