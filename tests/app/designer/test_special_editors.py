@@ -244,7 +244,7 @@ def test_the_form_of_a_questionnaire_without_a_language_fits_its_width(qtbot: An
     row = designer.row("questionnaires", "liquid", "items")
     words = [button.text() for button in row.repairs]
     assert len(words) == len(set(words))
-    assert row.sentence.text().count("Is missing") == 1
+    assert row.wrong.sentence.text().count("Is missing") == 1
     assert row.minimumSizeHint().width() <= row.width()
     area = designer.place.form.area
     assert area.widget().width() <= area.viewport().width()

@@ -28,6 +28,8 @@ from study_app.gui.widgets.main_view import Place
 from study_app.protocol.source.files import shipped_file
 
 COPIES = 60
+SETTLES_MS = 80
+"""After a selection the page and the numbers follow; the next selection is measured when they are painted."""
 ITEM = ("questionnaires", "liquid", "items", 3)
 
 
@@ -83,7 +85,7 @@ def main(edits: int = 60) -> None:
         selected = []
         for path in paths:
             selected.append(timed(lambda at=path: controller.editing.select(at), QApplication.sendPostedEvents))
-            QApplication.processEvents()
+            QTest.qWait(SETTLES_MS)
         rows.append(("selection in outline → form painted", "50", selected))
         controller.editing.select(ITEM)
         QTest.qWait(500)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
@@ -16,7 +16,7 @@ from study_app.gui.designer.form.question_rows import Panel, QuestionRow, Questi
 from study_app.gui.designer.form.row_fields import add_button
 from study_app.gui.designer.form.row_widget import RowWidget, is_wide, language_heads, structure_of
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
@@ -26,6 +26,8 @@ from study_app.viewmodels.designer.requests import AddKey, RemoveKey, RenameElem
 from study_app.viewmodels.designer.special.questions import QuestionLine
 
 ACROSS = 2
+ROW_PX = FIELD_PX + 7
+INFINITE_PX = 1 << 24
 BELOW = 2
 """Where the keys of an element begin in a path, after its section and its id."""
 
@@ -48,7 +50,14 @@ class FormCard(Card):
         self.setAccessibleName("Form")
         self.form: Form | None = None
         self.read_only = False
-        self.rows: list[RowWidget] = []
+        self._made: list[RowWidget] = []
+        self._unmade: Iterator[int] | None = None
+        self._known: Mapping[ProblemRow, tuple[str, ...]] = {}
+        self._together: tuple[tuple[str | int, ...], ...] = ()
+        self._later = QTimer(self)
+        self._later.setSingleShot(True)
+        self._later.setInterval(0)
+        self._later.timeout.connect(self._finish)
         self.others: list[QuestionRow] = []
         self.adds: list[QWidget] = []
         self._focused: RowWidget | None = None
@@ -58,10 +67,11 @@ class FormCard(Card):
         self.head.asked.connect(self._ask_by_head)
         self.own = label("", "label", "bad", wraps=True)
         self.inside = QWidget()
-        self.sections = QVBoxLayout(self.inside)
-        self.sections.setContentsMargins(0, 2, 8, 2)
-        self.sections.setSpacing(7)
-        self.area = scrolled(self.inside)
+        host = QWidget()
+        self._host = QVBoxLayout(host)
+        self._host.setContentsMargins(0, 0, 0, 0)
+        self._host.addWidget(self.inside)
+        self.area = scrolled(host)
         self.foot = FormFoot()
         for part in (self.head, Rule(), self.own):
             self.column.addWidget(part)
@@ -92,29 +102,48 @@ class FormCard(Card):
     def _make(self, form: Form, before: Form | None) -> None:
         """Make the editors anew; ``before`` is the form of the same element before, None for another element."""
         keyboard = QApplication.focusWidget()
-        held = next((row for row in self.rows if keyboard is not None and row.isAncestorOf(keyboard)), None)
+        held = next((row for row in self._made if keyboard is not None and row.isAncestorOf(keyboard)), None)
         if held is None and self.isAncestorOf(self.focusWidget()):
             held = self._focused
         focused = None
         if held is not None and before is not None:
             focused = (*form.path, *held.row.row.path[len(before.path) :])
-        scrolled = 0 if before is None else self.area.verticalScrollBar().value()
+        down_px = 0 if before is None else self.area.verticalScrollBar().value()
         self._focused = None
         self.flush()
         inside = QWidget()
-        whole = sections = QVBoxLayout(inside)
+        whole = QVBoxLayout(inside)
         whole.setContentsMargins(0, 2, 8, 2)
         whole.setSpacing(7)
-        self.rows, self.adds, self.others = [], [], []
-        if form.questions.lines:
+        self._made, self.adds, self.others = [], [], []
+        self._unmade = self._fill(form, whole)
+        room = self.area.viewport().height() if before is None else INFINITE_PX
+        for height in self._unmade:
+            room -= height
+            if room < 0:
+                self._later.start()
+                break
+        else:
+            self._unmade = None
+        apply_theme_within(inside, self.theme)
+        self._replace(inside)
+        self.area.verticalScrollBar().setValue(down_px)
+        QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(down_px))
+        if focused is not None:
+            self.focus(focused)
+
+    def _fill(self, form: Form, whole: QVBoxLayout) -> Iterator[int]:
+        """Make the editors from top to bottom; yield how high each part is, about [px]."""
+        lines, sections = form.questions.lines, whole
+        at = next((at for at, line in enumerate(lines) if line.path == form.path), 0)
+        if lines:
             panel = Panel()
             sections = QVBoxLayout(panel)
             sections.setContentsMargins(10, 8, 4, 8)
             sections.setSpacing(7)
-            at = next((at for at, line in enumerate(form.questions.lines) if line.path == form.path), 0)
-            whole.addWidget(self._others(form.questions.lines[:at], form.questions.languages))
+            whole.addWidget(self._others(lines[:at], form.questions.languages))
             whole.addWidget(panel)
-            whole.addWidget(self._others(form.questions.lines[at + 1 :], ()))
+            yield ROW_PX * at
         for number, section in enumerate(form.sections):
             if number:
                 sections.addWidget(Rule())
@@ -129,28 +158,56 @@ class FormCard(Card):
                     sections.addLayout(language_heads(beside, (LABEL_PX + 8, FIELD_PX + 8)))
                 heads = beside
                 sections.addWidget(self._row(row))
+                yield ROW_PX * (1 + len(row.entries))
             if section.absent and not self.read_only:
-                grid = QGridLayout()
-                grid.setSpacing(0)
-                for at, absent in enumerate(section.absent):
-                    made = add_button(f"Add {absent.label}", absent.label)
-                    made.setToolTip(absent.help)
-                    made.clicked.connect(
-                        lambda _checked=False, path=absent.path: self.asked.emit(AddKey(self._now(path)))
-                    )
-                    grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
-                    self.adds.append(made)
-                sections.addLayout(grid)
+                sections.addLayout(self._adds(section))
+                yield ROW_PX
+        if lines:
+            whole.addWidget(self._others(lines[at + 1 :], ()))
         whole.addStretch(1)
-        apply_theme_within(inside, self.theme)
-        self.inside, self.sections = inside, whole
-        old = self.area.takeWidget()
-        self.area.setWidget(inside)
-        if old is not None:
-            remove_widget(old)
-        QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(scrolled))
-        if focused is not None:
-            self.focus(focused)
+
+    def _adds(self, section: Section) -> QGridLayout:
+        """Return the buttons of the keys that can be added to a section."""
+        grid = QGridLayout()
+        grid.setSpacing(0)
+        for at, absent in enumerate(section.absent):
+            made = add_button(f"Add {absent.label}", absent.label)
+            made.setToolTip(absent.help)
+            made.clicked.connect(lambda _checked=False, path=absent.path: self.asked.emit(AddKey(self._now(path))))
+            grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
+            self.adds.append(made)
+        return grid
+
+    def _finish(self) -> None:
+        """Make the editors that are below what is seen at first."""
+        self._later.stop()
+        unmade, self._unmade = self._unmade, None
+        if unmade is not None:
+            for _height in unmade:
+                pass
+            apply_theme_within(self.inside, self.theme)
+            for row in (*self._made, *self.others):
+                row.show()
+            self.show_repairs(self._known)
+            self.show_selected(self._together)
+
+    @property
+    def rows(self) -> list[RowWidget]:
+        """Every row of the form."""
+        self._finish()
+        return self._made
+
+    def _replace(self, inside: QWidget) -> None:
+        """Show other editors; those before stay where they are until they are deleted: to move them takes long."""
+        old, self.inside = self.inside, inside
+        held = self.window().focusWidget()
+        if held is not None and old.isAncestorOf(held):
+            held.clearFocus()  # else Qt hands the keyboard on
+        old.hide()
+        self._host.removeWidget(old)
+        self._host.addWidget(inside)
+        inside.show()  # at once: a layout shows it later, and what is hidden takes no keyboard
+        old.deleteLater()
 
     def _now(self, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
         """Return the path of a part of the element, which may have been renamed since its editor was made."""
@@ -165,6 +222,7 @@ class FormCard(Card):
 
     def show_selected(self, paths: tuple[tuple[str | int, ...], ...]) -> None:
         """Show which other questions are selected with the one that is edited."""
+        self._together = paths
         for row in self.others:
             row.show_chosen(row.line.path in paths)
 
@@ -198,10 +256,11 @@ class FormCard(Card):
                 made.field.choose(self._chosen[1])
         made.field.came.connect(lambda: self._come(made))
         made.field.setEnabled(not self.read_only or row.row.kind in {"list", "tables", "references", "reference"})
-        made.remove.setEnabled(not self.read_only)
+        if made.remove is not None:
+            made.remove.setEnabled(not self.read_only)
         for entry in made.field.findChildren(EntryRow):
             entry.grip = entry.grip and not self.read_only
-        self.rows.append(made)
+        self._made.append(made)
         return made
 
     def _change_entries(self, path: tuple[str | int, ...], asked: object, after: tuple[int, ...]) -> None:
@@ -212,7 +271,8 @@ class FormCard(Card):
 
     def flush(self) -> None:
         """Hand on what is being typed."""
-        for part in self.findChildren(QWidget):
+        self.head.id.flush()
+        for part in self.inside.findChildren(QWidget):
             if isinstance(part, TypedLine | TypedText):
                 part.flush()
 
@@ -259,8 +319,9 @@ class FormCard(Card):
 
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
         """Offer repairs at the rows that their problems are in."""
-        for row in self.rows:
-            row.show_repairs({} if self.read_only else known)
+        self._known = {} if self.read_only else known
+        for row in self._made:
+            row.show_repairs(self._known)
 
     def _come(self, row: RowWidget) -> None:
         self._focused = row
@@ -269,7 +330,7 @@ class FormCard(Card):
 
     def show_help(self) -> None:
         """Show the help of the focused field, or of the first one."""
-        row = self._focused if self._focused in self.rows else next(iter(self.rows), None)
+        row = self._focused if self._focused in self._made else next(iter(self._made), None)
         if row is None:
             self.foot.show_help("", "", "")
         else:

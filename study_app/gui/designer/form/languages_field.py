@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QVBoxLayout
 
 from study_app.gui.designer.form.row_fields import Field
 from study_app.gui.designer.form.typed_fields import TypedLine, TypedText
@@ -39,10 +41,16 @@ class LanguagesField(Field):
             if down and len(row.languages) > 1:
                 self.box.addWidget(label(language, "small", "text2"))
             self.box.addWidget(made)
-        self.copied = label("", "small", "warn")
-        self.outer.addWidget(self.copied)
         self.setFocusProxy(next(iter(self.lines.values())))
         self.show_value()
+
+    @cached_property
+    def copied(self) -> QLabel:
+        """Which texts are those of the first language; made when it is first needed."""
+        made = label("", "small", "warn")
+        made.hide()
+        self.outer.addWidget(made)
+        return made
 
     @property
     def some_missing(self) -> bool:
@@ -56,8 +64,9 @@ class LanguagesField(Field):
         (first, named), *others = self.row.languages
         texts = value if isinstance(value, dict) else {}
         copies = [name for code, name in others if texts.get(code) and texts[code] == texts.get(first)]
-        self.copied.setText(f"As in {named}, not translated yet: {', '.join(copies)}")
-        self.copied.setVisible(bool(copies))
+        if copies or "copied" in self.__dict__:
+            self.copied.setText(f"As in {named}, not translated yet: {', '.join(copies)}")
+            self.copied.setVisible(bool(copies))
         for number, (code, line) in enumerate(self.lines.items()):
             text = value.get(code, "") if isinstance(value, dict) else value if number == 0 else ""
             line.show_text(text if isinstance(text, str) else "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from functools import cached_property
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
@@ -25,6 +26,19 @@ from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.requests import RemoveKey, SwitchKey
 
 MOST_REPAIRS = 3
+
+
+class FaultLine(QWidget):
+    """A sentence that says what is wrong, below an editor."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        across = QHBoxLayout(self)
+        across.setContentsMargins(LABEL_PX + 8, 0, 0, 0)
+        across.setSpacing(8)
+        across.addWidget(Icon("warning", "bad", 16), 0, Qt.AlignmentFlag.AlignTop)
+        self.sentence = label("", "label", "bad", wraps=True)
+        across.addWidget(self.sentence, 1)
 
 
 class RowWidget(Themed, QWidget):
@@ -49,24 +63,19 @@ class RowWidget(Themed, QWidget):
         self.words.setMinimumHeight(FIELD_PX)
         self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
         self.words.setBuddy(self.field)
-        self.remove = IconButton("cross", f"Remove {row.row.label} from the file", size=FIELD_PX, role="plain")
-        self.remove.clicked.connect(lambda: self.field.asked.emit(RemoveKey(self.row.row.path)))
+        self.remove: IconButton | None = None
+        if row.removable:
+            self.remove = IconButton("cross", f"Remove {row.row.label} from the file", size=FIELD_PX, role="plain")
+            self.remove.clicked.connect(lambda: self.field.asked.emit(RemoveKey(self.row.row.path)))
         across = QHBoxLayout()
         across.setSpacing(8)
         top = Qt.AlignmentFlag.AlignTop
         across.addWidget(self.words, int(wide), top)
         across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
-        across.addWidget(self.remove, 0, top)
-        policy = self.remove.sizePolicy()
-        policy.setRetainSizeWhenHidden(True)
-        self.remove.setSizePolicy(policy)
-        self.wrong = QWidget()
-        beside = QHBoxLayout(self.wrong)
-        beside.setContentsMargins(LABEL_PX + 8, 0, 0, 0)
-        beside.setSpacing(8)
-        beside.addWidget(Icon("warning", "bad", 16), 0, top)
-        self.sentence = label("", "label", "bad", wraps=True)
-        beside.addWidget(self.sentence, 1)
+        if self.remove is None:
+            across.addSpacing(FIELD_PX)
+        else:
+            across.addWidget(self.remove, 0, top)
         self.repairs: list[ActionButton] = []
         self._offered: dict[ProblemRow, tuple[str, ...]] = {}
         self._buttons = QVBoxLayout()
@@ -87,10 +96,19 @@ class RowWidget(Themed, QWidget):
             column.addLayout(language_heads(row.languages))
         if wide:
             column.addWidget(self.field)
-        column.addWidget(self.wrong)
         column.addLayout(self._buttons)
-        self.remove.setVisible(row.removable)  # in its layout by now: it would be shown as a window before
         self.show_row(row)
+
+    @cached_property
+    def wrong(self) -> FaultLine:
+        """What is wrong, below the editor; made when it is first needed."""
+        made = FaultLine()
+        column = self.layout()
+        assert isinstance(column, QVBoxLayout)  # noqa: S101 - made so
+        made.hide()
+        column.insertWidget(column.count() - 1, made)
+        apply_theme_within(made, self.theme)
+        return made
 
     def _switch(self, key: object) -> None:
         if key != self.row.row.path[-1]:
@@ -108,8 +126,10 @@ class RowWidget(Themed, QWidget):
         """Show what is wrong."""
         found = [sentence for sentence in (self.refusal, self.field.refusal, *self.row.faults) if sentence]
         times = Counter(found)
-        self.sentence.setText("\n".join(one if count == 1 else f"{count} × {one}" for one, count in times.items()))
-        self.wrong.setVisible(bool(found))
+        if found or "wrong" in self.__dict__:
+            said = (one if count == 1 else f"{count} × {one}" for one, count in times.items())
+            self.wrong.sentence.setText("\n".join(said))
+            self.wrong.setVisible(bool(found))
         row = self.row.row
         self.field.setAccessibleDescription(". ".join(filter(None, (row.help, self.row.bounds, *found))))
         some_missing = isinstance(self.field, LanguagesField) and self.field.some_missing
