@@ -28,7 +28,7 @@ from study_app.gui.theme.theme import DARK, LIGHT
 
 pytestmark = pytest.mark.slow
 
-KILLS = 2
+KILLS = int(os.environ.get("LIQUID_STUDY_DRAFT_KILLS", "2"))
 MODIFIERS = {"Ctrl": Qt.KeyboardModifier.ControlModifier, "Alt": Qt.KeyboardModifier.AltModifier,
              "Shift": Qt.KeyboardModifier.ShiftModifier}  # fmt: skip
 
@@ -131,7 +131,7 @@ def test_typing_into_the_file_reaches_the_form_and_a_fault_its_field(qtbot: Any,
     qtbot.waitUntil(lambda: not editor.pending)
     row = designer.row("blocks", "liquids", "order")
     assert row.wrong.isVisible()
-    assert "is not" in row.sentence.text()
+    assert "is not" in row.wrong.sentence.text()
     press(qtbot, designer, "F8")
     assert designer.place.problems.isVisible()
     assert designer.place.form.isAncestorOf(QApplication.focusWidget())
@@ -150,7 +150,7 @@ def test_text_that_is_not_a_number_stays_with_its_reason(qtbot: Any, designer: A
     press(qtbot, designer, "Return")
     assert designer.text == before
     assert row.field.line.text() == "strong"
-    assert "is not a number" in row.sentence.text()
+    assert "is not a number" in row.wrong.sentence.text()
     press(qtbot, designer, "Escape")
     assert row.field.line.text() != "strong"
     assert not row.wrong.isVisible()
@@ -292,10 +292,10 @@ designer.open("kitchen")
 designer.editing.select(("study",))
 line = next(row for row in designer.place.form.rows if row.row.row.path[-1] == "version").field.line
 line.setFocus()
-for count in range(100000):
-    line.selectAll()
-    QTest.keyClicks(line, str(count))
-    print(count, time.time(), flush=True)
+line.selectAll()
+for letters in range(1, 100000):
+    QTest.keyClick(line, Qt.Key.Key_1)
+    print(letters, time.time(), flush=True)
     QTest.qWait(30)
 """
 
@@ -305,15 +305,15 @@ for count in range(100000):
 def test_a_kill_while_typing_loses_at_most_the_last_second(designer: Any, tmp_path: Path) -> None:
     before = designer.file.read_bytes()
     for number in range(KILLS):
-        typed: dict[str, float] = {}
+        typed: dict[int, float] = {}
         command = [sys.executable, "-c", SCRIPT, str(tmp_path / "results")]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
             assert process.stdout is not None
             until = None
             for line in process.stdout:
-                count, moment = line.split()
-                typed[count] = float(moment)
-                until = until or time.time() + 1.6 + 0.17 * number
+                letters, moment = line.split()
+                typed[int(letters)] = float(moment)
+                until = until or time.time() + 1.6 + 0.17 * number % 1.0
                 if time.time() > until:
                     break
             killed = time.time()
@@ -321,5 +321,7 @@ def test_a_kill_while_typing_loses_at_most_the_last_second(designer: Any, tmp_pa
         draft = draft_of(designer.file)
         assert draft is not None
         kept = next(line for line in draft.text.splitlines() if line.startswith("version")).split('"')[1]
-        assert killed - typed[kept] < 1.0
+        assert set(kept) == {"1"}
+        lost = [moment for letters, moment in typed.items() if letters > len(kept)]  # the draft may be ahead of `typed`
+        assert not lost or killed - lost[0] < 1.0
         assert designer.file.read_bytes() == before
