@@ -97,7 +97,7 @@ class StudyHead(Table):
         pattern=r"^[0-9A-Za-z.+-]+$", max_length=40, description="Version of this protocol; raise it with every change."
     )
     languages: tuple[Language, ...] = Field(
-        min_length=1, description="Languages every text exists in; the first is preset."
+        min_length=1, description="Languages in which every text exists; the first is the default."
     )
     resume: Literal["trial", "block"] = Field(
         default="trial",
@@ -105,10 +105,10 @@ class StudyHead(Table):
     )
     blinding: Literal["double", "single"] = Field(
         default="double",
-        description="double: neither participant nor operator knows what is felt; single: the operator sees force and "
-        "wake while the session runs, the participant does not know what is felt.",
+        description="double: neither participant nor operator knows the condition; single: the operator sees force and "
+        "wake while the session runs, the participant does not know the condition.",
     )
-    credits: Credits | None = Field(default=None, description="What exports state of authors and licence.")
+    credits: Credits | None = Field(default=None, description="Authors, licence and citation that exports state.")
 
     @model_serializer(mode="wrap")
     def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -117,7 +117,7 @@ class StudyHead(Table):
 
 
 class DeviceNeeds(Table):
-    """What the study asks of whichever device is used."""
+    """What the study requires of the device."""
 
     rate_hz: Annotated[float, within(250, 4000, "below, no force is stable; above, no tick fits")] = Field(
         default=1000, description="Rate of the servo [Hz]."
@@ -141,16 +141,16 @@ class DeviceNeeds(Table):
 
 
 class SceneDefaults(Table):
-    """What all conditions share of the scene: everything but the liquids."""
+    """The part of the scene that all conditions share: everything but the liquids."""
 
-    scale: SceneScale = Field(default=10, description="Scene metres per hand metre.")
-    origin_m: Metres = Field(default=(0, 0, 0), description="Scene point under the hand's zero [m].")
-    body: Body = Field(default_factory=Body, description="The ball that is felt.")
+    scale: SceneScale = Field(default=10, description="Metres in the scene per metre of the hand.")
+    origin_m: Metres = Field(default=(0, 0, 0), description="Point in the scene at the zero of the hand frame [m].")
+    body: Body = Field(default_factory=Body, description="The ball that the participant moves.")
     velocity: Estimator = Field(default_factory=Ewma, description="How velocity is estimated from positions.")
-    knee: Knee = Field(default_factory=Knee, description="How high speeds are lowered.")
-    motion: MotionBox = Field(default_factory=MotionBox, description="How the ball is expected to move, scene.")
+    knee: Knee = Field(default_factory=Knee, description="How high speeds are reduced before forces are computed.")
+    motion: MotionBox = Field(default_factory=MotionBox, description="How the ball is expected to move in the scene.")
     accuracy: Accuracy = Field(default_factory=Accuracy, description='What effects = "auto" may leave out.')
-    fade_s: FadeS = Field(default=FADE_S, description="How long the force takes to fade in [s].")
+    fade_s: FadeS = Field(default=FADE_S, description="Time over which the force fades in [s].")
 
     @model_serializer(mode="wrap")
     def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -191,7 +191,7 @@ class PageText(Table):
 
 
 class OwnBody(Table):
-    """The ball in one liquid: what is left out is as in the scene's body."""
+    """The ball in one liquid; keys that are left out are those of scene.body."""
 
     diameter_m: DiameterM | None = None
     drag_coefficient: DragCoefficient | None = None
@@ -199,13 +199,13 @@ class OwnBody(Table):
 
 
 class StudyLiquid(Liquid):
-    """A liquid of a study: that of the force model, and where it needs one a ball of its own."""
+    """A liquid of a study, if needed with a ball of its own."""
 
     model_config = ConfigDict(title="Liquid")
 
     LATER: ClassVar[frozenset[str]] = Liquid.LATER | {"body"}
 
-    body: OwnBody | None = Field(default=None, description="The ball in this liquid, where it is not the scene's.")
+    body: OwnBody | None = Field(default=None, description="The ball in this liquid, if it differs from scene.body.")
 
     @property
     def alone(self) -> Liquid:
@@ -252,13 +252,13 @@ class Protocol(Table):
     scene: SceneDefaults = Field(default_factory=SceneDefaults)
     liquids: Named[StudyLiquid] = Field(min_length=1)
     conditions: dict[Id, Condition] = Field(min_length=1)
-    tasks: dict[Id, Task] = Field(min_length=1)
+    tasks: dict[Id, Task] = Field(min_length=1, description="What a participant does in a trial.")
     scales: dict[Id, Scale] = Field(default_factory=dict)
     questionnaires: dict[Id, Questionnaire] = Field(default_factory=dict)
     pages: dict[Id, PageText] = Field(default_factory=dict)
     stimuli: dict[Id, Stimulus] = Field(default_factory=dict)
-    designs: dict[Kind, AnyDesign] = Field(default_factory=dict)
-    methods: dict[Kind, AnyMethod] = Field(default_factory=dict)
+    designs: dict[Kind, AnyDesign] = Field(default_factory=dict, description="How trials with intervals are built.")
+    methods: dict[Kind, AnyMethod] = Field(default_factory=dict, description="How the levels of a stimulus are chosen.")
     blocks: Named[Block] = Field(min_length=1)
     sequence: Steps = Field(default=(), min_length=1, description="Pages, blocks and forms in order, in every session.")
     sequences: Sequences = Field(default=(), min_length=1, description="The steps of session 1, 2 … where they differ.")

@@ -46,23 +46,25 @@ class Everywhere(Frozen):
 
 
 class Box(Frozen):
-    """A box of full sizes ``size_m`` along x, y, z, around ``centre_m``."""
+    """A box along the axes."""
 
     kind: Literal["box"] = "box"
-    centre_m: Metres = (0.0, 0.0, 0.0)
-    size_m: tuple[Extent, Extent, Extent]
+    centre_m: Metres = Field(default=(0.0, 0.0, 0.0), description="Centre of the box [m].")
+    size_m: tuple[Extent, Extent, Extent] = Field(description="Full sizes along x, y, z [m].")
 
 
 class Cylinder(Frozen):
-    """An upright cylinder around ``centre_m``."""
+    """An upright cylinder."""
 
     kind: Literal["cylinder"] = "cylinder"
-    centre_m: Metres = (0.0, 0.0, 0.0)
-    radius_m: Extent
-    height_m: Extent
+    centre_m: Metres = Field(default=(0.0, 0.0, 0.0), description="Centre of the cylinder [m].")
+    radius_m: Extent = Field(description="Radius [m].")
+    height_m: Extent = Field(description="Height [m].")
 
 
-Region: TypeAlias = Annotated[Everywhere | Box | Cylinder, Field(discriminator="kind")]
+Region: TypeAlias = Annotated[
+    Everywhere | Box | Cylinder, Field(discriminator="kind", description="Where the liquid is, in the scene.")
+]
 
 
 class _Liquid(Frozen):
@@ -74,7 +76,9 @@ class _Liquid(Frozen):
     density_kg_m3: DensityKgM3
     viscosity_pa_s: ViscosityPaS | None = None
     region: Region = Everywhere()
-    effects: Effects = ("drag",)
+    effects: Effects = Field(
+        default=("drag",), description='Names of its effects; "auto": chosen by their size (scene.accuracy).'
+    )
 
     @model_validator(mode="after")
     def _effects_have_what_they_need(self) -> _Liquid:

@@ -16,10 +16,13 @@ class Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-def within(least: float, most: float, why: str, usual: float | None = None) -> Any:
-    """Return the annotation of a number from ``least`` to ``most``, both included; an editor begins with ``usual``."""
+def within(least: float, most: float, why: str, usual: float | None = None, what: str | None = None) -> Any:
+    """Return the annotation of a number from ``least`` to ``most``, both included.
+
+    An editor begins with ``usual``; ``what`` is the meaning of the number.
+    """
     examples = None if usual is None else [usual]
-    return Field(ge=least, le=most, examples=examples, json_schema_extra={REASON: why})
+    return Field(ge=least, le=most, description=what, examples=examples, json_schema_extra={REASON: why})
 
 
 Coordinate: TypeAlias = Annotated[float, within(-1000, 1000, "a scene is at most 1 km wide")]
@@ -27,16 +30,53 @@ Extent: TypeAlias = Annotated[float, within(1e-3, 1000, "from 1 mm, below what a
 Metres: TypeAlias = tuple[Coordinate, Coordinate, Coordinate]
 Flow: TypeAlias = Annotated[float, within(-100, 100, "no liquid flows faster than 100 m/s where a hand can be")]
 DensityKgM3: TypeAlias = Annotated[
-    float, within(0.01, 25_000, "hydrogen has 0.08 kg/m³, osmium, the densest element, 22 590", 1200)
+    float,
+    within(0.01, 25_000, "hydrogen has 0.08 kg/m³, osmium, the densest element, 22 590", 1200, "Density [kg/m³]."),
 ]
-ViscosityPaS: TypeAlias = Annotated[float, within(1e-6, 1e6, "gases have 1e-5 Pa·s, honey 10, tar 100")]
-DiameterM: TypeAlias = Annotated[float, within(1e-3, 1, "the ball is moved by a hand", 0.068)]
-DragCoefficient: TypeAlias = Annotated[float, within(0, 10, "a wing has 0.04, a sphere 0.47, a plate 1.2", 0.47)]
-Alpha: TypeAlias = Annotated[float, within(0.001, 1, "at 0.001 the velocity lags the hand by 1 s; 1 does not smooth")]
+ViscosityPaS: TypeAlias = Annotated[
+    float, within(1e-6, 1e6, "gases have 1e-5 Pa·s, honey 10, tar 100", what="Dynamic viscosity [Pa·s].")
+]
+DiameterM: TypeAlias = Annotated[
+    float, within(1e-3, 1, "the ball is moved by a hand", 0.068, "Diameter of the ball [m].")
+]
+DragCoefficient: TypeAlias = Annotated[
+    float,
+    within(0, 10, "a wing has 0.04, a sphere 0.47, a plate 1.2", 0.47, "Drag coefficient in the constant drag law."),
+]
+Alpha: TypeAlias = Annotated[
+    float,
+    within(
+        0.001,
+        1,
+        "at 0.001 the velocity lags the hand by 1 s; 1 does not smooth",
+        what="Weight of the newest difference at 1 kHz.",
+    ),
+]
 ForceLimitN: TypeAlias = Annotated[float, within(0.1, 20, "below 0.1 N a hand feels little, above 20 N it may be hurt")]
 FadeS: TypeAlias = Annotated[float, within(0.05, 2, "a faster onset is a knock, a slower one is no onset")]
-Decay: TypeAlias = Annotated[float, within(0.5, 1, "the share left after 1 ms: at 0.5 nothing is left after 10 ms")]
-Exponent: TypeAlias = Annotated[float, within(0.05, 10, "beyond, a wake is full at once, or never begins")]
+Decay: TypeAlias = Annotated[
+    float,
+    within(
+        0.5,
+        1,
+        "the share left after 1 ms: at 0.5 nothing is left after 10 ms",
+        what="Factor λ by which a stored velocity decays in 1 ms.",
+    ),
+]
+Exponent: TypeAlias = Annotated[
+    float, within(0.05, 10, "beyond, a wake is full at once, or never begins", what="Response exponent y of the wake.")
+]
 Smoothing: TypeAlias = Annotated[float, within(0, 1, "a hand moves on within a second")]
-TailLength: TypeAlias = Annotated[int, within(1, 100_000, "elements, one per millisecond: at most 100 s")]
-TailScaling: TypeAlias = Annotated[float, within(1, 1e9, "elements; at least the length")]
+TailLength: TypeAlias = Annotated[
+    int,
+    within(
+        1,
+        100_000,
+        "elements, one per millisecond: at most 100 s",
+        what="Number N of velocities that the wake stores, one per millisecond.",
+    ),
+]
+TailScaling: TypeAlias = Annotated[
+    float,
+    within(1, 1e9, "elements; at least the length", what="Divisor S of the sum of stored velocities, at least N."),
+]

@@ -93,28 +93,44 @@ class Knee(Frozen):
         description="sqrt: above the threshold as √(1 + 2 excess) − 1; square: as the square of the excess; none: "
         "speeds are not lowered.",
     )
-    threshold_mps: Annotated[float, within(0.01, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] = 5.0
+    threshold_mps: Annotated[
+        float,
+        within(
+            0.01,
+            1000,
+            "a hand moves at 0.01 to 2 m/s, times the scale",
+            what="Speed in the scene above which speeds are lowered [m/s].",
+        ),
+    ] = 5.0
 
 
 class Accuracy(Frozen):
     """What ``effects = "auto"`` may leave out: up to a share of the whole force, or a force if that is greater."""
 
-    relative: Annotated[float, within(0, 1, "a share of the force")] = 0.05
-    absolute_n: Annotated[float, within(0, 20, "the force limit is at most 20 N")] = 0.05
+    relative: Annotated[
+        float, within(0, 1, "a share of the force", what="Largest omitted share of the perceptible force.")
+    ] = 0.05
+    absolute_n: Annotated[
+        float, within(0, 20, "the force limit is at most 20 N", what="Largest omitted force, if that is greater [N].")
+    ] = 0.05
 
 
 class MotionBox(Frozen):
-    """How the body is expected to move, in the scene: greatest speed and acceleration, and how deep its centre gets.
+    """How the ball is expected to move, in the scene.
 
-    ``depth_m`` is the least and the greatest depth of the centre below a liquid's top face; negative is above it. What
-    is None follows from a hand that moves 40 mm to every side at up to 0.3 m/s and 3 m/s² (`Scene.motion_in`).
+    Defaults follow from a hand that moves 40 mm to every side at up to 0.3 m/s and 3 m/s².
     """
 
-    speed_mps: Annotated[float, within(0.001, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] | None = None
+    speed_mps: Annotated[float, within(0.001, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] | None = Field(
+        default=None, description="Greatest speed [m/s]."
+    )
     acceleration_mps2: (
         Annotated[float, within(0.001, 1e5, "a hand accelerates at 0.01 to 100 m/s², times the scale")] | None
-    ) = None
-    depth_m: tuple[Coordinate, Coordinate] | None = None
+    ) = Field(default=None, description="Greatest acceleration [m/s²].")
+    depth_m: tuple[Coordinate, Coordinate] | None = Field(
+        default=None,
+        description="Least and greatest depth of the ball's centre below a liquid's top face [m]; negative: above.",
+    )
 
     @model_validator(mode="after")
     def _least_depth_comes_first(self) -> MotionBox:

@@ -45,3 +45,8 @@ def test_a_row_has_range_default_and_meaning() -> None:
 def test_kinds_at_one_place_are_told_apart() -> None:
     found = [heading for heading in tables() if heading.startswith("tasks.NAME")]
     assert found == ["tasks.NAME, kind = explore", "tasks.NAME, kind = reach", "tasks.NAME, kind = follow"]
+
+
+def test_every_key_but_kinds_has_a_meaning() -> None:
+    rows = [line.split(" | ") for line in format_markdown().splitlines() if line.startswith("| `")]
+    assert [row[0] for row in rows if row[-1] in {"|", " |"} and row[0] != "| `kind`"] == []

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
+from pydantic import Field
+
 from study_app.haptics.model.effect import (
     FLOAT,
     Effect,
@@ -25,14 +27,15 @@ SMOOTHING_S: Final = 0.025
 
 
 class AddedMass(Frozen):
-    """The liquid that is accelerated with the body (``effects.added_mass``).
+    """The mass of the liquid that is accelerated with the body."""
 
-    ``coefficient`` C_a is ½ for a sphere; the acceleration is smoothed over ``filter_s`` (None: as suits the velocity
-    estimator, `effect.smoothing_s`), but not where velocities are given.
-    """
-
-    coefficient: Annotated[float, within(0, 10, "a sphere has 0.5")] = 0.5
-    filter_s: Smoothing | None = None
+    coefficient: Annotated[
+        float, within(0, 10, "a sphere has 0.5", what="Added mass over the mass of the displaced liquid, C_a.")
+    ] = 0.5
+    filter_s: Smoothing | None = Field(
+        default=None,
+        description="Time over which the acceleration is smoothed [s]; default: as suits the velocity estimator.",
+    )
 
 
 def _accelerated_n(extremes: ExtremesLike, acceleration_mps2: float, change_mps: float) -> float:

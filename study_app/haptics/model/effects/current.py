@@ -35,33 +35,36 @@ class Uniform(Frozen):
     """A current that is the same everywhere in the liquid."""
 
     kind: Literal["uniform"] = "uniform"
-    velocity_mps: tuple[ranges.Flow, ranges.Flow, ranges.Flow]
+    velocity_mps: tuple[ranges.Flow, ranges.Flow, ranges.Flow] = Field(
+        description="Velocity of the current along x, y, z [m/s]."
+    )
 
 
 class Channel(Frozen):
-    """A horizontal current between two walls ``width_m`` apart, fastest midway (``peak_mps``), at rest at the walls.
-
-    It flows toward ``heading_deg``: 0 is to the right (+x), 90 away from the participant (−z); its middle line goes
-    through ``centre_m``.
-    """
+    """A horizontal current between two parallel walls, fastest midway between them and zero at the walls."""
 
     kind: Literal["channel"] = "channel"
-    centre_m: Metres = (0.0, 0.0, 0.0)
-    heading_deg: Annotated[float, within(-360, 360, "one turn")] = 0.0
-    width_m: Extent
-    peak_mps: ranges.Flow
+    centre_m: Metres = Field(default=(0.0, 0.0, 0.0), description="A point on the middle line [m].")
+    heading_deg: Annotated[
+        float,
+        within(-360, 360, "one turn", what="Direction [°]: 0 is to the right (+x), 90 away from the participant (−z)."),
+    ] = 0.0
+    width_m: Extent = Field(description="Distance between the walls [m].")
+    peak_mps: ranges.Flow = Field(description="Speed midway between the walls [m/s].")
 
 
 class Vortex(Frozen):
-    """A current around the upright axis through ``centre_m``: ``peak_mps`` at ``core_m`` from it, counter-clockwise."""
+    """A current around an upright axis, counter-clockwise as seen from above."""
 
     kind: Literal["vortex"] = "vortex"
-    centre_m: Metres = (0.0, 0.0, 0.0)
-    core_m: Extent
-    peak_mps: ranges.Flow
+    centre_m: Metres = Field(default=(0.0, 0.0, 0.0), description="A point on the axis [m].")
+    core_m: Extent = Field(description="Distance from the axis where the current is fastest [m].")
+    peak_mps: ranges.Flow = Field(description="Speed at that distance [m/s].")
 
 
-Current: TypeAlias = Annotated[Uniform | Channel | Vortex, Field(discriminator="kind")]
+Current: TypeAlias = Annotated[
+    Uniform | Channel | Vortex, Field(discriminator="kind", description="The liquid's own flow.")
+]
 
 
 def flow(current: Current) -> Flow:

@@ -35,12 +35,17 @@ _DAMPING_NSPM: Final = 8.0
 """The damper that the lab begins with: heavier than honey in a slow hand, far below any slope limit. [choice]"""
 
 DampingNspm: TypeAlias = Annotated[
-    float, within(*DAMPING_NSPM, "a hand feels no damper below 0.01 N·s/m, and no loop is stable with more than 200")
+    float,
+    within(
+        *DAMPING_NSPM,
+        "a hand feels no damper below 0.01 N·s/m, and no loop is stable with more than 200",
+        what="Damping b of the law linear [N·s/m].",
+    ),
 ]
 
 
 class Drag(Frozen):
-    """Which drag coefficient resists (``effects.drag``): the body's own, or that of a sphere at its Reynolds number.
+    """The law of drag: a constant coefficient, or that of a sphere at its Reynolds number.
 
     The law "linear" is a damper, F = −b v with ``damping_nspm`` b [N·s/m] and the velocity v of the hand, whatever the
     scale, the ball and the knee.

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
+from pydantic import Field
+
 from study_app.haptics.model.effect import (
     FLOAT,
     INT,
@@ -29,14 +31,24 @@ _LONGEST_WINDOW_S: Final = 0.5
 
 
 class History(Frozen):
-    """The Basset force: the boundary layer's memory of past accelerations (``effects.history``).
+    """The Basset force: the boundary layer's memory of past accelerations.
 
-    Accelerations younger than ``window_s`` count one by one, older ones in ten exponentials. Velocities are smoothed
-    over ``smoothing_s`` before (None: as suits the estimator, `effect.smoothing_s`), but not where they are given.
+    Accelerations older than ``window_s`` are summed in ten exponentials.
     """
 
-    window_s: Annotated[float, within(0.005, 0.5, "the window holds 5 to 500 accelerations at 1 kHz")] = 0.05
-    smoothing_s: Smoothing | None = None
+    window_s: Annotated[
+        float,
+        within(
+            0.005,
+            0.5,
+            "the window holds 5 to 500 accelerations at 1 kHz",
+            what="Age up to which accelerations are summed one by one [s].",
+        ),
+    ] = 0.05
+    smoothing_s: Smoothing | None = Field(
+        default=None,
+        description="Time over which velocities are smoothed first [s]; default: as suits the velocity estimator.",
+    )
 
 
 def _accelerated_n(extremes: ExtremesLike, acceleration_mps2: float, change_mps: float) -> float:

@@ -17,11 +17,7 @@ CELLS = 64  # most cells of a local wake
 
 
 class LocalWake(Frozen):
-    """The position tail, tied to the places it was left at (``effects.local_wake``).
-
-    ``length``, ``scaling``, ``exponent``, ``decay`` and ``axes`` as in `Wake`. A place is felt up to about ``reach_m``
-    from it (None: one diameter of the body), ever farther and weaker as it spreads by ``spreading_m2ps``.
-    """
+    """A position tail that stays at the places of the path that left it."""
 
     length: TailLength
     scaling: TailScaling
@@ -30,8 +26,15 @@ class LocalWake(Frozen):
     axes: Literal["xz", "xyz"] = Field(
         default="xz", description="xz: vertical motion does not enter the tail; xyz: it does."
     )
-    reach_m: Extent | None = None
-    spreading_m2ps: Annotated[float, within(0, 10, "beyond, a wake is gone within a tick")] = 1e-3
+    reach_m: Extent | None = Field(
+        default=None, description="Distance from a place within which it acts [m]; default: one diameter of the body."
+    )
+    spreading_m2ps: Annotated[
+        float,
+        within(
+            0, 10, "beyond, a wake is gone within a tick", what="How fast a place spreads and weakens with time [m²/s]."
+        ),
+    ] = 1e-3
 
     @model_validator(mode="after")
     def _liquid_never_outruns_the_body(self) -> LocalWake:

@@ -26,22 +26,36 @@ BIT = 1 << 1
 
 
 class Wake(Frozen):
-    """The position tail: the liquid velocity left by the body's recent path (Rek 2024, §4.3; ``effects.wake``).
+    """The position tail: the velocity of the liquid that the body's recent path leaves behind (Rek 2024, §4.3).
 
-    ``length`` N and ``scaling`` S count elements at 1 kHz; N ≤ S, so that the liquid never outruns the body.
-    ``decay`` λ is the factor a millisecond, ``exponent`` y shapes the response to the fill. ``breaking_angle_deg`` β is
-    the turn that starts a new segment, taken between elements ``breaking_span_m`` of path apart (0: neighbours).
-    ``resolution_m`` is the least motion between two stored elements (0: every tick). ``axes`` says whether vertical
-    motion enters the tail.
+    N ≤ S, so that the liquid is never faster than the body.
     """
 
     length: TailLength
     scaling: TailScaling
     exponent: Exponent = 1.0
-    breaking_angle_deg: Annotated[float, within(0, 180, "180° is straight back")] = 45.0
-    breaking_span_m: Annotated[float, within(0, 100, "a hand turns within its reach")] = 0.068
+    breaking_angle_deg: Annotated[
+        float, within(0, 180, "180° is straight back", what="Change of direction β that starts a new segment [°].")
+    ] = 45.0
+    breaking_span_m: Annotated[
+        float,
+        within(
+            0,
+            100,
+            "a hand turns within its reach",
+            what="Length of path over which directions are compared [m]; 0: neighbouring elements.",
+        ),
+    ] = 0.068
     decay: Decay = 0.999975
-    resolution_m: Annotated[float, within(0, 10, "a tail of coarser elements would never move")] = 0.0
+    resolution_m: Annotated[
+        float,
+        within(
+            0,
+            10,
+            "a tail of coarser elements would never move",
+            what="Least motion between two stored elements [m]; 0: every tick is stored.",
+        ),
+    ] = 0.0
     axes: Literal["xz", "xyz"] = Field(
         default="xz", description="xz: vertical motion does not enter the tail; xyz: it does."
     )

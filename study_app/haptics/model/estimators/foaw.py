@@ -14,15 +14,19 @@ CODE = 3
 
 
 class Foaw(Frozen):
-    """The slope of the longest line that misses no position by more than ``tolerance_m`` (``velocity``).
-
-    First-order adaptive windowing: at most ``samples`` positions, fewer where the motion bends. The tolerance is in the
-    hand frame, by default one count of the Falcon's encoders.
-    """
+    """First-order adaptive windowing: the slope of the longest line that is within a tolerance of all its positions."""
 
     kind: Literal["foaw"] = "foaw"
-    samples: int = Field(default=16, ge=2, le=MAX_WINDOW)
-    tolerance_m: Annotated[float, within(0, 0.01, "10 mm is a third of a hand's stroke")] = 38e-6
+    samples: int = Field(default=16, ge=2, le=MAX_WINDOW, description="Largest number of positions.")
+    tolerance_m: Annotated[
+        float,
+        within(
+            0,
+            0.01,
+            "10 mm is a third of a hand's stroke",
+            what="Largest distance of a position from the line, hand frame [m]; default: an encoder count of a Falcon.",
+        ),
+    ] = 38e-6
 
 
 def _fill(record: Any, velocity: Foaw, scale: float) -> None:

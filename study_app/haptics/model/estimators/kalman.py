@@ -16,10 +16,10 @@ LAG_S: Final = 2e-3
 
 
 class Kalman(Frozen):
-    """A Kalman filter that knows the force just sent and learns the mass it moves (`kernels.estimators.kalman`).
+    """A Kalman filter whose input includes the force just sent; it estimates the mass that this force moves.
 
-    Encoder count, delay and least mass come from the device. Where it does not measure its delay, and while the filter
-    is in trouble, the velocity is that of `Ewma` as it comes.
+    Encoder count, delay and least mass come from the device. If the device does not measure its delay, and while the
+    innovations are too large, the velocity is that of ``ewma`` with its default.
     """
 
     kind: Literal["kalman"] = "kalman"

@@ -16,9 +16,9 @@ SMOOTHING_S: Final = 20e-3
 
 
 class Lead(Frozen):
-    """EWMA of weight 0.2 plus 3.4 ms of its acceleration, smoothed over 20 ms.
+    """EWMA of weight 0.2 plus 3.4 ms of its acceleration, smoothed over 20 ms; for comparison with ``kalman``.
 
-    It lags by 1.1 ms in slow motion, EWMA of this weight by 4.5 ms. For comparison with `Kalman`: it needs no force.
+    It lags by 1.1 ms in slow motion, EWMA of this weight by 4.5 ms. It does not use the force.
     """
 
     kind: Literal["lead"] = "lead"

@@ -14,10 +14,10 @@ MAX_WINDOW = 16
 
 
 class Line(Frozen):
-    """The slope of the least-squares line through the newest ``samples`` positions."""
+    """The slope of the least-squares line through the newest positions."""
 
     kind: Literal["line"] = "line"
-    samples: int = Field(default=15, ge=2, le=MAX_WINDOW)
+    samples: int = Field(default=15, ge=2, le=MAX_WINDOW, description="Number of positions.")
 
 
 ESTIMATOR = EstimatorKind(

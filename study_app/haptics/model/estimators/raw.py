@@ -11,7 +11,7 @@ CODE = 4
 
 
 class Raw(Frozen):
-    """The newest difference of positions over its time, as it is."""
+    """The newest difference of positions over its time, without smoothing."""
 
     kind: Literal["raw"] = "raw"
 

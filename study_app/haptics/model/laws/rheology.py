@@ -28,10 +28,20 @@ RESOLVED_S: Final = 0.01
 _INDICES: Final = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _SHAPES: Final = (1.354, 1.413, 1.458, 1.442, 1.420, 1.382, 1.320, 1.240, 1.140, 1.0)
 
-StressPa: TypeAlias = Annotated[float, within(0, 5000, "no liquid is a solid: toothpaste has 50 to 200 Pa")]
-ConsistencyPaSn: TypeAlias = Annotated[float, within(1e-4, 1e5, "water has 0.001 Pa·s, ketchup 10 Pa·sⁿ")]
+StressPa: TypeAlias = Annotated[
+    float, within(0, 5000, "no liquid is a solid: toothpaste has 50 to 200 Pa", what="Yield stress τ_y [Pa].")
+]
+ConsistencyPaSn: TypeAlias = Annotated[
+    float, within(1e-4, 1e5, "water has 0.001 Pa·s, ketchup 10 Pa·sⁿ", what="Consistency K [Pa·sⁿ].")
+]
 FlowIndex: TypeAlias = Annotated[
-    float, within(0.1, 1, 'below, no drag on a sphere is known; above 1 it is "shear-thickening"')
+    float,
+    within(
+        0.1,
+        1,
+        'below, no drag on a sphere is known; above 1 it is "shear-thickening"',
+        what="Flow index n; 1: no shear thinning.",
+    ),
 ]
 TimeS: TypeAlias = Annotated[float, within(1e-4, 1000, "shorter, a liquid is Newtonian; longer, it is a solid")]
 ShearRate: TypeAlias = Annotated[float, within(0.01, 1e5, "a hand shears a liquid at 0.1 to 100 per second")]
@@ -50,8 +60,8 @@ class Carreau(Frozen):
     """Flow curve τ = η₀ γ̇ [1 + (λγ̇)²]^((n−1)/2): thin at high shear rates, no yield stress."""
 
     kind: Literal["carreau"] = "carreau"
-    zero_shear_viscosity_pa_s: ViscosityPaS
-    time_constant_s: TimeS
+    zero_shear_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity η₀ at low shear rates [Pa·s].")
+    time_constant_s: TimeS = Field(description="Time constant λ: shear thinning begins at the rate 1/λ [s].")
     flow_index: FlowIndex
 
 
@@ -59,17 +69,17 @@ class Maxwell(Frozen):
     """Stress by τ + λ dτ/dt = η γ̇: viscoelastic, with the relaxation time λ and the shear modulus η/λ."""
 
     kind: Literal["maxwell"] = "maxwell"
-    zero_shear_viscosity_pa_s: ViscosityPaS
-    relaxation_time_s: TimeS
+    zero_shear_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity η in steady flow [Pa·s].")
+    relaxation_time_s: TimeS = Field(description="Relaxation time λ [s].")
 
 
 class ShearThickening(Frozen):
     """Viscosity η₀ up to a shear rate, the thickened one from twice that rate on; between them τ is linear in γ̇."""
 
     kind: Literal["shear-thickening"] = "shear-thickening"
-    zero_shear_viscosity_pa_s: ViscosityPaS
-    thickened_viscosity_pa_s: ViscosityPaS
-    onset_shear_rate_per_s: ShearRate
+    zero_shear_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity η₀ at low shear rates [Pa·s].")
+    thickened_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity at high shear rates [Pa·s].")
+    onset_shear_rate_per_s: ShearRate = Field(description="Shear rate at which thickening begins [1/s].")
 
     @model_validator(mode="after")
     def _thickens(self) -> Self:
@@ -81,7 +91,10 @@ class ShearThickening(Frozen):
         return self
 
 
-Rheology: TypeAlias = Annotated[HerschelBulkley | Carreau | Maxwell | ShearThickening, Field(discriminator="kind")]
+Rheology: TypeAlias = Annotated[
+    HerschelBulkley | Carreau | Maxwell | ShearThickening,
+    Field(discriminator="kind", description="The flow curve of a non-Newtonian liquid."),
+]
 
 
 def shape_factor(flow_index: float) -> float:
