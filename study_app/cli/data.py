@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.options import BY, EXIT_FOUND, Target, takes_session, takes_study
+from study_app.cli.options import BY, EXIT_FOUND, PARTICIPANT, REASON, SESSION, Target, takes_session, takes_study
 from study_app.cli.progress import progress
 
 
@@ -33,7 +33,7 @@ from study_app.cli.progress import progress
     "--validator",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     metavar="PATH",
-    help="A Psych-DS validator that is installed: run on that folder; ends with exit code 3 if it finds faults.",
+    help="Run this installed Psych-DS validator on that folder; ends with exit code 3 if it finds faults.",
 )
 def export(
     results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psych_ds: bool, validator: Path | None
@@ -86,7 +86,7 @@ def _validate(validator: Path, to: Path) -> None:
 @takes_study
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def plot(results: Path, to: Path) -> None:
-    """Draw the responses: by code until unblinded, by name after."""
+    """Draw the responses, with codes for conditions until the study is unblinded, then with names."""
     from study_app.analysis.figures.plotting import plot as plot_study
 
     with progress() as show:
@@ -116,7 +116,7 @@ def report(results: Path, to: Path) -> None:
 @click.command()
 @takes_study
 @BY
-@click.option("--reason", required=True, metavar="TEXT", help="Reason; recorded with the time.")
+@REASON
 def unblind(results: Path, by: str, reason: str) -> None:
     """Open the sealed key of a study and write the sealed columns; name, time and reason are recorded.
 
@@ -139,11 +139,11 @@ def unblind(results: Path, by: str, reason: str) -> None:
 
 @click.command()
 @takes_study
-@click.option("--participant", required=True, metavar="ID")
-@click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True)
+@PARTICIPANT
+@SESSION
 @click.option("--trial", type=click.IntRange(1), help="Only this trial; default: the whole session.")
 @BY
-@click.option("--reason", required=True, metavar="TEXT")
+@REASON
 def exclude(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
     """Exclude a session or a trial from the analysis, with a reason; nothing is deleted."""
     from study_app.store.exclusions import exclude as exclude_from
@@ -156,11 +156,11 @@ def exclude(results: Path, participant: str, session: int, trial: int | None, by
 
 @click.command()
 @takes_study
-@click.option("--participant", required=True, metavar="ID")
-@click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True)
+@PARTICIPANT
+@SESSION
 @click.option("--trial", type=click.IntRange(1), help="Only this trial, if it was excluded alone.")
 @BY
-@click.option("--reason", required=True, metavar="TEXT")
+@REASON
 def include(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
     """Reverse an exclusion: the session or trial counts again; name, time and reason are recorded."""
     from study_app.store.exclusions import include as include_in
@@ -173,9 +173,9 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
 
 @click.command()
 @takes_study
-@click.option("--participant", required=True, metavar="ID")
+@PARTICIPANT
 @BY
-@click.option("--reason", required=True, metavar="TEXT", help="Reason; it remains, so it must not identify the person.")
+@click.option("--reason", required=True, metavar="TEXT", help="Reason; it is kept, so it must not identify the person.")
 @click.option(
     "--also",
     multiple=True,
@@ -184,7 +184,7 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
     help="A folder with copies of the study, at any depth; repeatable.",
 )
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
-    """Erase what a participant gave; date, operator, reason and checksums remain."""
+    """Erase the data of a participant; date, operator, reason and checksums remain."""
     from study_app.store.sites.merged import own_place
     from study_app.store.withdrawals.withdraw import withdraw as withdraw_from
 
@@ -227,7 +227,7 @@ def _site(_context: click.Context, _parameter: click.Parameter, words: tuple[str
 )
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="New folder, or a merged study to add to.")
 def merge(sites: dict[str, Path], to: Path) -> None:
-    """Merge the study folders of several sites that ran one protocol; they are copied, unchanged.
+    """Merge the study folders of several sites that ran the same protocol; they are copied unchanged.
 
     Each site keeps its sealed key. The merged folder is RESULTS for report, export, plot, verify, unblind, exclude and
     withdraw; participants are SITE-ID there.
@@ -282,7 +282,7 @@ def reproduce(session: Path) -> None:
     "--fingerprints",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Compare with a copy of fingerprints.txt kept elsewhere: no session was changed, added or removed since.",
+    help="Compare with a copy of fingerprints.txt kept elsewhere: was a session changed, added or removed since?",
 )
 def verify(results: Path, fingerprints: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings, Psych-DS."""

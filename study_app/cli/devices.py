@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _WIDTH = 100
 _PREPARING = "Preparing …"
 FIRMWARE = click.option("--firmware", type=click.Path(path_type=Path), metavar="PATH", help="Firmware file.")
-DEVICE = click.option("--device", "name", default="falcon", show_default=True, metavar="NAME", help="Which one.")
+DEVICE = click.option("--device", "name", default="falcon", show_default=True, metavar="NAME", help="The device.")
 
 
 @click.group(invoke_without_command=True)
@@ -66,12 +66,12 @@ def list_devices() -> None:
 @click.option("--fault", "faults", multiple=True, metavar="NAME", help="Fault of an emulated device: drop=0.01, nan …")
 @click.option("--to", type=click.Path(path_type=Path), metavar="FILE", help="Write a zip file for support.")
 def doctor(name: str, faults: tuple[str, ...], to: Path | None, **device_options: str | Path | None) -> None:
-    """Examine a device: find, open and run it without force; say what is wrong, why, and the cure.
+    """Examine a device: find, open and run it without force; report each fault with its cause and remedy.
 
-    NAME is a device that has a doctor: falcon, falcon:SERIAL, falcon-emulated, falcon-socket:PATH, inverse3,
+    NAME is a device that can be examined: falcon, falcon:SERIAL, falcon-emulated, falcon-socket:PATH, inverse3,
     inverse3:HOST:PORT, inverse3-emulated, force-dimension, force-dimension:SERIAL or force-dimension-emulated. Exit
-    code 3 where something is wrong. The zip file holds this report, versions, settings, log and last error; no
-    participant's id, no answer, no liquid's value.
+    code 3 if something is wrong. The zip file contains this report, versions, settings, log and last error, but no
+    participant IDs, answers or liquids.
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
     from study_app.devices.doctor_report import lines
@@ -101,7 +101,7 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     """Calibrate a Falcon's force with a known weight or a luggage scale; stored by serial number.
 
     The Falcon holds its grip at five positions, first without load, then with the weight. Exit code 3 if the
-    measurements are inconsistent: then nothing is saved.
+    measurements are inconsistent; nothing is saved then.
     """
     if scale == (grams is not None):
         raise click.UsageError("calibrate needs either --grams G (a weight to hang on the grip) or --scale")
@@ -129,18 +129,23 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     if name.startswith("falcon-socket"):
         click.echo("A device at a socket is not calibrated permanently: nothing was saved.")
     else:
-        click.echo(f"Kept in {calibration.save(serial or '', found)}.")
+        click.echo(f"Saved in {calibration.save(serial or '', found)}.")
 
 
 @devices.command(cls=TakesDeviceOptions)
 @click.argument("name")
-@click.option("--to", type=click.Path(path_type=Path), metavar="FOLDER", help="Default: bench-NAME in this folder.")
+@click.option(
+    "--to",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Folder for the report; default: bench-NAME in the current folder.",
+)
 def bench(name: str, to: Path | None, **device_options: str | Path | None) -> None:
     """Measure a device in ten minutes: timing, noise, mass, friction, force on a scale, stable damping.
 
-    Stay within reach of its power switch: the handle moves by itself, with at most 4 N. Enter, Ctrl-C and the handle's
+    Stay within reach of its power switch: the handle moves by itself, with at most 4 N. Enter, Ctrl+C and the handle's
     button 4 end the force. The report (bench.md, bench.json) can be sent to others; receipts of later sessions on this
-    machine record what was measured. Exit code 3 where the handle was touched: then nothing is kept.
+    machine record what was measured. Exit code 3 if the handle was touched; nothing is saved then.
     """
     from study_app.devices.registry import check_options, descriptor_of
 
@@ -194,7 +199,7 @@ def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
     report = str((folder / "bench.md").resolve())
     bench = workstation.DeviceBench.model_validate({**kept(found, day), "report": report})
     workstation.save(workstation.load_or_default()[0].with_bench(bench))
-    click.echo("Kept in this machine's settings: receipts of its sessions record it, and the place Devices shows it.")
+    click.echo("Saved in this machine's settings: receipts of later sessions record it, and Devices shows it.")
 
 
 def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:

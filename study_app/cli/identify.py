@@ -74,7 +74,9 @@ def identify(
 
 @click.command()
 @SCENE_FILE
-@click.option("--measured", type=click.Path(path_type=Path), metavar="CSV", help="Motion and force; the file may grow.")
+@click.option(
+    "--measured", type=click.Path(path_type=Path), metavar="CSV", help="Motion and force; the file may still grow."
+)
 @click.option("--lsl", "stream", metavar="NAME", help="A stream of the Lab Streaming Layer instead.")
 @click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
 @click.option(
@@ -83,7 +85,7 @@ def identify(
     default="drag_coefficient",
     show_default=True,
     metavar="NAMES",
-    help="drag_coefficient, or with it length, scaling or both, separated by commas.",
+    help="Parameters: drag_coefficient, optionally with length, scaling or both, separated by commas.",
 )
 @click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter.")
 @click.option(
@@ -93,7 +95,7 @@ def identify(
     default=10.0,
     show_default=True,
     metavar="SECONDS",
-    help="A row of this age counts by 1/e.",
+    help="Age at which the weight of a row has decayed to 1/e.",
 )
 @click.option(
     "--idle",
@@ -102,7 +104,7 @@ def identify(
     default=5.0,
     show_default=True,
     metavar="SECONDS",
-    help="End when nothing came for so long.",
+    help="End after this time without new data.",
 )
 def estimate(
     scene: str,
@@ -114,7 +116,7 @@ def estimate(
     memory_s: float,
     idle_s: float,
 ) -> None:
-    """Estimate drag and wake of a liquid from measured force while it comes, once per second.
+    """Estimate drag and wake of a liquid while force is measured, once per second.
 
     CSV has columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the ball), and vx_mps,
     vy_mps, vz_mps where they are known; the channels of a stream have these labels. Ends with 3 if the motion did not

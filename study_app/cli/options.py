@@ -52,6 +52,9 @@ class Target(click.Path):
 FILE = click.argument("protocol", metavar="FILE")
 SCENE_FILE = click.argument("scene", metavar="FILE")
 BY = click.option("--by", required=True, metavar="NAME", help="Name or initials of the person, or a rule.")
+PARTICIPANT = click.option("--participant", required=True, metavar="ID", help="Participant, such as P007.")
+SESSION = click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
+REASON = click.option("--reason", required=True, metavar="TEXT", help="Reason; recorded with the time.")
 RESULTS = click.option(
     "--results", type=Target(), metavar="DIR", help="Study folder; default: results/<study> of the workspace."
 )

@@ -66,11 +66,11 @@ def _trials(_context: click.Context, _option: click.Parameter, value: str | None
 @click.option(
     "--studies",
     type=click.IntRange(1, 1_000_000),
-    help=f"Simulated studies for each size; default: {STUDIES}, of thresholds {THRESHOLD_STUDIES}.",
+    help=f"Simulated studies for each size; default: {STUDIES}, for thresholds {THRESHOLD_STUDIES}.",
 )
 @takes_workers
 @click.option("--engine", type=click.Choice(["processes", "dask"]), hidden=True)
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figures.")
 def power(
     protocol: str,
@@ -85,10 +85,10 @@ def power(
     """Estimate the power of the protocol's own tests on simulated studies, and the smallest detectable difference.
 
     Four sessions are rehearsed to obtain the features of each condition; then thousands of participants answer with
-    the rehearsals' answer model, which is plausible but not measured. Of a study of thresholds, d′, ratings or
-    magnitude estimation: the standard deviation of one participant, half the group's 95 % interval, and how many
-    studies reach analysis.precision, for each number of participants and of --trials. Ctrl-C ends with the results so
-    far.
+    the rehearsals' answer model, which is plausible but not measured. For a study of thresholds, d′, ratings or
+    magnitude estimation the command prints the standard deviation of one participant, half the group's 95 % interval,
+    and how many studies reach analysis.precision, for each number of participants and of --trials. Ctrl+C ends the
+    command with the results so far.
     """
     if engine == "processes":
         workers = Workers(workers.count)

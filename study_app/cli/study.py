@@ -9,7 +9,7 @@ from click.core import ParameterSource
 
 from study_app.authoring.templates import templates
 from study_app.cli.device_options import DeviceName, TakesDeviceOptions, given
-from study_app.cli.options import FILE, RESULTS, Target, keep_offered_workspace, takes_session
+from study_app.cli.options import FILE, RESULTS, SESSION, Target, keep_offered_workspace, takes_session
 from study_app.devices.names import DEFAULT_DEVICE
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, MOST_DELAY
 
@@ -27,7 +27,7 @@ OPERATOR = click.option("--by", "operator", default="", metavar="INITIALS", help
     type=click.IntRange(1, MOST_DELAY),
     default=BELIEVED_TICKS,
     show_default=True,
-    help="Delay of the device's forces, in ticks, that levels are checked for; the pre-flight uses the measured one.",
+    help="Delay of the device's forces [ticks] for which levels are checked; the pre-flight uses the measured delay.",
 )
 def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
     """Describe the study or the scenes, or list every problem of the file with line and hint."""
@@ -62,11 +62,15 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
 @click.command()
 @click.argument("name", metavar="NAME")
 @click.option(
-    "--template", metavar="T", default="empty", show_default=True, help=f"What it begins as: {', '.join(templates())}."
+    "--template",
+    metavar="T",
+    default="empty",
+    show_default=True,
+    help=f"Template of the study: {', '.join(templates())}.",
 )
-@click.option("--no-window", is_flag=True, help="Write the file at once; do not open the study designer.")
+@click.option("--no-window", is_flag=True, help="Write the file directly, without opening the study designer.")
 def new(name: str, template: str, *, no_window: bool) -> None:
-    """Begin a study of your own from a template, in the study designer."""
+    """Create a study from a template, and open it in the study designer."""
     from study_app.authoring import new_study
 
     study = new_study.template(template)
@@ -78,7 +82,7 @@ def new(name: str, template: str, *, no_window: bool) -> None:
         code = app.home(then=lambda visit: visit.begin_study(f"template:{template}", name))
         click.get_current_context().exit(code)
     file = new_study.write_new(study, name)
-    click.echo(f"{file}: edit it, then see all of it by liquid-study check {name}")
+    click.echo(f"{file}: edit it, then run liquid-study check {name}")
 
 
 @click.command()
@@ -95,8 +99,8 @@ def edit(protocol: str) -> None:
 
 @click.command()
 @FILE
-@click.option("--participants", type=click.IntRange(1, 9999), required=True)
-@click.option("--seed", type=SEED, default=1, show_default=True)
+@click.option("--participants", type=click.IntRange(1, 9999), required=True, help="Number of participants.")
+@click.option("--seed", type=SEED, default=1, show_default=True, help="Seed from which their orders are drawn.")
 def design(protocol: str, participants: int, seed: int) -> None:
     """Count positions and carry-over in the orders of N participants, before the study starts."""
     from study_app.protocol.load import load
@@ -109,19 +113,19 @@ def design(protocol: str, participants: int, seed: int) -> None:
 @click.command(cls=TakesDeviceOptions)
 @FILE
 @click.option("--participant", metavar="ID", required=True, help="Letters and digits, such as P007.")
-@click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
-@click.option("--seed", type=SEED, help="Default: drawn at random, shown and recorded.")
-@click.option("--device", cls=DeviceName, default=DEFAULT_DEVICE, show_default=True)
-@click.option("--language", metavar="LANG", help="Default: the first language of the protocol.")
+@SESSION
+@click.option("--seed", type=SEED, help="Seed of all random choices; default: drawn at random, shown and recorded.")
+@click.option("--device", cls=DeviceName, default=DEFAULT_DEVICE, show_default=True, help="Haptic or input device.")
+@click.option("--language", metavar="LANG", help="Language of the pages; default: the first of the protocol.")
 @OPERATOR
 @click.option(
     "--row-of",
     metavar="ID",
-    help="Participant who is replaced: take that participant's row of every Williams or Latin square.",
+    help="ID of a participant who is replaced, whose row of each Williams design or Latin square is used.",
 )
 @WINDOWED
 @SCREEN
-@click.option("--pilot", is_flag=True, help="Pilot session: in a window, marked, stored in results/<study>-pilot.")
+@click.option("--pilot", is_flag=True, help="Pilot session: in a marked window, stored in results/<study>-pilot.")
 @click.option("--no-recordings", is_flag=True, help="Store answers and trial rows only, not every sample and frame.")
 @RESULTS
 def run(
@@ -168,17 +172,21 @@ def run(
 
 @click.command()
 @FILE
-@click.option("--participants", type=click.IntRange(1, 99_999), default=1, show_default=True)
-@click.option("--seed", type=SEED, default=1, show_default=True)
-@click.option("--device", cls=DeviceName, only_moving=True, default="scripted", show_default=True)
+@click.option(
+    "--participants", type=click.IntRange(1, 99_999), default=1, show_default=True, help="Number of participants."
+)
+@click.option("--seed", type=SEED, default=1, show_default=True, help="Seed of all random choices.")
+@click.option(
+    "--device", cls=DeviceName, only_moving=True, default="scripted", show_default=True, help="Simulated device."
+)
 @click.option("--no-recordings", is_flag=True, help="Store answers and trial rows only, not every sample and frame.")
 @click.option(
     "--answers-only",
     is_flag=True,
     help=(
-        "Thousands of participants in seconds, to try an analysis: four sessions are rehearsed without being "
-        "stored, then every participant answers from the features of one of them. Nothing is measured, so the "
-        "columns of measurements are n/a. Sessions are written without waiting for the disk."
+        "Simulate thousands of participants in seconds, to try an analysis: four sessions are rehearsed without "
+        "being stored, then every participant answers from the features of one of them. Nothing is measured, so "
+        "the columns of measurements are n/a. Sessions are written without waiting for the disk."
     ),
 )
 @click.option(
@@ -226,7 +234,7 @@ def rehearse(
 @click.command(cls=TakesDeviceOptions)
 @takes_session
 @click.option("--protocol", metavar="FILE", help="Protocol of the session; default: found among the known protocols.")
-@click.option("--device", cls=DeviceName, help="Default: the device of the interrupted session.")
+@click.option("--device", cls=DeviceName, help="Device; default: that of the interrupted session.")
 @OPERATOR
 @WINDOWED
 @SCREEN

@@ -24,17 +24,17 @@ EXIT_UNDECIDED = 4
     help="Initial number of studies per cell.",
 )
 @takes_workers
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
 def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
     """Measure how often the report's verdicts are wrong, on studies simulated with no, some or all effects.
 
     Studies of rek2024 with 5, 12 and 24 participants, by the rehearsals' answer model and by an ordinal probit model
-    with random effects, go through the report's own tests. Of every rate the Wilson interval is printed, and whether
-    it keeps to its limit: "at most 5 %" holds if the interval reaches down to 5 % and ends below 7.5 %. A cell with
-    an undecided rate is continued with further studies, up to four times as many. Ctrl-C ends with the results so
-    far. Ends with exit code 3 if a rate exceeds its limit by its 99.9 % interval, else with 4 where the
-    studies are too few to decide about one.
+    with random effects, are analysed by the report's own tests. Every rate is printed with its Wilson interval, and
+    whether it meets its limit: "at most 5 %" is met if the interval reaches down to 5 % and ends below 7.5 %. A cell
+    with an undecided rate is continued with further studies, up to four times as many. Ctrl+C ends the command with
+    the results so far. Ends with exit code 3 if a rate exceeds its limit by its 99.9 % interval, otherwise with 4 if
+    there are too few studies to decide about a rate.
     """
     from study_app.analysis.power.plan import plan
     from study_app.protocol.load import load

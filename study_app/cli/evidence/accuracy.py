@@ -20,7 +20,7 @@ REAL = "physical2"
 
 @click.command()
 @click.argument("scene", metavar="[FILE]", required=False)
-@click.option("--liquid", metavar="NAME", help="Which liquid; default: the thesis' water, and honey by its viscosity.")
+@click.option("--liquid", metavar="NAME", help="Name of the liquid; default: water of rek2024, and honey of physical2.")
 @click.option(
     "--path",
     default=DEFAULT_PATH,
@@ -32,8 +32,8 @@ REAL = "physical2"
     "--liquids",
     "every",
     is_flag=True,
-    help="Compare the liquids of FILE instead, each with its own model: error of its force, up to which speed, and "
-    "what a tick costs; default: physical2.",
+    help="Compare the liquids of FILE (default: physical2) instead, each with its own model: error of the force, up to "
+    "which speed, and computation time of a tick.",
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for table and figure; default: print.")
 def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, *, every: bool) -> None:

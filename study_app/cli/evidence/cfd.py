@@ -17,24 +17,26 @@ from study_app.workers.executors import Workers
     "--solve",
     is_flag=True,
     help="Solve the flow again instead of using the stored tables: 20 minutes on one core, an hour on a busy one; "
-    "needs the extra cfd (pip install ngsolve, 350 MB).",
+    "needs the extra cfd (NGSolve, 350 MB).",
 )
 @click.option(
     "--refit",
     is_flag=True,
-    help="Fit the constants of unsteady drag to all solved motions, and print the error of each motion with them and "
-    "when it is left out of the fit: about two minutes.",
+    help="Fit the constants of unsteady drag to the stored motions, and print the error for each motion, with and "
+    "without this motion in the fit; takes about two minutes.",
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; default: print.")
 @click.option(
-    "--materials", is_flag=True, help="Only the drag in Herschel–Bulkley liquids; --solve takes half an hour."
+    "--materials",
+    is_flag=True,
+    help="Only compare the drag in Herschel–Bulkley liquids; with --solve this takes half an hour.",
 )
 @takes_workers
 def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, materials: bool) -> None:
     """Fit models of honey and glycerin to the force of a fluid solver; report the remaining error.
 
     A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
-    minute. Further motions, such as oscillations and a reversal, serve --refit.
+    minute. Further motions, such as oscillations and a reversal, are used by --refit.
     """
     from study_app.store.output_files import make_folder
     from study_app.validation.cfd.fits import fit_all

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("protocol", metavar="[FILE]", default="rek2024")
-@click.option("--hours", type=float, required=True, metavar="H", help="How long; 0.01 is 36 seconds.")
+@click.option("--hours", type=float, required=True, metavar="H", help="Duration in hours; 0.01 is 36 seconds.")
 @click.option("--virtual", is_flag=True, help="In virtual time: a day takes minutes.")
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the faults.")
 @click.option(
     "--load", type=LOAD, default="none", help="Also paint both windows of a session; also keep all cores busy."
 )

@@ -25,25 +25,32 @@ if TYPE_CHECKING:
 @click.option(
     "--table", type=click.Path(path_type=Path), metavar="FILE", help="Only measure the table of slope limits."
 )
-@click.option("--withheld", is_flag=True, help="Only the share of each liquid's force that safety withholds.")
-@click.option("--velocity", is_flag=True, help="Only errors, noise, stable damping and cost of velocity estimators.")
+@click.option("--withheld", is_flag=True, help="Only print the share of each liquid's force that safety withholds.")
 @click.option(
-    "--delayed", type=click.Path(path_type=Path), metavar="FILE", help="Only measure what is left of a delayed force."
+    "--velocity",
+    is_flag=True,
+    help="Only print errors, noise, stable damping and computation time of the velocity estimators.",
+)
+@click.option(
+    "--delayed",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Only measure how much of a delayed force is sent.",
 )
 @click.option(
     "--estimation",
     "estimated",
     type=click.IntRange(1),
     metavar="N",
-    help="Only N loops in which estimates are applied.",
+    help="Only simulate N loops in which estimates are applied.",
 )
 @click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
-@click.option("--cases", type=click.IntRange(1), metavar="N", help="Only N cases of each group.")
+@click.option("--cases", type=click.IntRange(1), metavar="N", help="Only simulate N cases of each group.")
 @click.option(
     "--group",
     "--only",
     metavar="TEXT",
-    help='Only groups with this text in their name, such as "non-Newtonian".',
+    help='Only simulate groups with this text in their name, such as "non-Newtonian".',
 )
 @takes_workers
 def stability(
@@ -61,9 +68,9 @@ def stability(
 ) -> None:
     """Simulate thousands of closed loops with the safety layer off and on, and print the unstable ones.
 
-    Each has a liquid, a scale, a rate, a delay, an estimator, a device and a hand; further groups have a second model
-    of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the driver of the Falcon in
-    front of its emulator. Ends with 3 if one is unstable with safety on.
+    Each case has a liquid, a scale, a rate, a delay, an estimator, a device and a hand; further groups have a second
+    model of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the driver of the Falcon
+    with its emulator. Ends with exit code 3 if a case is unstable with the safety layer on.
     """
     from study_app.store.output_files import make_folder
     from study_app.validation.stability import stability_report as found

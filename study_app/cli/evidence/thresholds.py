@@ -23,16 +23,16 @@ from study_app.workers.executors import Workers
     show_default=True,
     help="Studies of ten participants, of each protocol.",
 )
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
 def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, to: Path | None) -> None:
-    """Recover known thresholds of simulated observers, by methods and analysis alone and by the whole program.
+    """Recover the known thresholds of simulated observers, with methods and analysis alone and with the whole program.
 
-    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) many studies of ten equal
-    observers choose levels and are analysed; in magnitude estimation an exponent is planted. Then three participants
-    are rehearsed with servo, store, unblinding and analysis. Every value is printed with its limit. Ends with exit
-    code 3 if one exceeds it.
+    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) many studies of ten
+    identical observers are simulated and analysed; in magnitude estimation the exponent is known. Then three
+    participants are rehearsed with servo, files, unblinding and analysis. Every value is printed with its limit. Ends
+    with exit code 3 if a value exceeds its limit.
     """
     from study_app.protocol.load import load, source_bytes
     from study_app.store.output_files import make_folder, write_files
@@ -75,10 +75,10 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
 
 @click.command("delay-thresholds")
 @click.option("--people", type=click.IntRange(5, 1000), default=40, show_default=True, help="Simulated people.")
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for the table and the figure.")
 def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
-    """Compare the delay rated as different (rek2024) with the detected one (delaydetect), of the same simulated people.
+    """Compare the delay that simulated people rate as different (rek2024) with the one they detect (delaydetect).
 
     The forced choice does not depend on a person's criterion; the rating does.
     """

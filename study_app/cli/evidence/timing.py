@@ -65,19 +65,20 @@ def timing(
 ) -> None:
     """Measure the lateness of the servo, a bare compiled loop, a Python thread and a Qt timer.
 
-    They run alternately for a quarter second each, in each priority class that the system grants. Ctrl+C ends it.
+    They alternate every quarter second, in each priority class that the system grants. Ctrl+C ends the command.
 
-    With --delays a session shows the delays of the thesis' study on screens of 60 and 144 Hz, with and without
-    load, and the error of every frame's delay is computed from its recordings. No display is needed.
+    With --delays a session presents the delays of rek2024 on screens of 60 and 144 Hz, with and without load, and
+    the error of every frame's delay is computed from its recordings. No display is needed.
 
-    With --devices the servo ticks on each emulated device and on the scripted hand, alternately. Ends with 3 if the
-    99th percentile of the lateness on one of them exceeds 1.5 times that on the scripted hand.
+    With --devices the servo runs alternately on each emulated device and on the scripted hand. Ends with exit code 3
+    if the 99th percentile of the lateness on one of them is above 1.5 times that on the scripted hand, with its whole
+    95 % interval.
 
-    With --lsl another process receives samples at 1 kHz and markers for so many seconds; then the servo ticks with
-    and without both streams, alternately, for up to 300 s each. Ends with 3 if something is lost, a marker's time
-    differs from the servo's clock by more than 1 ms, or the median lateness grows by more than 10 %.
+    With --lsl another process receives samples at 1 kHz and markers for the given time; then the servo runs with and
+    without both streams, alternately, for up to 300 s each. Ends with exit code 3 if something is lost, a marker's
+    time differs from the servo's clock by more than 1 ms, or the median lateness grows by more than 10 %.
 
-    With --triggers events become bytes on a port, and the delay of each is measured.
+    With --triggers a byte is sent to a port for each event, and its delay is measured.
     """
     exclude_each_other(delays=of_delays, devices=of_devices, lsl=lsl, triggers=triggers)
     if (lsl or triggers is not None) and spin_us is not None:
