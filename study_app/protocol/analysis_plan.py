@@ -54,7 +54,7 @@ class Published(Table):
 
 
 class Analysis(Table):
-    """The decisions; a protocol without this table decides nothing, and the report calls all it finds exploratory."""
+    """Decisions about the analysis; without this table the report calls all its results exploratory."""
 
     alpha: Annotated[float, within(0.0001, 0.2, "no study of people shows less than 0.0001")] = Field(
         default=0.05, description="Largest p that counts as significant."
@@ -71,12 +71,12 @@ class Analysis(Table):
     )
     names: tuple[Id, ...] = Field(
         default=(),
-        description="Items that name a liquid: the one with the single highest answer is what the participant named.",
+        description="Items that name a liquid; the participant named the one with the single highest answer.",
     )
     rising: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to rise with delay.")
     falling: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to fall with delay.")
     noticed: Id | None = Field(
-        default=None, description="Item of which agreement (5 to 7) means that a delay was noticed."
+        default=None, description="Item for which agreement (5 to 7) means that a delay was noticed."
     )
     participants: Annotated[int, Field(ge=1, le=100_000)] | None = Field(
         default=None, description="How many participants are planned."

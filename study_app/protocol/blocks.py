@@ -32,7 +32,7 @@ class Criterion(Table):
     right: int = Field(ge=1, le=100, description="How many of the last answers must be correct.")
     of: int = Field(ge=1, le=100, description="How many of the last answers count.")
     missed: Literal["go_on", "end"] = Field(
-        default="go_on", description="go_on: the session continues if the block ends without; end: it ends."
+        default="go_on", description="go_on: if this is not reached, the session continues; end: it ends."
     )
 
     @model_validator(mode="after")
@@ -69,8 +69,8 @@ class Catch(Table):
 class Block(Table):
     """Trials that share a task and a questionnaire.
 
-    A condition of a main block is shown under a code, L1 … Ln with ``code_prefix`` L; which condition a code stands for
-    is drawn by ``schedule.draw_key``. Practice and baseline are announced for what they are, and have one condition.
+    Tables name a condition of a main block by a code, such as L1 with ``code_prefix`` L; which condition a code stands
+    for is drawn at random. Practice and baseline blocks have one condition and are announced as such.
     """
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("conditions", "stimulus"),)
@@ -100,7 +100,9 @@ class Block(Table):
     title: Localised = Field(description="Name of the block.")
     setting_label: Localised = Field(description="Neutral name of its trials; a number follows: Liquid setting 1.")
     code_prefix: str | None = Field(default=None, pattern=r"^[A-Z]$", description="Letter of the block's codes.")
-    conditions: tuple[Id, ...] = Field(default=(), description="What is presented; with a stimulus: left out.")
+    conditions: tuple[Id, ...] = Field(
+        default=(), description="The conditions that are presented; left out with a stimulus."
+    )
     standard: Id | None = Field(
         default=None, description="The condition that a design compares the block's other conditions with."
     )
@@ -133,7 +135,10 @@ class Block(Table):
         "max_repeats and min_distance; williams, latin: rows of a square, by the number in the participant's id.",
     )
     max_repeats: int | None = Field(
-        default=None, ge=1, le=100, description="How often a condition may come in a row; order constrained only."
+        default=None,
+        ge=1,
+        le=100,
+        description="How often in a row a condition may be presented; order constrained only.",
     )
     min_distance: int | None = Field(
         default=None,
@@ -142,13 +147,13 @@ class Block(Table):
         description="Trials from one presentation of a condition to its next: 2 is never twice in a row, 3 leaves two "
         "others between; order constrained only.",
     )
-    repetitions: int = Field(default=1, ge=1, le=100, description="How often each condition comes.")
+    repetitions: int = Field(default=1, ge=1, le=100, description="How often each condition is presented.")
     break_every: int | None = Field(
         default=None, ge=1, le=10_000, description="Trials between two breaks; left out: no breaks."
     )
     break_page: Id | None = Field(default=None, description="The page shown in a break, of kind break.")
     task: Id = Field(description="What the participant does.")
-    questionnaire: Id | None = Field(default=None, description="What is answered after each trial; left out: nothing.")
+    questionnaire: Id | None = Field(default=None, description="The questionnaire after each trial; left out: none.")
 
     @model_serializer(mode="wrap")
     def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -88,7 +88,7 @@ Format: TypeAlias = Annotated[Literal[1, 2], BeforeValidator(_whole)]
 
 
 class StudyHead(Table):
-    """Which study this is."""
+    """Name, version and languages of the study."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9]*$", max_length=40, description="Short name, used in folders and files.")
     title: Localised = Field(description="Title as people read it.")
@@ -264,7 +264,9 @@ class Protocol(Table):
     sequences: Sequences = Field(default=(), min_length=1, description="The steps of session 1, 2 … where they differ.")
     groups: dict[Id, Group] = Field(default_factory=dict)
     limits: Limits = Field(default_factory=Limits)
-    analysis: Analysis | None = Field(default=None, description="What was decided before the first session.")
+    analysis: Analysis | None = Field(
+        default=None, description="Decisions about the analysis, made before the first session."
+    )
 
     @model_serializer(mode="wrap")
     def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -22,7 +22,7 @@ Sequences: TypeAlias = tuple[Annotated[Steps, Field(min_length=1)], ...]
 
 
 class Group(Table):
-    """A group of participants; without a sequence of its own it has the study's."""
+    """A group of participants; a group without a sequence has that of the study."""
 
     share: Annotated[int, within(1, MOST_SHARE, "a share is a small whole number")] = Field(
         default=1, description="How many participants of each round of allocations come into this group."

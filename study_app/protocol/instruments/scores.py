@@ -26,8 +26,8 @@ class Score(Table):
     items: Annotated[tuple[Id, ...], Field(min_length=1)] = Field(description="The items that are combined.")
     reverse: tuple[Id, ...] = Field(default=(), description="Of these, the items whose answers are reversed.")
     combine: Literal["mean", "sum"] = Field(default="mean", description="mean: their mean; sum: their sum.")
-    factor: Weight = Field(default=1, description="What the result is multiplied by.")
-    offset: Weight = Field(default=0, description="What is then added.")
+    factor: Weight = Field(default=1, description="Factor by which the result is multiplied.")
+    offset: Weight = Field(default=0, description="Number that is then added.")
     weights: dict[Id, Weight] = Field(default_factory=dict, description="Weight of an item; left out: 1.")
     weights_from: tuple[Id, ...] = Field(
         default=(), description="Choices between items: each item's weight is how often it was chosen."

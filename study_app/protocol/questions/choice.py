@@ -55,7 +55,7 @@ class Choice(Question):
 
     kind: Literal["choice"] = "choice"
     options: tuple[Option, ...] = Field(
-        min_length=FEWEST_OPTIONS, max_length=MOST_OPTIONS, description="What can be chosen, in the order shown."
+        min_length=FEWEST_OPTIONS, max_length=MOST_OPTIONS, description="The options, in the order shown."
     )
     several: bool = Field(default=False, description="Whether any number of options can be chosen.")
 

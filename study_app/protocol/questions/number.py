@@ -74,7 +74,7 @@ class Number(Question):
     least: Bound | None = Field(default=None, alias="from", description="Smallest number; left out: any.")
     most: Bound | None = Field(default=None, alias="to", description="Largest number; left out: any.")
     whole: bool = Field(default=False, description="Whether only whole numbers are permitted.")
-    unit: Localised | None = Field(default=None, description="What is counted or measured, shown behind the field.")
+    unit: Localised | None = Field(default=None, description="Unit, shown after the field.")
 
     @model_validator(mode="after")
     def _range_has_numbers(self) -> Self:

@@ -82,9 +82,9 @@ class Question(Table):
     id: Id = Field(description="Name of the item in every table; never change it once data exist.")
     text: Localised = Field(description="The statement as the participant reads it.")
     short: Localised = Field(description="One to three words for figures and tables.")
-    required: bool = Field(default=True, description="Whether the participant can go on without an answer.")
+    required: bool = Field(default=True, description="Whether an answer is needed to continue.")
     show_if: ShowIf | None = Field(
-        default=None, description="An answer to an earlier item with which this one is shown; left out: always."
+        default=None, description="The answer to an earlier item that shows this one; left out: always shown."
     )
 
     @model_serializer(mode="wrap")

@@ -71,7 +71,7 @@ class Slider(Question):
     high: Localised = Field(description="Words at the upper end.")
     least: Bound = Field(default=0, alias="from", description="The number at the lower end.")
     most: Bound = Field(default=100, alias="to", description="The number at the upper end.")
-    step: float = Field(default=1, gt=0, description="From one number to the next.")
+    step: float = Field(default=1, gt=0, description="Difference between neighbouring numbers.")
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Self:

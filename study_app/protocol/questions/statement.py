@@ -10,7 +10,7 @@ from study_app.protocol.questions.rating import Rated
 
 
 class Statement(Rated):
-    """A statement; in a questionnaire of nothing else a row of the page's grid."""
+    """A statement; if a questionnaire has only statements, they form a grid."""
 
     widget: ClassVar[str] = "rating"
 

@@ -43,7 +43,7 @@ class Text(Question):
 
     kind: Literal["text"] = "text"
     lines: int = Field(default=1, ge=1, le=10, description="Height of the field, in lines.")
-    longest: int = Field(default=500, ge=1, le=5000, description="Most characters.")
+    longest: int = Field(default=500, ge=1, le=5000, description="Largest number of characters.")
 
     def view(self, number: int, context: Context) -> ItemView:
         """Return the field."""

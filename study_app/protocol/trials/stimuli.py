@@ -45,10 +45,7 @@ USUAL: Final[Mapping[str, Any]] = {
 
 
 class Condition(Table):
-    """A named combination of what is felt (one liquid, or several with regions), what is seen, and how late.
-
-    ``footage_sha256`` is that of the video file; ``load`` fills it in.
-    """
+    """A named combination of a liquid (or several with regions), what the tank shows, and delays."""
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("liquid", "liquids"),)
 
@@ -58,17 +55,17 @@ class Condition(Table):
         default=0, description="Delay of everything drawn in the tank [ms]."
     )
     label: Id | None = Field(
-        default=None, description="The item of analysis.names that is right for it; left out: none is."
+        default=None, description="The item of analysis.names that names it correctly; left out: none does."
     )
     ball: Literal["shown", "hidden"] = Field(
         default="shown",
-        description="shown: the ball is always drawn; hidden: it is drawn during a task's lead, not while it is felt.",
+        description="shown: the ball is always drawn; hidden: it is drawn only during a task's lead.",
     )
     force_delay_ms: Annotated[float, within(0, force_link.MOST_DELAY_MS, "a later force pushes the hand")] = Field(
         default=0, description="Delay of the force [ms]; what is drawn is not delayed by it."
     )
     force_jitter_ms: Annotated[float, within(0, force_link.MOST_JITTER_MS, "networks deviate less")] = Field(
-        default=0, description="A force is later by up to this, drawn again at every tick [ms]."
+        default=0, description="Largest additional delay of the force, drawn at random at every tick [ms]."
     )
     force_loss: Annotated[float, within(0, force_link.MOST_LOSS, "beyond, most forces are held ones")] = Field(
         default=0, description="Share of ticks whose force is lost; the last one is held."
@@ -84,6 +81,7 @@ class Condition(Table):
         description="shown: ball and targets are drawn over a video; hidden: the video is shown instead of them.",
     )
     footage_sha256: SkipJsonSchema[str | None] = None
+    """That of the video file; ``load`` fills it in."""
 
     @model_serializer(mode="wrap")
     def _without_what_format_1_has_not(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:

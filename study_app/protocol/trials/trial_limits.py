@@ -11,7 +11,7 @@ from study_app.protocol.table import Table
 
 
 class Limits(Table):
-    """What a trial may show at most, and what it must show at least, and still be valid."""
+    """Limits within which a trial is valid."""
 
     lateness_ms: Annotated[float, within(0.01, 1000, "no servo is more punctual, and 1 s is a failure")] = Field(
         default=2, description="99th percentile of the lateness of ticks [ms]."

@@ -19,7 +19,7 @@ class YesNo(Design):
 
     kind: Literal["yesno"] = "yesno"
     noise_share: Annotated[float, within(0.05, 0.5, "fewer say nothing of false alarms; half is balanced")] = Field(
-        default=0.3, description="Share of slots that present the standard."
+        default=0.3, description="Share of trials that present the standard."
     )
 
     has_noise: ClassVar[bool] = True

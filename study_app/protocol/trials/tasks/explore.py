@@ -17,11 +17,11 @@ SHAKE_M: Final = 0.03
 
 
 class Explore(Table):
-    """Free motion in the tank: at least ``min_s``, at most ``max_s``; between the two the participant may go on."""
+    """Free motion in the tank, for ``min_s`` to ``max_s``; after ``min_s`` the participant may continue."""
 
     kind: Literal["explore"]
     min_s: float = Field(ge=0, le=3600, description="Least time before the participant may go on [s].")
-    max_s: Seconds = Field(description="Time after which the questionnaire comes by itself [s].")
+    max_s: Seconds = Field(description="Time after which the task ends by itself [s].")
     instruction: Localised = Field(description="One sentence shown under the tank.")
 
     activity: ClassVar[str] = "free exploration"

@@ -16,21 +16,21 @@ from study_app.protocol.trials.tasks.stroke import Point, Radius, Stroke
 class Follow(Table):
     """A target that moves as A r(t) sin 2πft along an axis, with a raised-cosine ramp r over lead_s.
 
-    It ends by time alone, after the lead and ``cycles`` whole swings; what follows the lead is judged.
+    The task ends after the lead and ``cycles`` whole periods; only the periods after the lead are judged.
     """
 
     kind: Literal["follow"]
-    axis: Literal["x"] = Field(default="x", description="Along which axis the target moves, hand frame.")
+    axis: Literal["x"] = Field(default="x", description="Axis along which the target moves, hand frame.")
     amplitude_mm: Annotated[float, within(1, 250, "the tank is 10 to 1000 mm wide, and a hand trembles")] = Field(
         default=20, description="From the middle to either end, hand frame [mm]."
     )
     frequency_hz: Annotated[float, within(0.05, 5, "a hand follows no faster swing, and a slower one is none")] = Field(
-        default=1, description="Swings a second [Hz]."
+        default=1, description="Frequency of the target [Hz]."
     )
-    cycles: int = Field(default=3, ge=1, le=1000, description="Swings that are judged, after the lead.")
+    cycles: int = Field(default=3, ge=1, le=1000, description="Number of periods after the lead, which are judged.")
     radius_mm: Radius = Field(default=6, description="Radius of the target [mm].")
     lead_s: Annotated[float, within(0.1, 10, "a hand needs 0.2 s to react; nothing of the lead is judged")] = Field(
-        default=1, description="How long the target takes to reach its full swing, before what is judged [s]."
+        default=1, description="Time over which the amplitude rises before the judged periods [s]."
     )
     instruction: Localised | None = Field(
         default=None, description="One sentence shown under the tank; default: the program's own words."

@@ -23,7 +23,7 @@ MOVE_S: Final = 1.5
 
 
 class Reach(Table):
-    """Targets lit one after the other, round and round: hold the ball in the lit one for ``dwell_s``.
+    """Targets light up one after the other, repeatedly; the ball must stay in the lit target for ``dwell_s``.
 
     The task is complete after ``count`` targets or after ``duration_s``, whichever of the two the protocol gives; it
     ends without being complete at ``timeout_s``. Points are in the hand frame.
@@ -39,7 +39,7 @@ class Reach(Table):
     dwell_s: float = Field(ge=0, le=10, description="How long the ball must stay in the lit target [s].")
     count: int | None = Field(default=None, ge=1, le=1000, description="Targets to reach; or give duration_s.")
     duration_s: Seconds | None = Field(default=None, description="Length of the task [s]; or give count.")
-    timeout_s: Seconds = Field(default=120, description="End of the task at the latest [s].")
+    timeout_s: Seconds = Field(default=120, description="Time after which the task ends in any case [s].")
     instruction: Localised = Field(description="One sentence shown under the tank.")
 
     activity: ClassVar[str] = "reaching targets"
