@@ -14,7 +14,7 @@ from scipy.signal import savgol_filter
 
 from study_app.errors import StudyError
 from study_app.evaluation.hand_motions import vectors_x
-from study_app.haptics.model.motion import PLACES, VELOCITIES, Floats, Motion
+from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES, Floats, Motion
 
 FORCES: Final = ("fx_n", "fy_n", "fz_n")
 ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")
@@ -63,6 +63,8 @@ def read(path: Path) -> Measured | FlowCurve:
     StudyError
         The file cannot be read or used; the first thing wrong with it in one line.
     """
+    if path.is_char_device():
+        raise StudyError(f"cannot read {path}: it is a device, which may have no end; name a CSV file of {HEADER}")
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             numbered = [(number, line) for number, line in enumerate(file, start=1) if line.strip()]
@@ -100,7 +102,9 @@ def _rows(path: Path, numbered: list[tuple[int, str]], places: list[int]) -> Flo
         row = [_number(fields[place]) for place in places]
         if None in row:
             bad = fields[places[row.index(None)]]
-            raise StudyError(f"{path}, line {number}: {bad!r} is not a finite number; correct it or remove the row")
+            raise StudyError(
+                f"{path}, line {number}: {bad[:SHOWN]!r} is not a finite number; correct it or remove the row"
+            )
         rows.append(row)
     return np.array(rows, float)
 

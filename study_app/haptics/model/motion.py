@@ -18,6 +18,7 @@ Floats: TypeAlias = NDArray[np.floating[Any]]
 PLACES = ("t_s", "x_m", "y_m", "z_m")
 VELOCITIES = ("vx_mps", "vy_mps", "vz_mps")
 MOST_PROBLEMS = 20
+SHOWN = 200  # letters of a bad value that a message repeats
 
 HEADER = "t_s,x_m,y_m,z_m, one row per tick"
 
@@ -60,6 +61,8 @@ def read(path: Path) -> Motion:
     StudyError
         The file cannot be read.
     """
+    if path.is_char_device():
+        raise StudyError(f"cannot read the motion {path}: it is a device, which may have no end; name a CSV file")
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = list(csv.reader(file, strict=True))
@@ -72,7 +75,7 @@ def read(path: Path) -> Motion:
     header = tuple(lines[0]) if lines else ()
     if header not in {PLACES, PLACES + VELOCITIES}:
         permitted = f"the first line must be {','.join(PLACES)}, or that and {','.join(VELOCITIES)}"
-        found = ",".join(header) or "nothing"
+        found = ",".join(header)[:SHOWN] or "nothing"
         raise ProtocolError(str(path), (Problem("header", f"is {found}; {permitted}", line=1),))
     if len(lines) == 1:
         raise ProtocolError(str(path), (Problem("rows", "there are none", hint="give at least one"),))
@@ -90,7 +93,7 @@ def _numbers(path: Path, lines: list[list[str]], columns: int) -> Floats:
             problems.append(Problem(f"row {number}", f"has {len(fields)} fields, not {columns}", line=number + 1))
         elif None in values:
             bad = fields[values.index(None)]
-            problems.append(Problem(f"row {number}", f"{bad!r} is not a finite number", line=number + 1))
+            problems.append(Problem(f"row {number}", f"{bad[:SHOWN]!r} is not a finite number", line=number + 1))
         else:
             rows.append([value for value in values if value is not None])
             if len(rows) > 1 and rows[-1][0] <= rows[-2][0]:

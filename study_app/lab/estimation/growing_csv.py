@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.haptics.model.motion import PLACES, VELOCITIES
+from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES
 from study_app.lab.estimation.rows import FORCES, CentredVelocity, Floats, Rows, no_rows
 
 HEADER: Final = f"{','.join(PLACES + FORCES)}, with {','.join(VELOCITIES)} where they are known"
@@ -69,6 +69,8 @@ class GrowingCsv:
 
     def _bytes(self) -> list[str]:
         """Return the whole lines that were not read yet."""
+        if self.path.is_char_device():
+            raise StudyError(f"cannot read {self.path}: it is a device, which may have no end; name a CSV file")
         try:
             with self.path.open("rb") as file:
                 size = file.seek(0, 2)
@@ -105,7 +107,9 @@ class GrowingCsv:
             except ValueError:
                 value = math.nan
             if not math.isfinite(value):
-                raise StudyError(f"{self.path}, line {number}: {fields[place]!r} is not a finite number; correct it")
+                raise StudyError(
+                    f"{self.path}, line {number}: {fields[place][:SHOWN]!r} is not a finite number; correct it"
+                )
             row.append(value)
         return row
 

@@ -2,6 +2,7 @@
 
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -323,3 +324,9 @@ def test_every_number_has_a_range_to_be_searched_in():
     for found in parameters.find(Scene(liquids=(liquid,)), "tank", names):
         least, most = search.u_range(found)
         assert -math.inf < least < most < math.inf
+
+
+def test_a_device_is_not_read():
+    """One such as /dev/zero has no end."""
+    with pytest.raises(StudyError, match="it is a device, which may have no end"):
+        measured_force.read(Path("/dev/null"))

@@ -1,4 +1,5 @@
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -141,3 +142,10 @@ def test_on_error_nothing_is_written_and_what_was_there_stays(tmp_path):
 def test_a_motion_checks_itself(t_s, position_m, velocity_mps, message):
     with pytest.raises(StudyError, match=message):
         Motion(np.array(t_s), position_m, velocity_mps)
+
+
+def test_a_device_is_not_read(tmp_path):
+    """One such as /dev/zero has no end; a bad value is repeated in part."""
+    with pytest.raises(StudyError, match="it is a device, which may have no end"):
+        read(Path("/dev/null"))
+    assert len("".join(problems(tmp_path, "x" * 5000 + ",0,0,0"))) < 300

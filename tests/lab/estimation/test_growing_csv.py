@@ -85,3 +85,9 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     begun(path)
     with pytest.raises(StudyError, match="became shorter"):
         source.poll()
+
+
+def test_a_device_is_not_read() -> None:
+    """One such as /dev/zero has no end."""
+    with pytest.raises(StudyError, match="it is a device, which may have no end"):
+        GrowingCsv(Path("/dev/null")).poll()
