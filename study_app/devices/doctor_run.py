@@ -18,7 +18,7 @@ from study_app.haptics.runtime.servo import Servo
 
 SECONDS: Final = 3.0
 LEAST_HZ: Final = 900.0
-MOVE: Final = "Hold the handle and move it about a little …"
+MOVE: Final = "Hold the handle and move it a little …"
 _CHUNK_S = 0.25
 
 

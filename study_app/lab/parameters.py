@@ -94,7 +94,7 @@ def parameter(scene: Scene, name: str) -> Parameter:
         for it in section.parameters:
             if it.name == name:
                 return it
-    raise StudyError(f"this liquid has no parameter {name!r} now: call for the effect it belongs to")
+    raise StudyError(f"this liquid has no parameter {name!r} now: select the effect to which it belongs")
 
 
 def value_of(scene: Scene, name: str) -> Value:

@@ -13,9 +13,7 @@ from study_app.session.preflight import Check, Facts, checks
 OF_THE_COMPUTER: Final = ("Servo rate", "Servo lateness", "Priority", "Screen", "Results folder", "Free space")
 """The checks before a session that say nothing of the study or its device."""
 
-RECOMPILES: Final = (
-    "Every start compiles again, for up to a minute: name a folder that can be written in NUMBA_CACHE_DIR."
-)
+RECOMPILES: Final = "Every start compiles again, for up to a minute: set NUMBA_CACHE_DIR to a writable folder."
 
 
 def computer_checks(
@@ -45,7 +43,7 @@ def _devices(devices: Sequence[Backend]) -> Check:
     """Say which haptic devices are connected; without one sessions run with the mouse."""
     haptic = [one for one in devices if one.state.startswith("connected")]
     missing = [one.name for one in devices if one.state == NOT_AVAILABLE]
-    about = f"cannot be used now: {', '.join(missing)}" if missing else "every device could be used"
+    about = f"cannot be used now: {', '.join(missing)}" if missing else "every device can be used"
     if haptic:
         return Check("Haptic devices", "ok", ", ".join(one.name for one in haptic), about)
     advice = "Connect one, then look at Devices; without one only the mouse and the simulated hand can be used."
@@ -54,6 +52,6 @@ def _devices(devices: Sequence[Backend]) -> Check:
 
 def _compiled(cache: Path | None, compiled: int) -> Check:
     if cache is None:
-        return Check("Compiled code", "warning", "not stored", "no folder can be written", RECOMPILES)
+        return Check("Compiled code", "warning", "not stored", "no folder is writable", RECOMPILES)
     value = f"{compiled} functions compiled" if compiled else "stored"
     return Check("Compiled code", "ok", value, f"the force model for this processor, in {cache}")

@@ -136,7 +136,7 @@ def _of_elements(study: Study, asked: Request, selected: Path) -> Step:
         return add(study, asked, selected)
     if type(asked) in _OF_ELEMENTS:
         return _OF_ELEMENTS[type(asked)](study, asked)
-    raise Refused("this cannot be done to a study")
+    raise Refused("this cannot be done with a study")
 
 
 def _text(study: Study, asked: SetText) -> tuple[Edit, ...]:

@@ -149,7 +149,7 @@ def move(study: Study, asked: MoveElement) -> Step:
     """Return the step that moves an element up or down by one place, with those of its list that move with it."""
     first = step_of(study.document, asked.path)
     if first is None:
-        raise Refused(f"{title_of(study.document, asked.path)} has no place in an order: it is not moved")
+        raise Refused(f"{title_of(study.document, asked.path)} is not in an order, so it cannot be moved")
     steps = {path: step_of(study.document, path) for path in (asked.path, *asked.also)}
     together = {path: step for path, step in steps.items() if step is not None and step[:-1] == first[:-1]}
     title, indices = _titles(study, tuple(together)), [_index(step) for step in together.values()]

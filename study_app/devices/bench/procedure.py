@@ -184,7 +184,7 @@ def _damping(stand: Stand, axis: int, lasts: Durations, ask: Ask, progress: Call
     stand.excite(_held())
     stand.run(lasts.come_s)
     progress(f"Stable damping along {AXES[axis]}: up to {MOST_NSPM:g} N·s/m in {lasts.damping_s:g} s.")
-    answered = ask("damping", "It ends where the handle buzzes; press Enter to end it sooner.")
+    answered = ask("damping", "It ends when the handle oscillates; press Enter to end it earlier.")
     stand.excite(
         _held(
             integral_per_s=0.0,

@@ -19,7 +19,7 @@ NOT_FREE: Final = (
 _ENDED: Final = {
     "oscillation": "it oscillated",
     "operator": "the operator ended it",
-    "most": "stable up to the most that is tried",
+    "most": "stable up to the largest damping tried",
 }
 
 
@@ -96,7 +96,7 @@ def _lines(found: Found, day: str) -> Iterator[str]:
         else f"{gain.gain:.3f} N shown per newton sent, downward; offset {gain.offset_n:+.3f} N; greatest residual "
         f"{gain.residual_n:.3f} N; {gain.readings} readings."
     )
-    yield from ("", "## What the device says of itself", "", "```json")
+    yield from ("", "## What the device reports", "", "```json")
     yield json.dumps(_plain(found.device), indent=2, ensure_ascii=False)
     yield "```"
 

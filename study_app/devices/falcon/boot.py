@@ -176,7 +176,7 @@ def _attempt(transport: Transport, firmware: bytes) -> None:
     _upload(transport, firmware)
     configure(transport)
     if not is_running(transport):
-        raise _Ended("start", "the firmware went over, but the Falcon does not answer")
+        raise _Ended("start", "the firmware was sent, but the Falcon does not answer")
 
 
 def _ping(transport: Transport) -> None:
@@ -236,7 +236,7 @@ def _send(transport: Transport, data: bytes, step: str) -> None:
     except UsbFailure as failure:
         if failure.kind != "timeout":
             raise
-        raise _Ended(step, "the bridge does not take the bytes") from failure
+        raise _Ended(step, "the bridge does not accept the bytes") from failure
 
 
 def _set_line(transport: Transport, divisor: int) -> None:

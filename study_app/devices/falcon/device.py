@@ -168,7 +168,7 @@ class FalconDevice(Device):
         """Raise ``DeviceLost`` if its guard has died: no force is sent any more, and its reads say that it is lost."""
         if self._guard_died:
             raise DeviceLost(
-                "the Falcon's guard process has died, so its force was ended: close what may have ended it, start anew"
+                "the Falcon's guard process has died, so the force was turned off: start the program again"
             )
 
     def describe(self) -> dict[str, Any]:
@@ -275,7 +275,7 @@ class FalconDevice(Device):
         if self.falcon.ended != RUNS:
             raise usb_failure(ERROR_NO_DEVICE, "homing it")
         if self._cancelled is not None and self._cancelled():
-            raise DeviceError("homing the Falcon was given up")
+            raise DeviceError("homing the Falcon was cancelled")
         transport.pause(0.001)
 
 

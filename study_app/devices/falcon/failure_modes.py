@@ -22,8 +22,8 @@ LONGEST_ROUND_TRIP_S: Final = 0.002
 LARGEST_STEP_N: Final = 0.5
 
 _PORT: Final = {
-    OTHER: "unplug cable and mains adapter for ten seconds, and use another port of the machine itself, no hub",
-    "darwin": "unplug cable and mains adapter for ten seconds, and connect it through a hub with its own power",
+    OTHER: "unplug cable and power adapter for ten seconds, then use another port of the computer itself, not of a hub",
+    "darwin": "unplug cable and power adapter for ten seconds, then connect it through a powered hub",
 }
 
 
@@ -109,10 +109,10 @@ MODES: Final = (
         "upload",
         "its firmware loads (several attempts are normal)",
         "its firmware could not be loaded (several attempts are normal)",
-        "handshake or echo of its boot loader was disturbed",
+        "the handshake with its boot loader or its echo was disturbed",
         {
-            OTHER: f"check that its mains adapter is plugged in, then {_PORT[OTHER]}",
-            "darwin": f"check that its mains adapter is plugged in, then {_PORT['darwin']}",
+            OTHER: f"check that its power adapter is plugged in, then {_PORT[OTHER]}",
+            "darwin": f"check that its power adapter is plugged in, then {_PORT['darwin']}",
         },
         "the step at which loading ended, in ten attempts that each open it anew",
         _upload,
@@ -135,11 +135,11 @@ MODES: Final = (
         "windows-driver",
         "its driver lets programs open it",
         "Windows lists it, but it cannot be opened",
-        "its present driver does not let programs open it, and FTDI's library (ftd2xx) is not there",
+        "its present driver does not let programs open it, and FTDI's library (ftd2xx) is not installed",
         {
-            "win32": "install FTDI's D2XX driver; or put WinUSB in its place with Zadig, which shuts out Novint's and "
-            "Force Dimension's own programs until the old driver is chosen again in the Device Manager",
-            OTHER: "let libusb have it: remove the driver that was made for it",
+            "win32": "install FTDI's D2XX driver; or replace the driver by WinUSB with Zadig, after which Novint's and "
+            "Force Dimension's programs do not work until you select the old driver again in the Device Manager",
+            OTHER: "remove the driver that was installed for it, so that libusb can open it",
         },
         "libusb's error -12",
         _not_supported,
@@ -150,8 +150,8 @@ MODES: Final = (
         "Windows lists it, FTDI's driver shows none",
         "Force Dimension's driver is bound to it, which FTDI's D2XX cannot share",
         {
-            "win32": "in the Device Manager choose Update driver, Let me pick, and there FTDI's (or Novint's) driver, "
-            "or put WinUSB in its place with Zadig",
+            "win32": "in the Device Manager choose Update driver, Let me pick, then FTDI's (or Novint's) driver; or "
+            "replace the driver by WinUSB with Zadig",
             OTHER: "",
         },
         "it is in the list of USB devices and not in that of D2XX",
@@ -161,91 +161,90 @@ MODES: Final = (
         "firmware-file",
         "its firmware is available",
         "there is no firmware for it",
-        "it has no program since it was switched on, and none may be given away with this software",
+        "it lost its firmware when it was turned off, and the licence does not permit us to include it",
         {
             OTHER: "give --firmware PATH, the file nvent_firmware.bin (8492 bytes, SHA-256 1119e39c39fab1f3…) that "
-            "came with your Falcon's software; if another program loaded it just now, check its mains adapter"
+            "came with your Falcon's software; if another program has just loaded it, check the power adapter"
         },
-        "it answers no packet, and no file was given, or one that is no firmware",
+        "it answers no packet, and no file was given, or the file is not its firmware",
         _file,
     ),
     Mode(
         "stroke-in",
         "it homes: every arm has passed its index",
-        "it does not home: no lock is felt",
+        "it does not home: its arms do not lock",
         "not every arm has passed its index",
         {OTHER: "push the grip fully in, as far as it goes, then pull it out"},
-        "its encoders move, and an arm's homed bit stays 0",
+        "its encoders change, and the homed bit of an arm stays 0",
         _stroke_in,
     ),
     Mode(
         "stroke-out",
         "its grip was pulled out after homing",
-        "it is homed, and gives no force",
-        "it is homed, but its grip was not pulled out since",
+        "it is homed, but gives no force",
+        "its grip was not pulled out after homing",
         {OTHER: "pull it fully out, toward you"},
-        "all arms homed, and the grip never beyond 170 mm",
+        "all arms are homed, and the grip was never beyond 170 mm",
         _stroke_out,
     ),
     Mode(
         "power",
         "it responds",
-        "its bridge is there, its arms are limp",
+        "its bridge is found, but its arms are limp",
         "it does not answer",
-        {OTHER: "check its mains adapter, then unplug it, plug it in and start again"},
-        "no packet comes back, though the bridge takes them",
+        {OTHER: "check its power adapter, then unplug it, plug it in and start again"},
+        "the bridge accepts packets, but no reply comes back",
         _power,
     ),
     Mode(
         "frozen",
-        "its encoders move",
-        "its positions stand still",
-        "its encoders do not move",
-        {OTHER: "check its mains adapter; if the grip was moved, switch it off and on, then load its firmware again"},
-        "replies with the same encoders while the grip was to be moved",
+        "its encoder counts change",
+        "its positions do not change",
+        "its encoder counts do not change",
+        {OTHER: "check its power adapter; if the grip was moved, turn it off and on, then load its firmware again"},
+        "all replies have the same encoder counts while the grip is moved",
         _frozen,
     ),
     Mode(
         "broken-packets",
         "every packet gets a complete reply",
-        "it trembles, or buttons seem pressed that are not",
-        f"more than {MOST_BROKEN:.1%} of its packets get no whole reply",
+        "it trembles, or it reports buttons that are not pressed",
+        f"more than {MOST_BROKEN:.1%} of its packets get no complete reply",
         {OTHER: f"try another cable, then {_PORT[OTHER]}", "darwin": f"try another cable, then {_PORT['darwin']}"},
-        "packets sent and whole replies received, counted",
+        "numbers of packets sent and of complete replies",
         _broken,
     ),
     Mode(
         "shaking",
         "the servo keeps its rate, and the force does not jump",
         "it shakes or twitches",
-        f"the servo runs slower than {LEAST_HZ:.0f} times a second, or the force jumps by more than {LARGEST_STEP_N} N",
+        f"the servo runs below {LEAST_HZ:.0f} ticks per second, or the force jumps by more than {LARGEST_STEP_N} N",
         {
-            OTHER: "close other programs, plug the machine in, switch power saving off, and see what `liquid-study "
-            "soak` says of this machine"
+            OTHER: "close other programs, connect the computer to mains power, turn power saving off, and run "
+            "`liquid-study soak`"
         },
-        "ticks counted against the clock; the step of the force between two of them",
+        "number of ticks per second; largest step of the force between two ticks",
         _shaking,
     ),
     Mode(
         "slow",
         "its replies come in time",
         "it feels coarse, as at 60 or 300 Hz",
-        f"a reply takes {1000 * LONGEST_ROUND_TRIP_S:.0f} ms or longer: the bridge's timer holds it back",
+        f"a reply takes {1000 * LONGEST_ROUND_TRIP_S:.0f} ms or longer: the bridge's latency timer delays it",
         {
             OTHER: f"close programs that use other serial adapters of FTDI, then {_PORT[OTHER]}",
             "win32": "set the latency timer of its port to 1 ms in the Device Manager, under Advanced",
         },
-        "the median of fifty round trips, with the bridge's event character and without",
+        "median of fifty round trips, with and without the bridge's event character",
         _late,
     ),
     Mode(
         "mac-driver",
-        "no driver of macOS keeps it",
+        "no macOS driver has claimed it",
         "macOS denies access to it",
-        "a driver of FTDI's has taken it",
+        "an FTDI driver has claimed it",
         {
-            "darwin": "remove FTDIUSBSerialDriver.kext from /Library/Extensions, or D2xxHelper, then start the Mac "
-            "again",
+            "darwin": "remove FTDIUSBSerialDriver.kext from /Library/Extensions, or D2xxHelper, then restart the Mac",
             OTHER: "",
         },
         "libusb's error -3 on macOS",
@@ -253,34 +252,34 @@ MODES: Final = (
     ),
     Mode(
         "kernel-driver",
-        "no driver of Linux keeps it",
-        "Linux has made a serial port of it",
-        "a driver of the system holds it and does not let go",
-        {"linux": "run 'sudo modprobe -r ftdi_sio', and take '0403 cb48' out of what writes to its new_id", OTHER: ""},
+        "no Linux driver has claimed it",
+        "Linux uses it as a serial port",
+        "a driver of the system has claimed it and does not release it",
+        {
+            "linux": "run 'sudo modprobe -r ftdi_sio', and remove '0403 cb48' from the rule that writes to new_id",
+            OTHER: "",
+        },
         "the kernel's driver is active on its interface and cannot be detached",
         _usb("kernel-driver"),
         paste="sudo modprobe -r ftdi_sio",
     ),
     Mode(
         "busy",
-        "no other program holds it",
+        "no other program uses it",
         "it cannot be claimed",
-        "another program holds it",
-        {
-            OTHER: "close that program: another liquid-study, findfalcons, a viewer of H3D, a game, or Force "
-            "Dimension's tools"
-        },
+        "another program uses it",
+        {OTHER: "close that program: another liquid-study, findfalcons, H3DViewer, a game, or Force Dimension's tools"},
         "libusb's error -6, or -3 on Windows",
         _busy,
     ),
     Mode(
         "unplugged",
         "it stayed connected",
-        "it was lost in use",
+        "it was disconnected during use",
         "it is no longer there",
         {
-            OTHER: "switch it off if it pushes; check the cable, plug it in again, home it and resume: the trial is "
-            "marked and what was recorded is kept"
+            OTHER: "turn it off if it pushes; check the cable, plug it in again, home it and resume: the trial is "
+            "marked, and its recording is kept"
         },
         "libusb's error -4",
         _usb("no-device"),
@@ -310,7 +309,7 @@ MODES: Final = (
     Mode(
         "no-ftd2xx",
         "FTDI's driver library is loaded where it is needed",
-        "FTDI's driver is of no use",
+        "FTDI's driver cannot be used",
         "FTDI's driver library (ftd2xx) cannot be loaded",
         {OTHER: "install FTDI's D2XX driver"},
         "neither ftd2xx64.dll nor ftd2xx.dll loads",
@@ -321,8 +320,8 @@ MODES: Final = (
         "its transfers succeed",
         "a transfer failed",
         "the bridge did not carry out a transfer, or not in time",
-        {OTHER: f"check cable and mains adapter, then {_PORT[OTHER]}"},
-        "another error of libusb, which the message names",
+        {OTHER: f"check cable and power adapter, then {_PORT[OTHER]}"},
+        "another error of libusb, named in the message",
         _usb("io", "timeout", "overflow", "pipe"),
     ),
 )

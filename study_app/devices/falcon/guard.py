@@ -79,7 +79,9 @@ class Guard:
             child.kill()
             child.wait()
             _close(child)
-            raise DeviceError("the Falcon's guard process does not start, so no force may be sent: install again")
+            raise DeviceError(
+                "the Falcon's guard process does not start, so no force may be sent: reinstall liquid-study"
+            )
         self.child = child
         refuse_suspension(self)
         self.listener = threading.Thread(target=self._listen, args=(child, child.stdout), name="guard", daemon=True)
@@ -204,7 +206,7 @@ def watch(name: str) -> int:
     try:
         transport = open_patiently(name)
     except DeviceError as error:
-        sys.stderr.write(f"the Falcon may still push: {error}; switch it off\n")
+        sys.stderr.write(f"the Falcon may still push: {error}; turn it off\n")
         return 2
     try:
         return 0 if quiet(transport) else 2

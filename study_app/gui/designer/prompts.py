@@ -48,7 +48,7 @@ class DeleteCard(Prompt):
 
     def __init__(self, asked: DeletePrompt) -> None:
         count = len(asked.references)
-        places = "1 place names it:" if count == 1 else f"{count} places name it:"
+        places = "It is used in 1 place:" if count == 1 else f"It is used in {count} places:"
         super().__init__(f"Delete {asked.title}?", places)
         inside = QWidget()
         column = QVBoxLayout(inside)

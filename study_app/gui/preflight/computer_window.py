@@ -16,7 +16,7 @@ from study_app.session.preflight import Check
 SIZE = (860, 620)
 ABOUT = (
     "Measured for two seconds with the simulated hand. A session measures again, with its own device and limits. "
-    "You find this page again under This machine."
+    "This page is also available under This machine."
 )
 MEASURING = "Measuring … The first time the force model is compiled, which may take a minute."
 

@@ -138,7 +138,7 @@ class OnlineEstimator:
             self.restart()
             rows = rows.part(int(gaps[-1]))
             missing = f"no force was measured for {gaps_s[gaps[-1]]:.2g} s, at most {GAP_S:g} s are permitted"
-            self._estimate = replace(NOTHING, reason=f"{missing}: the estimation began again")
+            self._estimate = replace(NOTHING, reason=f"{missing}: the estimation restarted")
         self._last_s = float(rows.t_s[-1])
         if self._rate_hz is None:
             self._waiting = joined(self._waiting, rows)
@@ -229,7 +229,7 @@ class OnlineEstimator:
         if fit.values[DRAG] > _MOST_DRAG:
             return f"a drag coefficient of {fit.values[DRAG]:.3g} is not permitted: check the unit of the force"
         if fit.edge:
-            return "the wake may be longer than what was measured: move on, with stops and turns"
+            return "the wake may be longer than the measurement: continue, with stops and turns"
         if not fit.information.identified:
             vague = [WORDS[n] for n, it in zip(self.names, fit.information.vague, strict=True) if it]
             return (

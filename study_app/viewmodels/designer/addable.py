@@ -61,7 +61,7 @@ def _instruments() -> tuple[Addable, ...]:
     found = []
     for name in instruments():
         source = instrument(name)
-        texts = "" if source["languages"] else ". Its texts are not shipped: the study writes them"
+        texts = "" if source["languages"] else ". Its texts are not included: write them in the study"
         help_ = f"{source['source']}. Licence: {source['licence']}{texts}"
         words = f"Instrument: {name.upper()}, {len(source['items'])} questions"
         found.append(Addable(words, "list", AddInstrument(name), help_))

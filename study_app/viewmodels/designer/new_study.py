@@ -203,8 +203,8 @@ def _recovery(answer: KnownAnswer) -> Recovery:
     unit = answer.unit or "%"
     planted, found, low, high = (share * one for one in (answer.planted, answer.found, answer.low, answer.high))
     sentence = (
-        f"Planted: {planted:g} {unit} at 75 % correct (after {answer.source}). Found: {found:.3g} {unit}; in 9 of 10 "
-        f"simulated studies of {answer.people} people {low:.3g} to {high:.3g} {unit}. A model, not measured."
+        f"Simulated: {planted:g} {unit} at 75 % correct (after {answer.source}). Estimated: {found:.3g} {unit}; in 9 "
+        f"of 10 simulated studies of {answer.people} people {low:.3g} to {high:.3g} {unit}. A model, not measured."
     )
     most = 10.0 * (1 + int(1.5 * max(planted, high)) // 10)
     return Recovery(planted, low, high, most, unit, answer.recovered, sentence)

@@ -122,7 +122,7 @@ def limits_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
     if not outside:
         return f"All {counted(len(judged), 'measured trial')} met the limits of the study.{later}"
     return (
-        f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} broke a limit of the study. The "
+        f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded a limit of the study. The "
         "answers are kept and still count; exclude those you do not trust. The column “Limits” and the line below "
         f"the table name the limit.{later}"
     )

@@ -55,10 +55,10 @@ def test_conditions_say_liquid_delay_and_force(qtbot: Any, designer: Any) -> Non
 @pytest.mark.parametrize(
     ("order", "repetitions", "words"),
     [
-        ("shuffled", 1, "even on average"),
+        ("shuffled", 1, "balanced on average"),
         ("fixed", 1, "same for all"),
-        ("williams", 1, "even at 2, 4, 6 …"),
-        ("latin", 1, "even at 2, 4, 6 …"),
+        ("williams", 1, "balanced at 2, 4, 6 …"),
+        ("latin", 1, "balanced at 2, 4, 6 …"),
     ],
 )
 def test_an_order_says_with_how_many_it_is_even(designer: Any, order: str, repetitions: int, words: str) -> None:

@@ -210,7 +210,7 @@ def test_without_its_mains_adapter_it_does_not_answer_a_ping():
     failure, told = failing(transport)
     assert (failure.step, failure.attempt) == ("ping", ATTEMPTS)
     assert "does not answer" in str(failure)
-    assert "mains adapter is plugged in" in str(failure)
+    assert "power adapter is plugged in" in str(failure)
     assert len(told) == ATTEMPTS - 1
     assert told[0].startswith("Loading the firmware, attempt 1 of 10: its boot loader does not answer")
     assert transport.opened == ATTEMPTS
@@ -315,7 +315,7 @@ def test_a_bridge_that_takes_no_bytes_is_a_failed_attempt():
     _, transport = falcon()
     transport.fails = usb_failure(constants.ERROR_TIMEOUT, "sending")
     failure, _ = failing(transport, attempts=2)
-    assert (failure.step, failure.reason) == ("ping", "the bridge does not take the bytes")
+    assert (failure.step, failure.reason) == ("ping", "the bridge does not accept the bytes")
     configure(transport)
     assert not is_running(transport)
 

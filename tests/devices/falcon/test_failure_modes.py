@@ -174,7 +174,7 @@ class TestFaultsOfTheEmulator:
         emulator.power(False)
         failure = refused(emulator, firmware=firmware)
         assert shown_ids(failure) == ["upload", "power"]
-        assert "mains adapter" in str(failure)
+        assert "power adapter" in str(failure)
 
     def test_no_firmware_and_one_that_is_none(self, tmp_path):
         has_words_of(refused(Emulator()), "firmware-file")

@@ -79,7 +79,7 @@ def test_a_page_says_which_trial_broke_which_limit_and_what_out_of_limits_means(
     measured(tmp_path / "demo")
     page = page_of(qtbot, tmp_path / "demo")
     assert page.validity.word == "Out of limits"
-    assert page.limits.text().startswith("Out of limits: 1 of 2 measured trials broke a limit of the study.")
+    assert page.limits.text().startswith("Out of limits: 1 of 2 measured trials exceeded a limit of the study.")
     assert "still count" in page.limits.text()
     assert [said(page, row, 3) for row in range(2)] == ["Valid", "Out of limits"]
     page.trials.selectRow(0)

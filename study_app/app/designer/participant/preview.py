@@ -283,9 +283,9 @@ class ParticipantPreview(QObject):
         if own and self._protocol is not None:
             if not self._holds(self._protocol, study):
                 return f"{title} cannot be shown: {own[0].message}"
-            return f"{title} has a problem ({own[0].message}): the last sound value is shown."
+            return f"{title} has a problem ({own[0].message}): the last valid value is shown."
         count = len(study.problems)
-        return f"{count} problem{'s' * (count > 1)} elsewhere: the last sound values are shown."
+        return f"{count} problem{'s' * (count > 1)} elsewhere: the last valid values are shown."
 
     def _holds(self, protocol: Protocol, study: Study) -> bool:
         """Return whether the selected table, or question, is in the protocol that is shown."""

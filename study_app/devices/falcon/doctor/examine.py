@@ -32,7 +32,7 @@ from study_app.haptics.runtime.telemetry import timing
 
 SECONDS: Final = 3.0
 EMULATED_PATIENCE_S: Final = 5.0
-MOVE: Final = "Hold the grip and move it about a little …"
+MOVE: Final = "Hold the grip and move it a little …"
 _STILL_M = 5e-6  # a third of the least that one count of an encoder makes
 _BEGIN = 100  # samples until positions are those of the grip
 _CHUNK_S = 0.25  # the telemetry keeps less than all that is looked at

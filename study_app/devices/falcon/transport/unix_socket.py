@@ -145,7 +145,7 @@ def _receive(connection: socket.socket, size: int) -> bytes:
     while len(received) < size:
         more = connection.recv(size - len(received))
         if not more:
-            raise ConnectionResetError("the server has gone")
+            raise ConnectionResetError("the server has ended")
         received += more
     return received
 

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 NUMBERS, ONE_ROW_FROM = 4, 600
 PLOT_PX, HIGHEST_PX, FORCES_PX = 300, 470, 216
-FUNCTION_LEGEND = "Line: planted. Bands: 50 and 90 % of those found. Bars: how often a level is asked."
-TRACK_LEGEND = "Bands: 50 and 90 % of the estimates. Marks: the trials of one observer, filled if right."
+FUNCTION_LEGEND = (
+    "Line: simulated observers. Bands: 50 and 90 % of the estimates. Bars: how often each level is presented."
+)
+TRACK_LEGEND = "Bands: 50 and 90 % of the estimates. Marks: the trials of one observer, filled if correct."
 
 
 class NumbersRow(QWidget):

@@ -85,7 +85,7 @@ class AddList(Themed, QFrame):
                 self.list.addItem(item)
         self.list.setCurrentRow(0)
         if not self.list.count():
-            self.help.setText("Nothing that can be added here is called so")
+            self.help.setText("Nothing that can be added here has this name")
 
     def _choose(self) -> None:
         if (item := self.list.currentItem()) is not None:

@@ -33,7 +33,7 @@ class CommentsCard(Prompt):
 
     def __init__(self, name: str, comments: Sequence[tuple[int, str]]) -> None:
         super().__init__(
-            title_of(name, comments), "A rename changes no comment. Correct them in the file where needed."
+            title_of(name, comments), "Renaming does not change comments. Correct them in the file where needed."
         )
         inside = QWidget()
         column = QVBoxLayout(inside)

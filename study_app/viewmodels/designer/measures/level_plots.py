@@ -177,9 +177,9 @@ def function_plot(of: LevelBlock, simulated: Simulated) -> FunctionPlot | None:
     sentence = (
         f"Share of answers that are {words.success}, over the {words.kind}: {100 * found.planted[0]:.0f} % at "
         f"{words.words(found.levels[0])} to {100 * found.planted[-1]:.0f} % at {words.words(found.levels[-1])}, "
-        f"{100 * found.at_threshold:.0f} % at the planted {words.name} of {words.words(found.threshold)}. "
+        f"{100 * found.at_threshold:.0f} % at the simulated {words.name} of {words.words(found.threshold)}. "
         f"Half of {found.observers} observers are estimated between {middle[0]} and {words.words(_within(found)[1])}. "
-        f"The level asked most often is {words.words(most)}."
+        f"The level presented most often is {words.words(most)}."
     )
     return FunctionPlot(
         heading=f"% {words.success} over {words.kind}, {words.unit}".rstrip(", "),
@@ -232,8 +232,8 @@ def track_plot(of: LevelBlock, simulated: Simulated) -> TrackPlot | None:
         observers=found.observers,
         sentence=(
             f"Estimates of the {words.name} over {last} trials: after the last one half of the observers are between "
-            f"{words.number(low)} and {words.words(high)}, planted was {words.words(found.threshold)}. One of them "
-            f"answered {right} of {len(found.one)} trials with success."
+            f"{words.number(low)} and {words.words(high)}, the simulated value is {words.words(found.threshold)}. "
+            f"One of them answered {right} of {len(found.one)} trials with success."
         ),
         anew="observed" in simulated.anew,
     )
@@ -281,8 +281,8 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
         repair=repair,
         sentence=(
             f"Force at {len(shown)} levels from {rounded(values[0])} to {rounded(values[-1])} {unit}: at most "
-            f"{strongest:.2f} N are asked, the force limit is {limit_n:g} N. {asked} of {len(of.levels)} levels are as "
-            f"asked, {clipped} are clipped."
+            f"{strongest:.2f} N are requested; the limit is {limit_n:g} N. {asked} of {len(of.levels)} levels are "
+            f"as requested, {clipped} are clipped."
         ),
     )
 
@@ -303,4 +303,4 @@ def _clipped_words(of: LevelBlock, clipped: int) -> str:
     known = [f"above {rounded(at)} {of.words.value_unit} {name}" for name, at in limits if at is not None]
     begins = " and ".join(known) or "the limits"
     levels_ = "level" if clipped == 1 else "levels"
-    return f"{begins[:1].upper()}{begins[1:]} takes part of the force away: {clipped} {levels_} feel alike."
+    return f"{begins[:1].upper()}{begins[1:]} reduces the force: {clipped} {levels_} have the same force."

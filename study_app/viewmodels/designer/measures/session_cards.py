@@ -83,7 +83,7 @@ def questions_card(protocol: Protocol, name: str, parts: int | None) -> SessionC
     blocks = [block for block in protocol.blocks_in_order if block.questionnaire == name]
     times = sum(order_of(protocol, block).trials for block in blocks) + (name in protocol.forms)
     figures = ((minutes(answering_s(questionnaire)), "min"), (str(count), "answers"))
-    asked: Verdict = ("neutral", "info", f"{count * times} answers a session, asked {times} times")
+    asked: Verdict = ("neutral", "info", f"{count * times} answers per session, asked {times} times")
     if not times:
         asked = ("warn", "warning", "It is never asked")
     return SessionCard("Each time it is asked", figures, verdicts=(*_fit(parts), asked))
@@ -136,15 +136,15 @@ def balance_card(study: Study, protocol: Protocol, block: Block, participants: i
     evenness, rows = judged.evenness, judged.rows
     if evenness.balanced:
         rounds = "" if rows is None else f", {participants // rows} round{'s' * (participants > rows)} of {rows}"
-        verdict: Verdict = ("ok", "check", f"even{rounds}")
+        verdict: Verdict = ("ok", "check", f"balanced{rounds}")
     elif rows is not None and participants % rows:
-        verdict = ("warn", "warning", f"even at {judged.next_even}")
+        verdict = ("warn", "warning", f"balanced at {judged.next_even}")
     elif rows is not None:
-        verdict = ("warn", "warning", "even in position, not in carry-over")
+        verdict = ("warn", "warning", "positions balanced, carry-over not")
     elif judged.order == "fixed":
-        verdict = ("warn", "warning", "everyone gets the same order, which reveals the codes")
+        verdict = ("warn", "warning", "all participants have the same order, which reveals the codes")
     else:
-        verdict = ("neutral", "info", "even on average only: drawn for each session")
+        verdict = ("neutral", "info", "balanced on average only: drawn for each session")
     title = _title(study, block.id)
     if len(evenness.codes) > MOST_CODES:
         cells = [count for line in evenness.positions for count in line]

@@ -40,7 +40,10 @@ def order_balance(study: Study, row: Row) -> OrderBalance | None:
         )
     if not isinstance(order, str) or order not in SQUARES:
         return OrderBalance(
-            "neutral", "ring", "even on average", "Drawn anew in every session: positions are even on average only."
+            "neutral",
+            "ring",
+            "balanced on average",
+            "Drawn anew in every session: positions are balanced on average only.",
         )
     square, repetitions = SQUARES[order], block.get("repetitions", 1)
     rows = row_count(square, codes)
@@ -48,10 +51,16 @@ def order_balance(study: Study, row: Row) -> OrderBalance | None:
     carries = square == "williams" and isinstance(repetitions, int) and borders_even(codes, max(1, repetitions))
     if carries or codes == 2:
         return OrderBalance(
-            "ok", "check", f"even at {numbers} …", f"Positions and carry-over are even at every {rows} participants."
+            "ok",
+            "check",
+            f"balanced at {numbers} …",
+            f"Positions and carry-over are balanced at every multiple of {rows} participants.",
         )
     return OrderBalance(
-        "warn", "warning", f"in part at {numbers} …", f"Positions alone are even at every {rows} participants."
+        "warn",
+        "warning",
+        f"in part at {numbers} …",
+        f"Only positions are balanced, at every multiple of {rows} participants.",
     )
 
 

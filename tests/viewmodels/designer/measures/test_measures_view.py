@@ -68,7 +68,7 @@ def test_a_block_of_statements_shows_session_balance_power_and_force() -> None:
     assert ("ok", "check", "One page, no scrolling at 1366 × 768") in session.verdicts
     assert sum(share for _, share, _ in session.segments) == pytest.approx(1.0)
     assert isinstance(balance, BalanceCard)
-    assert balance.verdict == ("ok", "check", "even, 2 rounds of 6")
+    assert balance.verdict == ("ok", "check", "balanced, 2 rounds of 6")
     assert {count for line in balance.positions for count in line} == {4}
     assert isinstance(power, LinesCard)
     assert [line.number for line in power.lines] == ["1.0", UNKNOWN]
@@ -81,14 +81,17 @@ def test_a_block_of_statements_shows_session_balance_power_and_force() -> None:
     assert [line.number for line in force.lines] == [f"{force_n:.2f} N" for force_n in forces]
     uneven = view(study, ("blocks", "liquids"), people=13).cards[1]
     assert isinstance(uneven, BalanceCard)
-    assert uneven.verdict == ("warn", "warning", "even at 18")
+    assert uneven.verdict == ("warn", "warning", "balanced at 18")
 
 
 def test_a_questionnaire_shows_each_time_it_is_asked_and_its_languages() -> None:
     asked, texts, *_ = view(study_of("rek2024"), ("questionnaires", "liquid"), SlowResults(parts=2)).cards
     assert isinstance(asked, SessionCard)
     assert asked.figures == (("0:59", "min"), ("9", "answers"))
-    assert [words for _, _, words in asked.verdicts] == ["2 pages at 1366 × 768", "27 answers a session, asked 3 times"]
+    assert [words for _, _, words in asked.verdicts] == [
+        "2 pages at 1366 × 768",
+        "27 answers per session, asked 3 times",
+    ]
     assert isinstance(texts, TextsCard)
     assert [line.number for line in texts.languages] == ["60 of 60", "60 of 60"]
 
