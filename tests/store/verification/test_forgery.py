@@ -25,6 +25,7 @@ from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.fingerprints import listed
 from study_app.store.verification.verify_study import verify
+from study_app.store.withdrawals.tombstones import Tombstone, bury, describe_session
 from tests.store.conftest import SOURCE
 from tests.store.forging import Lines, cover_up, forge
 
@@ -229,6 +230,20 @@ def test_a_forgery_that_computes_everything_anew_is_found_with_the_fingerprints_
     cover_up(study)
     assert verify(study).sound
     assert sentence in told(study, tmp_path / "kept.txt")
+
+
+def test_a_deleted_participant_who_is_said_to_have_withdrawn_is_named(study: Path, tmp_path: Path) -> None:
+    """Nothing can prove that nobody did: whoever compares has the letter, or has none."""
+    folder = StudyFolder(study)
+    erased = tuple(map(describe_session, folder.sessions()[:1]))
+    forget_a_participant(study)
+    cover_up(study)
+    bury(folder, Tombstone("P007", "2026-03-02T09:30:00+01:00", "AB", "asked", erased))
+    found = verify(study, tmp_path / "kept.txt")
+    assert found.errors == ()
+    assert "participant P007 withdrew at 2026-03-02T09:30:00+01:00 (recorded by AB)" in "\n".join(
+        map(str, found.warnings)
+    )
 
 
 def test_changed_tables_do_not_survive_a_rebuild(study: Path, tmp_path: Path) -> None:
