@@ -6,8 +6,10 @@ Each command imports what it needs when it runs, so that ``--help`` loads neithe
 
 from __future__ import annotations
 
+import errno
 import io
 import logging
+import re
 import sys
 
 import click
@@ -18,6 +20,8 @@ from study_app.cli.devices import devices, emulate_falcon
 from study_app.cli.evidence import accuracy, cfd, soak, stability, thresholds, timing
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands
 from study_app.errors import StudyError, naming_the_extra
+
+SHOWN = 200  # letters of a bad value that a message repeats
 
 
 @click.group(cls=GroupedCommands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -63,6 +67,11 @@ commands.add_command(devices)  # with commands of its own
 commands.add_command(emulate_falcon)
 
 
+def _shortened(message: str) -> str:
+    """Return a message with the first `SHOWN` letters of any longer word, such as a path, that it repeats."""
+    return re.sub(rf"(\S{{{SHOWN}}})\S{{{SHOWN},}}", r"\1…", message)
+
+
 def main() -> None:
     """Run a command; turn what the user can fix into one line and exit code 2, and log what else fails."""
     from study_app.store.program_log import keep_log
@@ -75,14 +84,17 @@ def main() -> None:
             code = commands.main(standalone_mode=False)
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "liquid-study"
-        click.echo(f"{command}: {error.format_message()} (see {command} --help)", err=True)
+        click.echo(f"{command}: {_shortened(error.format_message())} (see {command} --help)", err=True)
         sys.exit(EXIT_USER_ERROR)
     except (click.Abort, KeyboardInterrupt):
         sys.exit(130)
     except StudyError as error:
-        click.echo(f"liquid-study: {error}", err=True)
+        click.echo(f"liquid-study: {_shortened(str(error))}", err=True)
         sys.exit(EXIT_USER_ERROR)
-    except Exception:
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:  # of a name that was given
+            click.echo(f"liquid-study: {_shortened(str(error.filename))}: the file name is too long", err=True)
+            sys.exit(EXIT_USER_ERROR)
         logging.getLogger(__name__).critical("a bug ended the program", exc_info=True)
         raise
     sys.exit(code if isinstance(code, int) else 0)
