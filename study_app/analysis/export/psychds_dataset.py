@@ -39,7 +39,7 @@ def dataset_files(
     files = {
         "dataset_description.json": _json(description),
         "data/file_metadata.json": _json({key: description[key] for key in description if key != VARIABLES}),
-        **{f"data/{PurePosixPath(name).stem}.json": _sidecar(name, columns[name]) for name in tables},
+        **{f"data/{PurePosixPath(name).stem}.json": _sidecar(study, name, columns[name]) for name in tables},
         "README.md": _readme(study, tables, report, own.missing),
         "CHANGES.md": f"# Changes\n\n- {study.version}: exported by liquid-study {__version__}\n".encode(),
         ".psychds-ignore": b".psychds-ignore\n",
@@ -54,15 +54,20 @@ def dataset_files(
     return {f"{FOLDER}/{name}": content for name, content in files.items()}
 
 
-def _sidecar(name: str, columns: tuple[Column, ...]) -> bytes:
-    """Return what describes the columns of one table alone."""
+def _sidecar(study: Study, name: str, columns: tuple[Column, ...]) -> bytes:
+    """Return what describes the columns of one table alone, with authors and licence."""
     head = {"@context": CONTEXT, "@type": "Dataset", "name": PurePosixPath(name).stem}
-    return _json({**head, VARIABLES: [variable(column) for column in columns]})
+    return _json({**head, VARIABLES: [variable(column) for column in columns], **_stated(study)})
 
 
 def _credits(study: Study) -> dict[str, Any]:
     stated = study.protocol.get("study", {}).get("credits") or {}
     return {name: stated[name] for name in CREDITS if stated.get(name)}
+
+
+def _stated(study: Study) -> dict[str, Any]:
+    """Return authors, licence and citation as properties of schema.org."""
+    return {CREDITS[name]: value for name, value in _credits(study).items()}
 
 
 def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dict[str, Any]:
@@ -81,7 +86,7 @@ def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dic
         "version": study.version,
         "keywords": [*KEYWORDS, *(["simulated"] if study.simulated else [])],
         VARIABLES: [variable(column) for column in every.values()],
-        **{CREDITS[name]: value for name, value in _credits(study).items()},
+        **_stated(study),
     }
 
 

@@ -105,6 +105,7 @@ def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path
         header = table.read_text(encoding="utf-8").splitlines()[0].split(",")
         assert [one["name"] for one in sidecar["variableMeasured"]] == header
         assert {name for one in sidecar["variableMeasured"] for name in one} <= OF_SCHEMA_ORG
+        assert (sidecar["license"], sidecar["citation"]) == ("CC-BY-4.0", "Kox and Lam (2026)")
     of_folder = json.loads((folder / "data" / "file_metadata.json").read_bytes())
     assert of_folder == {name: value for name, value in described.items() if name != "variableMeasured"}
     assert described["author"] == ["A. Kox", "B. Lam"]
