@@ -83,7 +83,7 @@ class DesignerHeader(QWidget):
         self.study = Choice()
         self.study.setAccessibleName("Study")
         self.study.setFont(font("body"))
-        self.study.setMinimumWidth(190)
+        self.study.setMinimumWidth(150)
         self.study.setMaxVisibleItems(24)
         self.study.setPlaceholderText("Choose a study")
         self.problems = ChipButton("show the list")

@@ -33,11 +33,12 @@ class ProblemLine(Themed, QWidget):
         self.go = PressedByEnter(row.title)
         self.go.setProperty("role", "plain")
         self.go.setProperty("dense", "true")
+        self.go.setFont(font("label"))
         where = f"{row.title}, {row.field}" if row.field else row.title
         self.go.setAccessibleName(f"{where}: {row.message}")
         self.go.clicked.connect(self.opened)
         self.go.setFixedWidth(150)
-        self.go.setStyleSheet("text-align: left;")
+        self.go.setStyleSheet("text-align: left; padding-left: 0;")
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         across = QHBoxLayout(self)
         across.setContentsMargins(10, 2, 6, 2)
@@ -52,15 +53,16 @@ class ProblemLine(Themed, QWidget):
         words = row.message if not row.hint else f"{row.message}  ({row.hint})"
         said = Clamped(words, 2, "label")
         said.setAlignment(Qt.AlignmentFlag.AlignVCenter)
-        across.addWidget(said, 1)
         line = figures("" if row.line is None else f"line {row.line}", "small", "text2")
-        line.setMinimumWidth(LINE_PX)
-        across.addWidget(line)
+        line.setFixedWidth(LINE_PX)
+        across.addWidget(line)  # before the sentence: repairs of different widths would shift it
+        across.addWidget(said, 1)
         buttons = QWidget()
         buttons.setMinimumWidth(NARROW_REPAIR_PX if narrow else REPAIR_PX)
         self._repairs = QHBoxLayout(buttons)
         self._repairs.setContentsMargins(0, 0, 0, 0)
         self._repairs.setSpacing(6)
+        self._repairs.addStretch()
         across.addWidget(buttons)
         self.repairs: list[ActionButton] = []
         self.setMinimumHeight(ROW_PX)

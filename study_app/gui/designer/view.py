@@ -73,7 +73,7 @@ class DesignerPlace(Place):
         self.pane = RightPane()
         self.measures = MeasuresPage()
         self.pane.add_page(PanePage("measures", "Measures", self.measures, self.measures.controls, with_facts=False))
-        self.pane.add_page(PanePage("file", "File", self.file))
+        self.pane.add_page(PanePage("file", "File", self.file, self.file.aside))
         self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
         self.sides = self.parts.sides
         self.adding, self.nothing = AddList(self), NoStudyCard()

@@ -176,7 +176,10 @@ def _fields(t: Theme) -> str:
 {focused} {{ border: 2px solid {t.accent}; padding: 6px 11px; }}
 QLineEdit[dense='true'], QComboBox[dense='true'] {{ padding: 3px 6px; min-height: 22px; }}
 QLineEdit[dense='true']:focus, QComboBox[dense='true']:focus {{ padding: 2px 5px; }}
+QPlainTextEdit[dense='true'] {{ padding: 6px 8px; min-height: 18px; }}
+QPlainTextEdit[dense='true']:focus, QPlainTextEdit[dense='true'][state='refused'] {{ padding: 5px 7px; }}
 QLineEdit[state='changed'], QComboBox[state='changed'] {{ border: 2px solid {t.accent}; padding: 2px 5px; }}
+QPlainTextEdit[state='refused'] {{ border: 2px solid {t.bad}; }}
 QLineEdit[state='refused'] {{ border: 2px solid {t.bad}; padding: 2px 5px; }}
 QComboBox {{ combobox-popup: 0; }}
 QComboBox::drop-down {{ border: none; width: 28px; }}

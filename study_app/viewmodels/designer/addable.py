@@ -42,7 +42,12 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
     sections.sort(key=lambda path: path[:1] != selected[:1])
     found = [one for path in lists for one in _of_list(study, path)]
     found += [
-        Addable(label_of(singular(path[0])), icon_of(path), AddElement(path), f"To {label_of(path[0]).lower()}")
+        Addable(
+            label_of(singular(path[0])),
+            icon_of(path, study.document),
+            AddElement(path),
+            f"To {label_of(path[0]).lower()}",
+        )
         for path in sections
     ]
     found += _instruments() if second else ()
@@ -74,11 +79,11 @@ def _of_list(study: Study, path: Path) -> Iterator[Addable]:
     to = f"To {title_of(study.document, path[:2])}"
     key, kinds = tags(node_at(study.document, (*path, 0)))
     if not kinds or not is_second(study.document):
-        yield Addable(words, icon_of(path), AddElement(path), to)
+        yield Addable(words, icon_of(path, study.document), AddElement(path), to)
         return
     row = row_at(study.document, (*path, 0, key))
     choices = sorted(() if row is None else row.choices, key=lambda choice: choice.value is not None)
     for choice in choices:
         named = words if choice.value is None else f"{words}: {label_of(choice.value).lower()}"
         asks = AddElement(path, () if choice.value is None else (key, choice.value))
-        yield Addable(named, icon_of(path), asks, f"{to}. {choice.sentence}")
+        yield Addable(named, icon_of(path, study.document), asks, f"{to}. {choice.sentence}")

@@ -178,7 +178,7 @@ def form(study: Study, path: Path) -> Form:
         name = ""
     title = title_of(document, path)
     return Form(
-        path, title, icon_of(path), _kind(path), None if name is None else str(name), sections, own,
+        path, title, icon_of(path, document), _kind(path), None if name is None else str(name), sections, own,
         of_id, position_of(document, path),
         question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
         tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),

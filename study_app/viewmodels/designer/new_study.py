@@ -156,7 +156,7 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
     language, document = protocol.study.languages[0], study.document
     session = (
         (
-            icon_of((section, step)),
+            icon_of((section, step), document),
             title_of(document, (section, step)),
             minutes(step_duration_s(protocol, step, language)),
         )

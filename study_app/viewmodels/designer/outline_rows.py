@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.edited_study import Study
 from study_app.authoring.outline import Element, found, outline
-from study_app.protocol.source.document import Path, names
+from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.viewmodels.number_words import minutes
 
 ICONS: Final = {
@@ -18,10 +18,14 @@ ICONS: Final = {
     "groups": "people", "study": "file", "device": "device", "scene": "drop", "limits": "check", "analysis": "bars",
 }  # fmt: skip
 """The icon of each section; a section that is not listed has a ring."""
+PAGES: Final[Mapping[Any, str]] = {"consent": "pen", "break": "pause", "debrief": "flag"}
+"""The icon of a page by its kind, where it is not that of every page."""
 SECTIONS: Final = ("Session, in order", "Parts it is made of", "The study itself")
 FIRST: Final = ("study",)
 """What is selected where nothing else is."""
 
+
+FORCE_LIMIT: Final = ("device", "force_limit_n")
 
 ElementPath: TypeAlias = Path
 """The path of an element, as windows hand it on."""
@@ -82,8 +86,11 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
     return tuple(rows)
 
 
-def icon_of(path: Path) -> str:
+def icon_of(path: Path, document: Mapping[str, Any]) -> str:
     """Return the icon of an element."""
+    if len(path) == 2 and path[0] == "pages":
+        value = value_at(document, path)
+        return PAGES.get(value.get("kind"), ICONS["pages"]) if isinstance(value, Mapping) else ICONS["pages"]
     return "list" if "items" in path else ICONS.get(str(path[0]), "ring") if path else "ring"
 
 
@@ -94,6 +101,10 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
     elif element.depth == 0 and kind in SECTIONS_OF_TABLES:
         count = len(names(study.document, kind))
         note = str(count) if count else "none"
+    elif path == FIRST:
+        note = " ".join(str(code).upper() for _, code in entries(study.document, "study.languages.*"))
+    elif path == ("device",) and isinstance(limit := value_at(study.document, FORCE_LIMIT), int | float):
+        note = f"{limit:g} N"
     faults = f"{element.faults} problem{'s' * (element.faults > 1)}" if element.faults else ""
     sort = singular(kind) if len(path) == 2 else "question" if "items" in path else ""
     spoken, at = _spoken(note) if in_session else note, ""
@@ -103,7 +114,7 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
         sort = "" if "items" in path else sort
     name = ", ".join(filter(None, (element.title, sort, spoken, at, faults)))
     title, step = element.title, element.step
-    return OutlineRow(path, title, icon_of(path), note, element.depth + 1, element.faults, name, step)
+    return OutlineRow(path, title, icon_of(path, study.document), note, element.depth + 1, element.faults, name, step)
 
 
 def _spoken(time: str) -> str:

@@ -72,5 +72,12 @@ def _row(study: Study, fault: Fault, line: int | None) -> ProblemRow:
     message = f"{fault.message[:1].upper()}{fault.message[1:]}"
     field = ", ".join(label_of(step) for step in inside)
     return ProblemRow(
-        fault, element, title_of(study.document, element), icon_of(element), field, message, fault.hint, line
+        fault,
+        element,
+        title_of(study.document, element),
+        icon_of(element, study.document),
+        field,
+        message,
+        fault.hint,
+        line,
     )

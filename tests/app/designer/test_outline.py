@@ -236,7 +236,7 @@ def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: An
     def listed() -> tuple[str, ...]:
         return designer.editing.opened.study.document["blocks"]["liquids"]["conditions"]
 
-    designer.editing.select(path[:2])
+    designer.select(path[:2])
     first, second, third = listed()
     row = designer.row(*path).field.rows[0]
     qtbot.mousePress(row, LEFT, pos=QPoint(10, 16))
@@ -244,6 +244,7 @@ def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: An
     event_move(row, QPoint(10, 70))
     qtbot.mouseRelease(row, LEFT, pos=QPoint(10, 70))
     assert listed() == (second, first, third)
+    QApplication.processEvents()
     row = designer.row(*path).field.rows[1]
     row.setFocus()
     qtbot.keyClick(row, Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier)

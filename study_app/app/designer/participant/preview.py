@@ -58,7 +58,9 @@ class ParticipantPreview(QObject):
         super().__init__(editing)
         self.editing, self.place = editing, place
         self.tab = ParticipantTab()
-        place.pane.add_page(PanePage("participant", "Participant", self.tab, self.tab.aside), first=True)
+        page = PanePage("participant", "Participant", self.tab, self.tab.aside, most_px=lambda: self.tab.most_px)
+        place.pane.add_page(page, first=True)
+        self.tab.resized.connect(place.pane.make_room)
         self._language = ""
         self._found: Found | None = None
         self._moment: Moment | None = None

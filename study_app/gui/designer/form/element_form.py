@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.entry_list import EntryList
@@ -28,6 +29,8 @@ from study_app.viewmodels.designer.special.questions import QuestionLine
 ACROSS = 2
 ROW_PX = FIELD_PX + 7
 INFINITE_PX = 1 << 24
+FOOT_FROM = 460
+"""The height of the form from which it has a foot [px]."""
 BELOW = 2
 """Where the keys of an element begin in a path, after its section and its id."""
 
@@ -77,6 +80,11 @@ class FormCard(Card):
             self.column.addWidget(part)
         self.column.addWidget(self.area, 1)
         self.column.addWidget(self.foot)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Leave the room to the editors where there is little."""
+        super().resizeEvent(event)
+        self.foot.setVisible(self.height() >= FOOT_FROM)
 
     def _ask_by_head(self, asked: object) -> None:
         """Ask for a step; the form of an element that it renames keeps its editors."""

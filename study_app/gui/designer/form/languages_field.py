@@ -17,6 +17,9 @@ from study_app.viewmodels.designer.requests import SetText
 class LanguagesField(Field):
     """A text in each language, side by side, or below each other where there are more than two or several lines."""
 
+    one: type[TypedLine | TypedText] = TypedLine
+    """What a text of one paragraph is typed into."""
+
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         several, down = row.row.kind == "paragraphs", stacked(row)
@@ -29,7 +32,7 @@ class LanguagesField(Field):
         self.lines: dict[str, TypedLine | TypedText] = {}
         for code, language in row.languages:
             name = row.row.label if len(row.languages) == 1 else f"{row.row.label}, {language}"
-            made: TypedLine | TypedText = TypedText(name) if several else TypedLine(name)
+            made = (TypedText if several else self.one)(name)
             if len(row.languages) > 1:
                 made.setPlaceholderText(f"Missing in {language}")
                 made.setToolTip(language)

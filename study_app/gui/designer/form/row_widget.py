@@ -14,7 +14,7 @@ from study_app.gui.designer.form.languages_field import LanguagesField, stacked
 from study_app.gui.designer.form.list_fields import field, structure
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.designer.form.special_editor import SpecialEditor
-from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedSentence, TypedText
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
@@ -73,7 +73,7 @@ class RowWidget(Themed, QWidget):
         across.addWidget(self.words, int(wide), top)
         across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
         if self.remove is None:
-            across.addSpacing(FIELD_PX)
+            across.addSpacing(FIELD_PX + across.spacing())
         else:
             across.addWidget(self.remove, 0, top)
         self.repairs: list[ActionButton] = []
@@ -84,7 +84,13 @@ class RowWidget(Themed, QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
-        column.addLayout(across)
+        heads = wide and len(row.languages) > 1 and not stacked(row)
+        labelled = row.removable or not (heads or (special is not None and not special.labelled))
+        if labelled:
+            column.addLayout(across)
+        else:  # the names of the languages, or the editor, say what it is
+            self.words.setParent(self)
+            self.words.hide()
         if self.keys is not None:
             self.keys.show_values(row.instead, row.row.path[-1])
             self.keys.chosen.connect(self._switch)
@@ -92,8 +98,9 @@ class RowWidget(Themed, QWidget):
             above.setContentsMargins(0 if wide else LABEL_PX + 8, 0, 0, 0)
             above.addWidget(self.keys, 0, Qt.AlignmentFlag.AlignLeft)
             column.insertLayout(0, above)
-        if wide and len(row.languages) > 1 and not stacked(row):
-            column.addLayout(language_heads(row.languages))
+        if heads:
+            of = "" if labelled else f"{row.row.label}, "
+            column.addLayout(language_heads(tuple((code, f"{of}{language}") for code, language in row.languages)))
         if wide:
             column.addWidget(self.field)
         column.addLayout(self._buttons)
@@ -136,7 +143,7 @@ class RowWidget(Themed, QWidget):
         for part in self.field.findChildren(QWidget):
             if isinstance(part, TypedLine | TypedText):
                 part.setAccessibleDescription(self.field.accessibleDescription())
-            if isinstance(part, TypedLine) and not self.field.refusal:
+            if isinstance(part, TypedLine | TypedSentence) and not self.field.refusal:
                 blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
                 part.show_refused(bool(self.row.faults) and blamed)
 
@@ -172,7 +179,8 @@ class RowWidget(Themed, QWidget):
         reason = f" ({row.reason})" if row.reason else ""
         permitted = f"Permitted: {self.row.bounds}{reason}." if self.row.bounds and not row.choices else ""
         words = " ".join(filter(None, (sentence or row.help, permitted)))
-        return " ".join(words.replace("`", "").split())
+        words = " ".join(words.replace("`", "").split())
+        return f"{words[:1].upper()}{words[1:]}"
 
 
 def special_editor_of(row: FormRow) -> SpecialEditor | None:

@@ -25,6 +25,8 @@ class SpecialEditor:
         Makes the editor of a row.
     wide : bool
         Whether it takes the width of the form, with the label above it.
+    labelled : bool
+        Whether the label is shown; a screen reader says it in any case.
     structure : callable
         Returns what makes another editor necessary, beyond what does for every row.
     """
@@ -32,4 +34,5 @@ class SpecialEditor:
     keys: tuple[tuple[str, str], ...]
     make: Callable[[FormRow], Field]
     wide: bool = False
+    labelled: bool = True
     structure: Callable[[FormRow], object] = _same

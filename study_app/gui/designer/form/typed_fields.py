@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence
+from PySide6.QtCore import QEvent, QMimeData, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.gui.theme.theme import font
@@ -15,6 +15,8 @@ HAND_ON_MS = 150
 CLICK_MS = 10
 """How often it is looked whether the click is done that the keyboard left a field by [ms]."""
 FIELD_PX = 34
+MOST_LINES, SENTENCE_EDGE_PX = 5, 14
+"""How many lines a sentence has at most, and what its field needs above and below them [px]."""
 KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
 
 if TYPE_CHECKING:
@@ -79,6 +81,14 @@ class _Typed(_Base):
     def show_text(self, text: str) -> None:
         """Show a text, unless something else is being typed."""
         raise NotImplementedError
+
+    def show_refused(self, yes: bool) -> None:
+        """Give the field the edge of one whose text is refused, or take it away."""
+        state = "refused" if yes else ""
+        if (self.property("state") or "") != state:
+            self.setProperty("state", state)
+            self.style().unpolish(self)
+            self.style().polish(self)
 
     def leaves_to_place(self, event: QEvent) -> bool:
         """Return whether a key is the place's, whose undo is for the whole study."""
@@ -153,14 +163,6 @@ class TypedLine(_Typed, QLineEdit):
             self.setText(text)
             self.setCursorPosition(min(at, len(text)) if self.hasFocus() else 0)
 
-    def show_refused(self, yes: bool) -> None:
-        """Give the field the edge of one whose text is refused, or take it away."""
-        state = "refused" if yes else ""
-        if (self.property("state") or "") != state:
-            self.setProperty("state", state)
-            self.style().unpolish(self)
-            self.style().polish(self)
-
 
 class TypedText(_Typed, QPlainTextEdit):
     """Several lines; Tab leaves the field."""
@@ -176,8 +178,14 @@ class TypedText(_Typed, QPlainTextEdit):
         self.setUndoRedoEnabled(False)
         self.setFont(font("label", weight=400))
         self.setFixedHeight(118)
-        self._showing = False
-        self.textChanged.connect(lambda: None if self._showing else self.note())
+        self._known = ""
+        self.textChanged.connect(self._note_change)
+
+    def _note_change(self) -> None:
+        """Note what was typed; Qt says so of another font or margin, too."""
+        if self.words() != self._known:
+            self._known = self.words()
+            self.note()
 
     def words(self) -> str:
         """Return the text."""
@@ -190,6 +198,49 @@ class TypedText(_Typed, QPlainTextEdit):
     def show_text(self, text: str) -> None:
         """Show a text, unless something else is being typed."""
         if not self.pending and text != self.words():
-            self._showing = True
+            self._known = text
             self.setPlainText(text)
-            self._showing = False
+
+
+class TypedSentence(TypedText):
+    """A sentence in as many lines as it takes, as far as there is room for them; Enter accepts it."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.setProperty("dense", "true")
+        self.document().setDocumentMargin(0)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.textChanged.connect(self._fit)
+        self._fit()
+
+    def _fit(self) -> None:
+        block, needed = self.document().firstBlock(), 0
+        layout = self.document().documentLayout()
+        while block.isValid():
+            layout.blockBoundingRect(block)  # lays it out
+            needed += block.layout().lineCount()
+            block = block.next()
+        lines = min(MOST_LINES, max(1, needed))
+        scrolls = Qt.ScrollBarPolicy.ScrollBarAsNeeded if lines == MOST_LINES else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        self.setVerticalScrollBarPolicy(scrolls)
+        self.setFixedHeight(max(FIELD_PX, lines * self.fontMetrics().lineSpacing() + SENTENCE_EDGE_PX))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Take the height of the lines."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for the lines."""
+        return QSize(120, self.height())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Accept at Enter."""
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self.accept()
+        else:
+            super().keyPressEvent(event)
+
+    def insertFromMimeData(self, source: QMimeData) -> None:  # noqa: N802 - Qt's name
+        """Paste a text as one paragraph."""
+        self.insertPlainText(" ".join(source.text().split()))

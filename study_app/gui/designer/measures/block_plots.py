@@ -96,9 +96,11 @@ class MeasurePlot(Plot):
         )  # fmt: skip
         self.add(made, -8)
 
-    def words(self, text: str, x: float, y: float, colour: str, anchor: tuple[float, float]) -> None:
-        """Write words at a place."""
-        made = pg.TextItem(text, color=QColor(colour), anchor=anchor)
+    def words(
+        self, text: str, x: float, y: float, colour: str, anchor: tuple[float, float], *, over: bool = False
+    ) -> None:
+        """Write words at a place; those ``over`` a line of the grid interrupt it."""
+        made = pg.TextItem(text, color=QColor(colour), anchor=anchor, fill=QColor(self.theme.surface) if over else None)
         made.textItem.setFont(font("small", weight=600, tabular=True))
         made.setPos(QPointF(x, y))
         self.add(made, 5)
@@ -218,7 +220,7 @@ class ForcesView(MeasurePlot):
         highest = 1.16 * top
         room = count * LIMIT_PX / max(LIMIT_PX + 1.0, self.box.width() - LIMIT_PX)
         self.curve([-0.7, count - 0.3], [shown.limit_n, shown.limit_n], theme.bad, 1.5, dashed=True)
-        self.words(f"limit {shown.limit_n:g} N", count - 0.2, shown.limit_n, theme.bad, (0.0, 0.5))
+        self.words(f"limit {shown.limit_n:g} N", count - 0.2, shown.limit_n, theme.bad, (0.0, 0.5), over=True)
         self.show_ticks("left", list(shown.ticks_y))
         self.show_ticks("bottom", list(shown.ticks_x))
         self.box.setXRange(-0.8, count - 0.2 + room, padding=0)

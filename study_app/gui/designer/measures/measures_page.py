@@ -76,7 +76,7 @@ class PlotCard(Card):
     def show_heading(self, words: str, *, anew: bool) -> None:
         """Say what is drawn, and whether it is of an earlier study."""
         self.heading_unit.show_text(words)
-        self.legend.setText(f"{ANEW[:1].upper()}{ANEW[1:]}." if anew else self._legend)
+        self.legend.setText(f"{ANEW[:1].upper()}{ANEW[1:]}" if anew else self._legend)
 
 
 class WarningBar(Themed, QWidget):

@@ -91,12 +91,14 @@ class TemplateButton(Themed, QAbstractButton):
             painter, "lock" if self.choice.note.startswith("ships") else "layers", QRectF(27, 29, 18, 18), t.text2
         )
         painter.setPen(QColor(t.text))
-        painter.setFont(font("strong"))
         wide = self.width() - 80
-        painter.drawText(QRectF(68, 16, wide, 22), Qt.AlignmentFlag.AlignVCenter, self._elided(painter, wide))
+        painter.setFont(font("label", weight=600))
+        two = painter.fontMetrics().horizontalAdvance(self.text()) > wide
+        box = QRectF(68, 8, wide, 36) if two else QRectF(68, 16, wide, 22)
+        painter.drawText(box, Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignVCenter, self.text())
         painter.setPen(QColor(t.text2))
         painter.setFont(font("small"))
-        painter.drawText(QRectF(68, 38, wide, 20), Qt.AlignmentFlag.AlignVCenter, self.choice.note)
+        painter.drawText(QRectF(68, box.bottom(), wide, 20), Qt.AlignmentFlag.AlignVCenter, self.choice.note)
 
     def _paint_empty(self, painter: QPainter) -> None:
         t, middle = self.theme, self.width() / 2

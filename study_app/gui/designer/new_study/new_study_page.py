@@ -37,12 +37,18 @@ class NoStudyCard(Card):
     study_asked = Signal(str)
 
     def __init__(self) -> None:
-        super().__init__("No study is open", padding=28, gap=12)
+        super().__init__(padding=28, gap=12)
         self.drafts: list[ActionButton] = []
-        self.column.addWidget(label("Choose a study above, or begin a new one.", "body", "text2"))
         self.new = ActionButton("plus", "New study …", role="primary")
-        self.column.addWidget(self.new, 0, Qt.AlignmentFlag.AlignLeft)
-        self.column.addStretch()
+        self.column.addStretch(2)
+        for part in (
+            Icon("designer", "accent", 44),
+            label("No study is open", "card"),
+            label("Choose a study above, or begin a new one.", "body", "text2"),
+            self.new,
+        ):
+            self.column.addWidget(part, 0, Qt.AlignmentFlag.AlignHCenter)
+        self.column.addStretch(3)
 
     def show_studies(self, studies: tuple[StudyChoice, ...]) -> None:
         """Offer to continue the studies with a draft that is not saved."""
@@ -53,7 +59,7 @@ class NoStudyCard(Card):
             made = ActionButton("save", f"Continue {study.title} with its unsaved changes")
             made.clicked.connect(lambda _on=False, source=study.source: self.study_asked.emit(source))
             apply_theme_within(made, self.theme)
-            self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignLeft)
+            self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignHCenter)
             self.drafts.append(made)
 
 

@@ -26,7 +26,7 @@ from study_app.gui.designer.text_lines import visible_lines
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.designer.file_text import FileText
 
@@ -235,7 +235,7 @@ class FileEditor(Themed, QPlainTextEdit):
 
 
 class FileCard(Card):
-    """The editor, with the name of the file; ``typed`` carries the text."""
+    """The editor; ``aside`` holds the name of the file, for the right of the tabs; ``typed`` carries the text."""
 
     typed = Signal(str)
 
@@ -243,14 +243,18 @@ class FileCard(Card):
         super().__init__(padding=14, gap=8)
         self.setAccessibleName("File")
         self.name = Elided("label", "text2")
-        self.name.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.name.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.editor = FileEditor()
         self.editor.typed.connect(self.typed)
         self.setFocusProxy(self.editor)
-        top = QHBoxLayout()
-        top.addWidget(label("File", "card"))
-        top.addWidget(self.name, 1)
-        self.column.addLayout(top)
+        self.aside = QWidget()
+        across = QHBoxLayout(self.aside)
+        across.setContentsMargins(0, 0, 0, 0)
+        across.setSpacing(6)
+        across.addWidget(Icon("check", "ok", 16))
+        across.addWidget(label("comments and order are kept", "small", "text2"))
+        across.addSpacing(10)
+        across.addWidget(self.name)
         self.column.addWidget(self.editor, 1)
 
     def show_file(self, file: FileText, *, scroll: bool, read_only: bool) -> None:

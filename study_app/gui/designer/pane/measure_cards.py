@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
@@ -39,16 +39,17 @@ class FactsRow(QScrollArea):
         column.addWidget(self.numbers)
         column.addWidget(self.grid, 1)
         self.setWidget(inside)
-        self._window_px = 0
-        self.make_room(0)
+        self._window_px = self._left_px = 0
+        self.make_room(0, 0)
 
-    def make_room(self, window_px: int) -> None:
-        """Take the height of the cards, as far as the window has room for them."""
-        self._window_px = window_px
+    def make_room(self, window_px: int, left_px: int) -> None:
+        """Take the height of the cards, as far as the window has room for them, or the page above leaves it."""
+        self._window_px, self._left_px = window_px, left_px
         most = MOST if window_px >= HIGH_FROM else max(LEAST, round(SHARE * window_px))
-        needed = self._inside.totalHeightForWidth(self.viewport().width())
-        if needed < 0:
-            needed = self._inside.totalSizeHint().height()
+        most = max(most, left_px)
+        needed = max(
+            self._inside.totalHeightForWidth(self.viewport().width()), self._inside.totalMinimumSize().height()
+        )
         self.setFixedHeight(min(most, needed + 2 * self.frameWidth()) if self.grid.cards else most)
 
     def show_measures(self, shown: MeasuresView) -> None:
@@ -63,8 +64,15 @@ class FactsRow(QScrollArea):
         self._show()
         self.appeared.emit()
 
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+        """Take another height when the cards need one."""
+        handled = super().eventFilter(watched, event)
+        if watched is self.widget() and event.type() == QEvent.Type.LayoutRequest:
+            self.make_room(self._window_px, self._left_px)
+        return handled
+
     def _show(self) -> None:
         if self.shown is not None:
             self.numbers.show_numbers(self.shown.numbers)
             self.grid.show_cards(self.shown.below)
-            self.make_room(self._window_px)
+            self.make_room(self._window_px, self._left_px)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from PySide6.QtCore import Signal
@@ -12,7 +13,9 @@ from study_app.gui.designer.pane.measure_cards import FactsRow
 from study_app.gui.designer.segments import Segments
 from study_app.gui.widgets.cards import SHADOW
 
-FACTS_FROM = 740
+FACTS_FROM, FACTS_FROM_OWN = 740, 560
+"""The height of the window and of the pane from which there is room for facts [px]."""
+QWIDGETSIZE_MAX = (1 << 24) - 1
 GAP = 24
 
 
@@ -30,6 +33,8 @@ class PanePage:
         Controls at the right of the tabs, while the page is shown.
     with_facts : bool
         Whether the facts stay below the page.
+    most_px : callable
+        Returns how high the body is at most; the facts take the rest [px].
     """
 
     name: str
@@ -37,6 +42,7 @@ class PanePage:
     body: QWidget
     aside: QWidget | None = None
     with_facts: bool = True
+    most_px: Callable[[], int] = lambda: QWIDGETSIZE_MAX
 
 
 class RightPane(QWidget):
@@ -60,13 +66,14 @@ class RightPane(QWidget):
         bar.addStretch()
         bar.addLayout(self._asides)
         self._stack = QStackedWidget()
-        column = QVBoxLayout(self)
+        self._column = column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(12 - 2 * SHADOW)
         column.addLayout(bar)
         column.addLayout(self._below)
         column.addWidget(self._stack, 1)
         column.addWidget(self.facts)
+        column.addStretch(0)
         self.tabs.chosen.connect(lambda name: self.show_tab(str(name)))
 
     def add_page(self, page: PanePage, *, first: bool = False) -> None:
@@ -104,10 +111,15 @@ class RightPane(QWidget):
         """Put the controls where there is room."""
         super().resizeEvent(event)
         self._place_aside()
+        self.make_room()
 
     def make_room(self) -> None:
         """Hide the facts where the window is too low for them, or the page takes their place."""
         page = next((one for one in self.pages if one.name == self.tab), None)
         height = self.window().height()
-        self.facts.make_room(height)
-        self.facts.setVisible(page is not None and page.with_facts and height >= FACTS_FROM)
+        room = not self.isVisible() or self.height() >= FACTS_FROM_OWN
+        facts = page is not None and page.with_facts and height >= FACTS_FROM and room
+        most = QWIDGETSIZE_MAX if page is None or not facts else page.most_px()
+        self._stack.setMaximumHeight(most)
+        self.facts.make_room(height, self.height() - self._stack.y() - most - self._column.spacing())
+        self.facts.setVisible(facts)

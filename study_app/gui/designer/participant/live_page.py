@@ -45,6 +45,7 @@ from study_app.viewmodels.designer.participant_page import SIZES, ParticipantVie
 FRAME_MS: Final = 33
 RING: Final = 2
 QWIDGETSIZE_MAX: Final = (1 << 24) - 1
+"""The height of a part without a limit, as Qt has it [px]."""
 
 
 class LivePage(Themed, QGraphicsView):

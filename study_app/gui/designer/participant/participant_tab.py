@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from study_app.gui.designer.participant.live_page import LivePage
+from study_app.gui.designer.participant.live_page import QWIDGETSIZE_MAX, LivePage
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card
@@ -18,13 +18,16 @@ from study_app.session.trial import TankView
 from study_app.viewmodels.designer.participant_page import ParticipantView, ScreenSize
 
 MOST_IN_ROW: Final = 2
+BAR_PX: Final = 34
+"""The height of what stands beside the tabs."""
 
 
 class ParticipantTab(Card):
     """Draws a `ParticipantView`.
 
     ``aside`` holds language and screen, for the right of the tabs. Signals: ``language_asked`` (code), ``step_asked``
-    (−1 or 1), ``moment_asked`` (moment); ``happened``, ``frame_due`` and ``shown`` as of `LivePage`.
+    (−1 or 1), ``moment_asked`` (moment), ``resized`` when it needs another height; ``happened``, ``frame_due`` and
+    ``shown`` as of `LivePage`.
     """
 
     language_asked = Signal(str)
@@ -33,6 +36,7 @@ class ParticipantTab(Card):
     happened = Signal(object)
     frame_due = Signal()
     shown = Signal()
+    resized = Signal()
 
     def __init__(self) -> None:
         super().__init__(padding=12, gap=10)
@@ -46,6 +50,8 @@ class ParticipantTab(Card):
         self.screens = Choice()
         self.screens.setAccessibleName("Screen")
         self.screens.setFont(font("label"))
+        self.screens.setProperty("dense", "true")
+        self.screens.setFixedHeight(BAR_PX)
         self.screens.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.screens.setMinimumContentsLength(9)
         self.aside = QWidget()
@@ -136,6 +142,13 @@ class ParticipantTab(Card):
     def _make_room(self) -> None:
         margins = self.column.contentsMargins()
         self.page.make_room(self.width() - margins.left() - margins.right())
+        self.resized.emit()
+
+    @property
+    def most_px(self) -> int:
+        """The height that it can use: where the page is shown whole, no more than that needs [px]."""
+        other = self.column.minimumSize().height() - self.page.minimumHeight()
+        return min(QWIDGETSIZE_MAX, self.page.maximumHeight() + other)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Give the page the height that it needs."""

@@ -69,7 +69,7 @@ def trial_strip(study: Study, row: Row) -> TrialStrip | None:
     if design.shows_feedback(block.phase == "practice"):
         phases.append(Phase("feedback", "Feedback", "", design.feedback_s))
     whole_s = sum(phase.duration_s for phase in phases) + design.between_s
-    return TrialStrip((*phases, Phase("pause", "Until the next", "", design.between_s)), whole_s)
+    return TrialStrip((*phases, Phase("pause", "Inter-trial", "", design.between_s)), whole_s)
 
 
 FACTS: Final = RowFacts((("Block", "design"),), trial_strip)

@@ -1,4 +1,4 @@
-"""Sentences: their languages side by side, in the width of the form."""
+"""Sentences: their languages side by side, in the width of the form, each shown whole."""
 
 from __future__ import annotations
 
@@ -6,10 +6,18 @@ from typing import Final
 
 from study_app.gui.designer.form.languages_field import LanguagesField
 from study_app.gui.designer.form.special_editor import SpecialEditor
+from study_app.gui.designer.form.typed_fields import TypedSentence
 
 QUESTIONS: Final = ("Statement", "Rating", "Slider", "Number", "Choice", "Text")
 TASKS: Final = ("Explore", "Reach", "Follow")
 DESIGNS: Final = ("Abx", "Adjusted", "Estimation", "ForcedChoice", "Oddity", "Rated", "SameDifferent", "YesNo")
+
+
+class SentencesField(LanguagesField):
+    """A sentence in each language."""
+
+    one = TypedSentence
+
 
 EDITOR: Final = SpecialEditor(
     (
@@ -18,6 +26,6 @@ EDITOR: Final = SpecialEditor(
         *((kind, "instruction") for kind in TASKS),
         *((kind, "question") for kind in DESIGNS),
     ),
-    LanguagesField,
+    SentencesField,
     wide=True,
 )

@@ -62,4 +62,4 @@ class KindField(ChoiceField):
         self._make_room()
 
 
-EDITOR: Final = SpecialEditor(tuple((kind, "kind") for kind in QUESTIONS), KindField, wide=True)
+EDITOR: Final = SpecialEditor(tuple((kind, "kind") for kind in QUESTIONS), KindField, wide=True, labelled=False)
