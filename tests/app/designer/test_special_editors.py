@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QMouseEvent
+from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.authoring.fields import rows
@@ -261,3 +261,40 @@ def test_the_keyboard_stays_in_a_row_that_is_made_anew(qtbot: Any, designer: Any
     assert after is not before
     assert len(after.field.rows) == count - 1
     assert after.isAncestorOf(QApplication.focusWidget())
+
+
+def test_a_question_is_shown_whole_and_typed_as_one_paragraph(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select((*ITEMS, 0))
+    before = designer.text
+    (line,) = designer.row(*ITEMS, 0, "text").field.lines.values()
+    low = line.height()
+    line.setFocus()
+    line.selectAll()
+    QGuiApplication.clipboard().setText(
+        "Would you say\nthat this liquid\nbehaves as a liquid does " + 3 * "which you know "
+    )
+    qtbot.keyClick(line, Qt.Key.Key_V, Qt.KeyboardModifier.ControlModifier)
+    assert designer.text == before
+    qtbot.keyClick(line, Qt.Key.Key_Return)
+    assert "\n" not in line.words()
+    assert designer.editing.opened.study.document["questionnaires"]["liquid"]["items"][0]["text"] == line.words()
+    qtbot.waitUntil(lambda: line.height() > low)
+    assert line.verticalScrollBar().maximum() == 0
+    line.selectAll()
+    qtbot.keyClick(line, Qt.Key.Key_X)
+    qtbot.keyClick(line, Qt.Key.Key_Escape)
+    assert designer.text != before
+    designer.editing.undo()
+    assert designer.text == before
+
+
+def test_rows_below_what_is_seen_are_made_when_the_form_is_painted(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.window.resize(1024, 640)
+    designer.select(("pages", "welcome"))
+    designer.editing.select(("blocks", "liquids"))
+    form = designer.place.form
+    assert len(form._made) < len(form.form.rows)
+    qtbot.waitUntil(lambda: len(form._made) == len(form.form.rows))
+    assert all(row.isVisible() for row in form.rows)

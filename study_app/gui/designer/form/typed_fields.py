@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QEvent, QMimeData, QSize, Qt, QTimer, Signal
@@ -15,7 +16,7 @@ HAND_ON_MS = 150
 CLICK_MS = 10
 """How often it is looked whether the click is done that the keyboard left a field by [ms]."""
 FIELD_PX = 34
-MOST_LINES, SENTENCE_EDGE_PX = 5, 14
+MOST_LINES, SENTENCE_EDGE_PX = 6, 16
 """How many lines a sentence has at most, and what its field needs above and below them [px]."""
 KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
 
@@ -214,16 +215,14 @@ class TypedSentence(TypedText):
         self._fit()
 
     def _fit(self) -> None:
-        block, needed = self.document().firstBlock(), 0
-        layout = self.document().documentLayout()
+        block, needed = self.document().firstBlock(), 0.0
         while block.isValid():
-            layout.blockBoundingRect(block)  # lays it out
-            needed += block.layout().lineCount()
+            needed += self.document().documentLayout().blockBoundingRect(block).height()
             block = block.next()
-        lines = min(MOST_LINES, max(1, needed))
-        scrolls = Qt.ScrollBarPolicy.ScrollBarAsNeeded if lines == MOST_LINES else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        most = MOST_LINES * self.fontMetrics().lineSpacing()
+        scrolls = Qt.ScrollBarPolicy.ScrollBarAsNeeded if needed > most else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
         self.setVerticalScrollBarPolicy(scrolls)
-        self.setFixedHeight(max(FIELD_PX, lines * self.fontMetrics().lineSpacing() + SENTENCE_EDGE_PX))
+        self.setFixedHeight(max(FIELD_PX, min(most, math.ceil(needed)) + SENTENCE_EDGE_PX))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Take the height of the lines."""
