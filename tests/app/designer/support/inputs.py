@@ -55,8 +55,9 @@ class XInput:
                 self.come_forward(shown)
 
     def come_forward(self, window: QWidget) -> None:
-        """Give the keyboard to a window."""
-        subprocess.run(["xdotool", "windowfocus", str(int(window.winId()))], check=False)
+        """Give the keyboard to a window, and put it above the others, as a window manager would."""
+        number = str(int(window.winId()))
+        subprocess.run(["xdotool", "windowraise", number, "windowfocus", number], check=False)
         QTest.qWaitForWindowActive(window, ACTIVE_MS)
 
     @staticmethod
