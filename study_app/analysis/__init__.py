@@ -1,1 +1,1 @@
-"""Understanding results folders; never a live session."""
+"""Analysis of results folders, never of a live session."""

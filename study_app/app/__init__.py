@@ -1,7 +1,7 @@
-"""Where device, servo, store, session, analysis and windows meet: the ways to open the program.
+"""The composition root, where device, servo, store, session, analysis and windows meet.
 
-`main_controller` runs the main window, `session.live_session` one session from its choices to the closed journal;
-`session.entry` starts or resumes a session by command.
+``main_controller`` owns the main window; ``session.live_session`` runs one session from its request to the closed
+journal; ``session.entry`` begins or resumes one by command.
 """
 
 from study_app.gui.display.display_check import missing_library

@@ -1,6 +1,6 @@
-"""The commands: parse words, call one function, give an exit code.
+"""The commands: parse arguments, call one function, return an exit code.
 
-0 done · 1 a bug (with traceback) · 2 something the user can mend (one line) · 3 a check that found something.
+0 done · 1 a bug (with traceback) · 2 a mistake the user can correct (one line) · 3 a check found a problem.
 Each command imports what it needs when it runs, so that ``--help`` loads neither Qt nor the compiler.
 """
 

@@ -20,6 +20,9 @@ GROUPS: Final = {
     "Devices": "devices outlets emulate-falcon",
 }
 
+LONGEST: Final = 150
+"""Characters of a command's first sentence in ``--help``, which wraps it."""
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
@@ -32,8 +35,9 @@ class GroupedCommands(click.Group):
         for heading, names in GROUPS.items():
             listed = [(name, self.commands[name]) for name in names.split()]
             with formatter.section(heading):
-                room = formatter.width - width - 6
-                formatter.write_dl([(name.ljust(width), command.get_short_help_str(room)) for name, command in listed])
+                formatter.write_dl(
+                    [(name.ljust(width), command.get_short_help_str(LONGEST)) for name, command in listed]
+                )
 
 
 class Target(click.Path):

@@ -67,7 +67,7 @@ def _load(point: EntryPoint, known: Container[str]) -> DeviceDescriptor:
     """Return the descriptor at an entry point; a name that is ``known`` already is refused."""
     device = point.load()
     if not isinstance(device, DeviceDescriptor):
-        raise DeviceError(f"{point.value} is no DeviceDescriptor but a {type(device).__name__}")
+        raise DeviceError(f"{point.value} is not a DeviceDescriptor but a {type(device).__name__}")
     if device.name in known:
         raise DeviceError(f"a device named '{device.name}' exists already: give it another name")
     return device

@@ -1,1 +1,1 @@
-"""The force model under test: what accuracy costs in time, where it stays stable, and what a liquid is."""
+"""What the program computes about its model: computation time, expected error, replay, fitted parameters."""

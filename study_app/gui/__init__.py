@@ -1,1 +1,1 @@
-"""Drawing it: windows for operator and participant."""
+"""The windows of operator and participant."""

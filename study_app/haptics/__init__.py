@@ -1,4 +1,4 @@
-"""The force model: what a body feels in a liquid, and the servo that renders it.
+"""The force model: the force on a body in a liquid, and the servo that renders it.
 
 Imports nothing, so that reading a scene (``haptics.model.scene``) never loads the compiler.
 """

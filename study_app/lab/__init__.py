@@ -1,1 +1,1 @@
-"""The liquid lab without its windows: what can be changed, two settings side by side, and what was felt of them."""
+"""The liquid lab without its windows: adjustable parameters, two settings side by side, and their forces."""

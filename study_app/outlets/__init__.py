@@ -1,1 +1,1 @@
-"""What goes to other programs while a session runs: markers of its events, and the servo's samples."""
+"""Output to other programs while a session runs: markers of its events, and the servo's samples."""

@@ -1,1 +1,1 @@
-"""What is to be run: a TOML file becomes a frozen value, the value with participant and seed a schedule."""
+"""Protocols: a TOML file becomes a frozen value; the value, participant and seed give a schedule."""

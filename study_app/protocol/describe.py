@@ -93,7 +93,7 @@ def _head(protocol: Protocol, language: str) -> Iterable[str]:
         ("Expected duration", f"about {spread(minutes)} min"),
         ("Force limit", f"{device.force_limit_n:g} N"),
         ("Servo", f"{device.rate_hz:g} Hz"),
-        ("Tank", f"{sizes} mm of the hand, drawn and felt {scene.scale:g} times as large"),
+        ("Tank", f"{sizes} mm of the hand, {scene.scale:g} times as large in the scene"),
         ("Ball", f"{ball_mm:g} mm, {ball_mm / scene.scale:.3g} mm of the hand"),
     ]
     return (f"{protocol.text(study.title, language)} ({study.name}, version {study.version})", *_aligned(rows))

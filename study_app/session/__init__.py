@@ -1,7 +1,6 @@
 """Running a study without Qt: events in, pages and commands out.
 
-``machine`` decides (its table and ``moves``, over ``state``, with pages from ``compose``). ``runner`` carries out what
-it decided, follows the task (``tasks``) and measures the trial (``statistics``). ``rehearsal`` runs whole sessions with
-a ``simulated`` participant, who explores in ``strokes``. What they exchange are the values of ``events``, ``commands``
-and ``pages``.
+``transitions`` decides (its table over events and state). ``runner`` carries out what it decided, follows the task
+(``tasks``) and measures the trial (``trial_statistics``). ``simulated`` runs whole sessions with simulated
+participants.
 """

@@ -1,7 +1,6 @@
-"""Keeping what happened: journal, receipt, derived tables, recordings, sealed conditions; and proving it.
+"""The files of a study: journals, receipts, tables, recordings, sealed conditions, and their verification.
 
-begin a session: ``session``; while it runs: ``open_session``, ``journal``, ``recorder``; afterwards: ``progress``,
-``resume``, ``rebuild``, ``verify``, ``exclusions``; who may know the conditions: ``blinding``, ``sealing``,
-``unblinding``; what files hold: ``layout``, ``columns``, ``events``, ``recording``, ``receipt``, ``checksums``,
-``dictionary``.
+A session is begun, reopened and rebuilt in ``sessions``; while it runs, ``journals`` and ``recorder`` write its files.
+``progress`` computes from a journal where a session stands; ``tables`` derives rows from it; ``verification`` proves
+that files were not changed; ``blinded`` decides who may know the conditions.
 """

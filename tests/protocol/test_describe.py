@@ -20,7 +20,7 @@ REK = load("rek2024")
         "Blinding           double-blind: the operator sees no force",
         "Expected duration  about 18 min",
         "Force limit        8 N",
-        "100 × 60 × 60 mm of the hand, drawn and felt 10 times as large",
+        "100 × 60 × 60 mm of the hand, 10 times as large in the scene",
         "68 mm, 6.8 mm of the hand",
         "Part 1: Baseline settings (block liquids, main)",
         "Trials       7 trials, another order for each participant",

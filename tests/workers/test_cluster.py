@@ -125,7 +125,7 @@ def silent_program(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 @pytest.mark.parametrize(
     ("address", "said"),
     [
-        ("localhost", "'localhost' is no address of a Dask scheduler: give tcp://HOST:PORT"),
+        ("localhost", "'localhost' is not the address of a Dask scheduler: give tcp://HOST:PORT"),
         ("http://127.0.0.1:8786", "give tcp://HOST:PORT"),
         ("tcp://127.0.0.1:port", "give tcp://HOST:PORT"),
         ("tcp://127.0.0.1:99999", "no Dask scheduler answers at tcp://127.0.0.1:99999"),

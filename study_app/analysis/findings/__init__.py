@@ -1,4 +1,4 @@
-"""What is asked of the answers of a block: a module a finding, whose ``FINDING`` says all that the others need.
+"""The questions asked of the answers of a block: one module per finding, described by its ``FINDING``.
 
 Modules of folders in this one, such as ``factors``, are findings, too.
 """

@@ -1,1 +1,1 @@
-"""The report: what was found, in words, tables and figures, with everything that is needed to doubt it."""
+"""The report: findings in words, tables and figures, with everything needed to check them."""

@@ -32,7 +32,7 @@ def block(
         yield (
             bullets(missing(found))
             if untested
-            else paragraph("Nobody's answers count yet: there is nothing to test or to draw.")
+            else paragraph("No answers count yet: there is nothing to test or to plot.")
         )
         return
     held = Failures() if failures is None else failures

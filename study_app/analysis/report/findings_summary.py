@@ -74,7 +74,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if study.simulated:
         yield "These participants were SIMULATED: nothing here is evidence about people."
     if study.pilot:
-        yield "These are pilot sessions: nothing here belongs into the results of the study."
+        yield "These are pilot sessions: nothing here belongs in the results of the study."
     if not decided.made:
         yield (
             "The protocol decided nothing about the analysis beforehand (it has no table [analysis]): everything "
@@ -86,12 +86,12 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "the first session's decisions are used."
         )
     if study.n == 1:
-        yield "One participant: whatever is shown is about this person alone, and says nothing about anybody else."
+        yield "One participant: all results concern this person alone, and do not generalise to others."
     if study.n < FEW and results.blocks:
         people = counted(study.n, "participant")
         yield (
             f"{people[:1].upper()}{people[1:]}: below {FEW} no bootstrap interval and no mixed model is given, since "
-            "they do not hold there. What is not shown here may well be there."
+            "they do not hold there. An effect that is not shown here may well exist."
         )
 
 

@@ -31,7 +31,7 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
     quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
     yield (
         f"Answers were given on scales of seven points and are taken as ordinal: medians, quartiles ({quartiles}), "
-        "never means, except in the test of equivalence, which is about the mean difference."
+        "never means, except in the test of equivalence, which concerns the mean difference."
     )
     for found in blocks:
         yield from said_of_presentations(found)
@@ -86,9 +86,9 @@ def _presented(study: Study, results: Results) -> str:
         asked = f", each followed by {counted(len(found.items), 'statement')}"
         parts.append(f"{counted(len(found.settings), noun)}{delays} {words}".strip() + asked)
     blind = (
-        "known by codes alone until the key was opened" if study.revealed else "known by codes, the key being sealed"
+        "they were known only by codes until the key was opened" if study.revealed else "they are known only by codes"
     )
-    return f"Presented were {'; '.join(parts)}; {blind}."
+    return f"The study presented {'; '.join(parts)}; {blind}."
 
 
 def _common(results: Results, blocks: list[BlockFound]) -> Iterator[str]:
@@ -96,16 +96,16 @@ def _common(results: Results, blocks: list[BlockFound]) -> Iterator[str]:
     if decided.binding:
         which = "all statements were primary" if not decided.primary else f"primary: {', '.join(decided.primary)}"
         yield (
-            f"Decided before the first session: alpha = {decided.alpha:g}, {which}; different questions are not "
-            "corrected for each other."
+            f"These decisions were made before the first session: alpha = {decided.alpha:g}, {which}. "
+            "Different questions are not corrected for each other."
         )
     elif decided.made:
         yield (
-            "The decisions about the analysis changed between sessions: all results are exploratory, by the decisions "
-            f"of the first session (alpha = {decided.alpha:g})."
+            "The decisions about the analysis changed between sessions, so all results are exploratory; those of the "
+            f"first session were used (alpha = {decided.alpha:g})."
         )
     else:
-        yield f"Nothing was decided beforehand: all results are exploratory, at {decided.alpha:g}."
+        yield f"No decisions were made beforehand: all results are exploratory, with alpha = {decided.alpha:g}."
     for finding in all_findings():
         yield from finding.common_methods(blocks)
     measured = results.performance

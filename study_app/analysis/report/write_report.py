@@ -237,12 +237,13 @@ def _again(study: Study, results: Results) -> Iterator[str]:
         yield table(("File", "SHA-256"), list(hashes.items()), words=2)
     yield paragraph(
         f"The numbers come from {counted(len(hashes), 'file')}; SHA-256 over their hashes and names: "
-        f"{together.hexdigest()}. Each one's hash, and every session's seed, stands in report.json."
+        f"{together.hexdigest()}. Each one's hash, and every session's seed, is in report.json."
     )
     yield paragraph(
-        "Beside this page: report.json (every number), tests.csv (a row a test), motion.csv, the tables of responses, "
-        "trials and aggregates with their codebook, every figure as PNG, SVG and PDF with its caption, methods.txt, "
-        f"and report.R, which computes the main numbers again in base R. Made by liquid-study {__version__}.",
+        "Files next to this page: report.json (every number), tests.csv (one row per test), motion.csv, the tables of "
+        "responses, trials and aggregates with their codebook, every figure as PNG, SVG and PDF with its caption, "
+        "methods.txt, and report.R, which computes the main numbers again in base R. "
+        f"Made by liquid-study {__version__}.",
         "soft",
     )
 

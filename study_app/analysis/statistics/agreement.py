@@ -46,7 +46,7 @@ def kappa(table: ArrayLike) -> Kappa:
     counts = checked(table, "categories of one, categories of the other")
     if counts.shape[0] != counts.shape[1] or not (counts >= 0).all():
         raise AnalysisError(
-            f"a table of shape {counts.shape} is no square table of counts; give one row and column each"
+            f"a table of shape {counts.shape} is not a square table of counts: give one row and one column per category"
         )
     n = int(counts.sum())
     if n == 0:

@@ -54,6 +54,6 @@ def check_there(study: StudyFolder, trials: pd.DataFrame, listed: Sequence[Exclu
     for one in listed:
         if (one.participant, one.session) not in sessions or (one.trial is not None and one.what not in presented):
             raise AnalysisError(
-                f"{study.exclusions} leaves out {named(one)}, which is not there: mend or remove the row, lest "
-                "something counts that should not"
+                f"{study.exclusions} excludes {named(one)}, which does not exist: correct or remove the row, so "
+                "that the intended data are excluded"
             )

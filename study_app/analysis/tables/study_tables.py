@@ -334,8 +334,8 @@ def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
 def _no_sessions(path: Path) -> str:
     if not path.is_dir():
         return (
-            f"{path} is no folder: give a study's folder, such as results/rek2024, or a name that liquid-study studies "
-            "lists"
+            f"{path} is not a folder: give a study's folder, such as results/rek2024, or a name that "
+            "liquid-study studies lists"
         )
     inside = sorted(found.name for found in path.iterdir() if found.is_dir() and StudyFolder(found).sessions())
     if inside:

@@ -49,7 +49,7 @@ def _file(path: Path, columns: tuple[Column, ...]) -> Any:
         data = read_regular(path)
     except OSError as error:
         why = error.strerror or type(error).__name__
-        raise AnalysisError(f"{path} cannot be read ({why}): {again(path)}, or mend the permissions") from error
+        raise AnalysisError(f"{path} cannot be read ({why}): {again(path)}, or correct its permissions") from error
     table = _unquoted(data, path, columns)
     return table if table is not None else _parsed(data, path, columns)
 

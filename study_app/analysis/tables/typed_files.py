@@ -75,7 +75,7 @@ def document(path: Path) -> dict[str, Any]:
 def unreadable(path: Path, error: OSError) -> AnalysisError:
     """Return the error for a file that cannot be read."""
     why = error.strerror or type(error).__name__
-    return AnalysisError(f"{path} cannot be read ({why}): restore it from a copy, or mend the permissions")
+    return AnalysisError(f"{path} cannot be read ({why}): restore it from a copy, or correct its permissions")
 
 
 def _typed(cells: Any, columns: tuple[Column, ...], paths: Sequence[Path], lengths: Sequence[int]) -> pd.DataFrame:

@@ -1,7 +1,7 @@
 """Pictures of every window in both themes, taken of the real program: a rehearsed study, a session, the lab.
 
-Windows are opened without a screen, sessions are held with the scripted hand, and what one sees is grabbed as it is
-painted. Everything lies in a folder that is gone afterwards; the user's settings are not touched.
+Windows are opened without a screen, and sessions are run with the scripted hand. All files are in a temporary folder;
+the user's settings are not changed.
 """
 
 from study_app.app.screenshots.screenshots import screenshots

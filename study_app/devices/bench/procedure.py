@@ -241,5 +241,5 @@ def _grams(answer: str) -> float:
         return float(answer.replace(",", ".").removesuffix("g").strip())
     except ValueError:
         raise DeviceError(
-            f"'{answer}' is no reading of a scale, so the bench was ended: type grams, such as 102"
+            f"'{answer}' is not a reading of a scale, so the bench was ended: type grams, such as 102"
         ) from None

@@ -1,7 +1,7 @@
-"""The Novint Falcon: a driver in layers, and an emulator to put in front of it.
+"""The Novint Falcon: a driver in layers, and an emulator.
 
-From the wire to the hand: ``wire`` (numbers of the protocol), ``packets`` (bytes and what they mean), ``transport``
-(the USB bridge), ``firmware`` and ``boot`` (the program it needs after power-up), ``kinematics`` (angles, positions,
-torques), ``exchange`` (the compiled tick), ``device`` (homing, lights, the gate before any force), ``guard`` (zero
-torque when the program dies), ``calibration`` (motor units a newton). ``emulator`` answers as a Falcon would.
+``wire`` (constants, packets and replies of the protocol), ``transport`` (the USB bridge), ``firmware`` and ``boot``
+(loading the firmware after power-up), ``mechanics`` (geometry, kinematics, calibration), ``exchange`` (the compiled
+tick), ``device`` and ``homing`` (opening, lights, no force before homing), ``guard`` (zero torque when the program
+dies). ``emulator`` answers as a Falcon would.
 """

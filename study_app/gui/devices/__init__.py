@@ -1,1 +1,1 @@
-"""What can be felt with on this machine, and what is wrong with it."""
+"""Devices: the haptic and input devices of this machine, and their diagnosis."""

@@ -1,1 +1,1 @@
-"""Home: which studies there are, which sessions were held, and the way into the next."""
+"""Home: the studies, the recorded sessions, and the start of the next one."""

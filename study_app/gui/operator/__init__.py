@@ -1,6 +1,6 @@
-"""The operator's window: where we are, whether it is healthy, and what the operator can do.
+"""The operator's window: progress of the session, health of servo and screen, and the operator's actions.
 
-The window is loaded when it is asked for: what it says of a session is needed where nothing is plotted.
+The window is imported when it is first used, since other places need its texts without plots.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Before a session: what was found, and whether to begin."""
+"""Pre-flight: the checks before a session, and whether to begin."""
 
 from study_app.gui.preflight.window import PreflightWindow
 

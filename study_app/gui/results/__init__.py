@@ -1,1 +1,1 @@
-"""Results: which sessions count, what they say, and how to hand it on."""
+"""Results: which sessions count, their figures, and exports."""

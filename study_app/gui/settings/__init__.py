@@ -1,1 +1,1 @@
-"""What this machine is like, set by its operator: screens, distance, text, display offset, device, folders."""
+"""Settings of this machine: screens, distance, text, display offset, device, folders."""

@@ -1,1 +1,1 @@
-"""A liquid's drag coefficient and wake from a stream of measured force, estimated while it comes."""
+"""A liquid's drag coefficient and wake, estimated while force is measured."""

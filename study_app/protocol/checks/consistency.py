@@ -168,8 +168,8 @@ def unfelt(parts: Draft) -> Iterator[Fault]:
                 yield Fault(
                     ("blocks", name, "conditions", index),
                     f'"{condition}" exerts {exerted_n:.2g} N in the fastest stroke of task "{block.task}" '
-                    f"({stroke.speed_mps:.2g} m/s), less than {LEAST_N:g} N: nothing is felt",
-                    "call for effects such as drag, or raise density, scale or the ball's diameter",
+                    f"({stroke.speed_mps:.2g} m/s), less than {LEAST_N:g} N: it cannot be perceived",
+                    "select effects such as drag, or raise density, scale or the ball's diameter",
                 )
 
 

@@ -91,7 +91,7 @@ def _between(merged: Merged, found: Gathered) -> None:
                 found.error(session.path, f"is a copy of {twin.relative_to(merged.path).as_posix()}: it counts twice")
             seen[begun] = session.path
     for path in unlisted(merged):
-        found.warning(path, f"is no site that {merged.manifest.name} lists, and does not count")
+        found.warning(path, f"is not a site that {merged.manifest.name} lists, so it is ignored")
     for path in temporaries(merged.path):
         found.warning(path, "is an incomplete file of a program that was ended, or is being written")
 

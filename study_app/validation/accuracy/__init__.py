@@ -1,1 +1,1 @@
-"""What accuracy costs in time: ladders of models against truths computed independently, and the clock."""
+"""Accuracy over computation time: models compared with independently computed references."""

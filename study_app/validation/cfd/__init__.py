@@ -1,6 +1,6 @@
-"""A ball in a viscous liquid by a fluid solver: a truth for the force that none of our models had a part in.
+"""The force on a ball in a viscous liquid by a fluid solver, a reference that is independent of our models.
 
-``case`` says which liquids and motions, ``flow`` solves them (with the extra ``cfd``), ``solve`` checks and stores what
-comes out: the ``*.csv`` in this folder, which are read by ``tables`` without the extra. ``fitted`` fits models to
-them, ``compared`` says in words and ``drawn`` in a figure how well they do.
+``cases`` has the liquids and motions, ``flow`` solves them (with the extra ``cfd``), ``solver`` checks and stores the
+results: the ``*.csv`` in this folder, which ``stored_flows`` reads without the extra. ``fits`` and ``law_fit`` fit
+models to them; ``model_comparison`` and ``flow_figure`` report how well they agree.
 """

@@ -1,1 +1,1 @@
-"""The evidence about outlets: what arrives in another process, and what it costs the servo."""
+"""The evidence about outlets: what arrives in another process, and its cost to the servo."""

@@ -1,1 +1,1 @@
-"""The servo for hours or days, in every fault there is, and what drifted, leaked or broke."""
+"""The servo for hours or days with every kind of fault: drift, leaks and failures."""

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    assert "nowhere is no folder" in refusal(tmp_path / "nowhere")
+    assert "nowhere is not a folder" in refusal(tmp_path / "nowhere")
 
 
 def test_an_empty_or_foreign_folder_is_refused(tmp_path: Path) -> None:

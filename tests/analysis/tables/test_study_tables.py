@@ -229,9 +229,9 @@ def test_reasons_of_session_and_trial_stand_beside_each_other_and_none_excludes_
 @pytest.mark.parametrize(
     ("excluded", "says"),
     [
-        ({"participant": "P010"}, "participant P010, session 1, which is not there"),
-        ({"participant": "P001", "session": 2}, "participant P001, session 2, which is not there"),
-        ({"participant": "P001", "trial": 99}, "participant P001, session 1, trial 99, which is not there"),
+        ({"participant": "P010"}, "participant P010, session 1, which does not exist"),
+        ({"participant": "P001", "session": 2}, "participant P001, session 2, which does not exist"),
+        ({"participant": "P001", "trial": 99}, "participant P001, session 1, trial 99, which does not exist"),
     ],
 )
 def test_excluding_what_is_not_there_is_refused(rek: Results, excluded: dict, says: str) -> None:

@@ -45,7 +45,7 @@ def decided(keys: str) -> tuple[str, str]:
     return "[pages.hello]", DECIDED.replace("names", f"{keys}\nnames") + "[pages.hello]"
 
 
-FELT = ("blocks.feel.conditions", "less than 0.01 N: nothing is felt")
+FELT = ("blocks.feel.conditions", "less than 0.01 N: it cannot be perceived")
 
 # name of the case, (old, new) text, place of the fault, words of its line
 IMPOSSIBLE: tuple[tuple[str, tuple[str, str], str, str], ...] = (

@@ -227,7 +227,7 @@ def test_a_killed_merge_leaves_the_old_state_or_the_new_one(exists: bool, labs: 
 def test_what_is_no_listed_site_does_not_count_and_is_named(labs: dict[str, Path], pooled: Path) -> None:
     shutil.copytree(labs["C"], pooled / "sites/C")
     assert len(participants_of(pooled)) == 4
-    assert "sites/C: is no site that sites.json lists" in "\n".join(map(str, verify_folder(pooled).warnings))
+    assert "sites/C: is not a site that sites.json lists" in "\n".join(map(str, verify_folder(pooled).warnings))
 
 
 def test_verify_finds_what_was_changed_after_merging(labs: dict[str, Path], pooled: Path) -> None:

@@ -174,7 +174,7 @@ def hang(grip: Grip, weight_n: float, ask: Ask) -> Notes:
         ask("hang", f"Hang the weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g on the grip, and let it hang still.")
     )
     notes += _round(grip, weight_n)
-    grip.wait(ask("take-off", "Take the weight off and hold the grip: it goes limp now."))
+    grip.wait(ask("take-off", "Take the weight off and hold the grip: its motors are turned off now."))
     return _noted(notes)
 
 
@@ -202,7 +202,7 @@ def pull(grip: Grip, ask: Ask) -> Notes:
         counts, units = grip.weigh()
         notes.append((counts, _read_scale(grip, ask), units))
         grip.wait(ask("let-go", "Take the scale off, and let go."))
-    grip.wait(ask("take-off", "Hold the grip: it goes limp now."))
+    grip.wait(ask("take-off", "Hold the grip: its motors are turned off now."))
     return _noted(notes)
 
 
@@ -217,7 +217,7 @@ def _read_scale(grip: Grip, ask: Ask) -> float:
             load_n = -1.0
         if 0.0 < load_n <= MOST_N:
             return load_n
-        words = f"'{reading}' is no reading of the scale in grams, more than 0 and up to 600. What did it show?"
+        words = f"'{reading}' is not a reading of the scale in grams, above 0 and up to 600. What did it show?"
 
 
 def _noted(notes: list[tuple[Any, float, Any]]) -> Notes:

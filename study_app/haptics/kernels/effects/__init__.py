@@ -1,1 +1,1 @@
-"""The contributions to the force, one file each: equation and source in the docstring, the kernel under it."""
+"""Contributions to the force, one file each: a kernel, with equation and source in its docstring."""

@@ -1,4 +1,4 @@
-"""The effects: one descriptor a module, found by importing every module of this folder."""
+"""The effects: one descriptor per module, found by importing every module of this folder."""
 
 from __future__ import annotations
 

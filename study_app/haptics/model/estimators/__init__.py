@@ -1,4 +1,4 @@
-"""The velocity estimators: one descriptor a module, found by importing every module of this folder."""
+"""The velocity estimators: one descriptor per module, found by importing every module of this folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What special editors show beyond the value of their row: one module each, with a `RowFacts` named ``FACTS``."""
+"""What special editors show besides the value of their row: one module each, with a `RowFacts` named ``FACTS``."""
 
 from __future__ import annotations
 
