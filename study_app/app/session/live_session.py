@@ -24,9 +24,10 @@ from study_app.app.devices_controller import diagnosis
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.termination import BY_SIGNAL_S, ended_from_outside
 from study_app.app.workstation_controller import described, screen_number, settings_here, text_scale_on
+from study_app.authoring.versions.contents import keep_content
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
-from study_app.errors import SessionError, StudyError
+from study_app.errors import SessionError, StoreError, StudyError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.home.startup_window import OpeningWindow
@@ -256,6 +257,9 @@ class LiveSession(QObject):
         operator = make_cockpit(chosen, protocol, rig, self.theme)
         yield  # the last one: no session is on the disk without its windows
         self._store = open_store(chosen, protocol, source, rig, screens, made.masking, made.outlets, made.videos)
+        if not chosen.played:
+            with suppress(StoreError):  # only the designer's comparisons would miss it
+                keep_content(source)
         self._crash_trace = CrashTrace(self._store.folder.crash)
         self._store.append("preflight", checks=[one.entry for one in found])
         protocol = self._store.as_recorded(protocol)

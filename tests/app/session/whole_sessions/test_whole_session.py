@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import threading
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
@@ -15,6 +16,7 @@ from PySide6.QtTest import QTest
 
 from study_app import app
 from study_app.app.session import live_session, termination
+from study_app.authoring.versions.contents import kept_content
 from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError, StudyError
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.operator import OperatorWindow
@@ -69,6 +71,7 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
     receipt = json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())
     assert receipt["screens"]["participant"]["number"] == 1
     assert receipt["operator"] == "AK"
+    assert kept_content(receipt["protocol_hash"]) == Path(short_demo).read_bytes()
     assert receipt["device"]["name"] == device
     assert ("The Falcon is ready (green light)." in lines) == (device == "falcon-emulated")
     assert receipt["status"] == "completed"
