@@ -73,6 +73,7 @@ class MainWindow(QMainWindow):
         self.stack.addWidget(self._waiting)
         whole = QWidget()
         whole.setProperty("role", "window")
+        whole.setAccessibleName("Liquid Study")
         row = QHBoxLayout(whole)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(0)

@@ -6,11 +6,12 @@ import time
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtGui import QAccessible, QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
+from study_app.gui.widgets.accessible import give_role
 from study_app.gui.widgets.cards import Logo
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
@@ -69,6 +70,7 @@ class OpeningWindow(QWidget):
         self._done = False
         self._said = False
         apply_theme(self, theme)
+        give_role(self, QAccessible.Role.Window)
 
     def _tell(self) -> None:
         seconds = self._now_s() - self._since_s

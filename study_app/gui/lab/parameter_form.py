@@ -27,7 +27,7 @@ class SectionBlock(QWidget):
         self.rows: dict[str, ParameterRow] = {}
         self.count = label("", "small", "text2")
         head = QHBoxLayout()
-        head.addWidget(label(title, "strong"))
+        head.addWidget(label(title, "strong", heading=True))
         head.addStretch()
         head.addWidget(self.count)
         self._grid = QGridLayout()

@@ -78,6 +78,7 @@ class LabPlace(Place):
         self.setProperty("role", "window")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.setAccessibleName("Liquid lab")
         self.setMinimumSize(LEAST)
         self._view: LabView | None = None
         self._wide: bool | None = None

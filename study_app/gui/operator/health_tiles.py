@@ -47,7 +47,8 @@ class TileCard(Card):
         self.line.show_text(tile.line)
         self.sign.show_icon(*VERDICTS[tile.verdict])
         words = {"ok": "within limits", "late": "outside limits", "open": "not measured yet"}
-        self.setAccessibleName(f"{tile.title}: {tile.value} {tile.unit}, {words[tile.verdict]}, {tile.line}")
+        value = f"{tile.value} {tile.unit}".strip()
+        self.setAccessibleName(f"{tile.title}: {value}, {words[tile.verdict]}, {tile.line}")
 
 
 class Tiles(QWidget):

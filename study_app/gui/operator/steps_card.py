@@ -57,7 +57,8 @@ class StepLine(Themed, QWidget):
         self.name.setFont(font("body", weight=600 if row.state == "now" else 400, scale=0.94))
         set_ink(self.name, "text2" if row.state == "open" else "text")
         set_ink(self.note, "accent" if row.state == "now" else "text2")
-        self.setAccessibleName(f"{row.label}, {row.state} {row.note}".strip())
+        note = "" if row.note == row.state else row.note
+        self.setAccessibleName(f"{row.label}, {row.state} {note}".strip())
         self.setToolTip(f"{row.label}  ·  {row.note}" if row.note else row.label)
         self.update()
 

@@ -161,6 +161,7 @@ class ParticipantWindow(QWidget):
 
     def open_on(self, screen: QScreen | None = None) -> None:
         """Open the window on ``screen`` (or where the system puts it), full-screen unless windowed."""
+        give_role(self, QAccessible.Role.Window)  # again: what was connected to its methods since has taken it away
         if screen is not None:
             self.setScreen(screen)
             self.move(screen.geometry().topLeft())

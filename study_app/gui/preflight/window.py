@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtGui import QAccessible, QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from study_app.gui.preflight.check_rows import CheckRow
 from study_app.gui.preflight.masking_question import MaskingQuestion
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
-from study_app.gui.widgets.accessible import describe_plot
+from study_app.gui.widgets.accessible import describe_plot, give_role
 from study_app.gui.widgets.cards import Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
@@ -65,6 +65,7 @@ class PreflightWindow(QWidget):
         self.again.clicked.connect(self.again_asked)
         self.start.clicked.connect(self._start)
         apply_theme(self, theme)
+        give_role(self, QAccessible.Role.Window)
         self.start.setFocus()
 
     def _lay_out(self) -> None:

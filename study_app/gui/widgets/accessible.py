@@ -14,6 +14,7 @@ def give_role(widget: QWidget, role: QAccessible.Role) -> None:
     """Give ``widget`` a role that Qt does not give to its class; its accessible name and description stay its own.
 
     Qt owns the interface and deletes it with the widget; Python's reference must outlive it, or it is deleted twice.
+    Call it last: Qt forgets the role once a signal is connected to a method that the widget's class has in Python.
     """
     if len(_given) >= _PRUNED_FROM:
         _given[:] = [one for one in _given if shiboken6.isValid(one)]
@@ -32,8 +33,8 @@ def describe_plot(plot: QWidget, name: str, sentence: str) -> None:
 class HeadingLabel(QLabel):
     """A label that is a heading to a screen reader."""
 
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
+    def __init__(self, text: str, parent: QWidget | None = None) -> None:
+        super().__init__(text, parent)
         self.setAccessibleName(text)
         give_role(self, QAccessible.Role.Heading)
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPoint, QRectF, QSize, Qt
+from PySide6.QtCore import QEvent, QPoint, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QCheckBox,
     QComboBox,
+    QLabel,
     QPushButton,
     QRadioButton,
     QSpinBox,
@@ -144,12 +145,27 @@ class IconButton(Themed, PressedByEnter):
 class Choice(Themed, QComboBox):
     """A list to choose one from, with its chevron; the wheel scrolls the page, never the choice.
 
-    A word too long for the field ends in "…", whole in the list and in the tip.
+    A word too long for the field ends in "…", whole in the list and in the tip. On Linux, screen readers take the
+    choice for its name, and what it is a choice of from a label alone: so it has one that nobody sees.
     """
 
     def __init__(self) -> None:
         super().__init__()
+        self._named = QLabel()
         self.setItemDelegate(QStyledItemDelegate(self))  # the theme gives the list's lines their height
+
+    def setAccessibleName(self, name: str) -> None:  # noqa: N802 - Qt's name
+        """Name the choice, in its label too."""
+        super().setAccessibleName(name)
+        self._named.setText(name)
+        self._named.setBuddy(self)
+
+    def event(self, event: QEvent) -> bool:
+        """Keep the label next to it."""
+        if event.type() == QEvent.Type.ParentChange:
+            self._named.setParent(self.parentWidget())
+            self._named.hide()
+        return super().event(event)
 
     def showPopup(self) -> None:  # noqa: N802 - Qt's name
         """Open the list, as wide as its longest words."""

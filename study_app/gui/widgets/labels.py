@@ -5,20 +5,22 @@ from __future__ import annotations
 from typing import Literal, TypeAlias
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QFontMetricsF, QResizeEvent, QTextLayout
+from PySide6.QtGui import QAccessible, QFontMetricsF, QResizeEvent, QTextLayout
 from PySide6.QtWidgets import QLabel, QSizePolicy
 
 from study_app.gui.theme.theme import TypeRole, font
-from study_app.gui.widgets.accessible import HeadingLabel
+from study_app.gui.widgets.accessible import HeadingLabel, give_role
 
 HEADINGS: frozenset[TypeRole] = frozenset({"display", "title", "title_dense", "card"})
 """The type roles of headings, for people who see them and for screen readers."""
 Ink: TypeAlias = Literal["text", "text2", "text3", "ok", "warn", "bad", "accent"]
 
 
-def label(text: str = "", role: TypeRole = "body", ink: Ink = "text", *, wraps: bool = False) -> QLabel:
-    """Return a label in the type ``role`` and the colour role ``ink``."""
-    made = HeadingLabel(text) if role in HEADINGS else QLabel(text)
+def label(
+    text: str = "", role: TypeRole = "body", ink: Ink = "text", *, wraps: bool = False, heading: bool | None = None
+) -> QLabel:
+    """Return a label in the type ``role`` and the colour role ``ink``; by default titles are headings."""
+    made = HeadingLabel(text) if (role in HEADINGS if heading is None else heading) else QLabel(text)
     made.setTextFormat(Qt.TextFormat.PlainText)
     made.setFont(font(role))
     made.setProperty("role", ink)
@@ -32,7 +34,7 @@ def label(text: str = "", role: TypeRole = "body", ink: Ink = "text", *, wraps: 
 
 def figures(text: str = "", role: TypeRole = "label", ink: Ink = "text") -> QLabel:
     """Return a label whose figures share one width, for numbers that change or stand in a column."""
-    made = label(text, role, ink)
+    made = label(text, role, ink, heading=False)
     made.setFont(font(role, tabular=True))
     return made
 
@@ -46,6 +48,8 @@ class Elided(QLabel):
         self.setFont(font(role))
         self.setProperty("role", ink)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        if role in HEADINGS:
+            give_role(self, QAccessible.Role.Heading)
         self.whole = ""
 
     def show_text(self, text: str) -> None:

@@ -62,7 +62,8 @@ class Plot(Themed, pg.GraphicsView):
     def __init__(self) -> None:
         super().__init__(background=LIGHT.surface)
         self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        for part in (self, self.viewport()):
+            part.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.box = pg.ViewBox(enableMenu=False, enableMouse=False, defaultPadding=0)
         self.axes = {side: pg.AxisItem(side) for side in ("left", "bottom")}

@@ -6,8 +6,9 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAccessible
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 
+from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.lab.lab_plots import ForceCard as LabForceCard
 from study_app.gui.lab.lab_plots import SpeedCard
 from study_app.gui.operator.force_plots import ForceCard
@@ -16,7 +17,8 @@ from study_app.gui.participant.pages import screen_reader
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.sessions.motion_plots import MotionPlot
-from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.controls import Choice
+from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.gui.widgets.live_plots import Plot
 from study_app.protocol.wording.languages import words
 from tests.gui.small import ManualClock, questionnaire, text_page
@@ -102,6 +104,50 @@ def test_a_chosen_answer_is_announced_as_checked(participant, monkeypatch):
     QTest.keyClick(row, Qt.Key.Key_3)
     assert (QAccessible.Event.Focus, "3 Somewhat disagree", True) in told
     participant.close()
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: PreflightWindow(2000.0), lambda: OpeningWindow("Preparing demo", "Participant P001")]
+)
+def test_windows_before_a_session_are_windows(qtbot, make):
+    window = make()
+    qtbot.addWidget(window)
+    assert told_of(window).role() == QAccessible.Role.Window
+
+
+def test_the_participants_window_stays_one_whatever_is_connected_to_it(participant):
+    button = QPushButton()
+    button.clicked.connect(participant.come_forward)
+    participant.open_on()
+    assert told_of(participant).role() == QAccessible.Role.Window
+    participant.close()
+
+
+def test_the_title_of_questions_is_a_heading_and_a_number_is_none(qtbot, participant):
+    participant.show_page(questionnaire())
+    labels = participant.widget.findChildren(QLabel)
+    headings = [one.text() for one in labels if told_of(one).role() == QAccessible.Role.Heading]
+    assert headings == [participant.widget.accessibleName()]
+    clock = figures("0:03", "card")
+    qtbot.addWidget(clock)
+    assert told_of(clock).role() == QAccessible.Role.StaticText
+    card = Elided("card")
+    qtbot.addWidget(card)
+    card.show_text("A first look")
+    assert told_of(card).role() == QAccessible.Role.Heading
+    assert told_of(card).text(QAccessible.Text.Name) == "A first look"
+
+
+def test_a_choice_is_labelled_by_what_it_is_of(qtbot):
+    window = QWidget()
+    qtbot.addWidget(window)
+    choice = Choice()
+    choice.setAccessibleName("Sessions shown")
+    choice.addItem("Participants (0)")
+    choice.setParent(window)
+    window.show()
+    labels = [one for one in window.findChildren(QLabel) if one.buddy() is choice]
+    assert [(one.text(), one.isVisible()) for one in labels] == [("Sessions shown", False)]
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from study_app.gui.participant.pages.page_widget import PageWidget, beginning
 from study_app.gui.participant.pages.progress_line import ProgressLine
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.widgets.accessible import HeadingLabel
 from study_app.protocol.forms.show_if import shown
 from study_app.protocol.questions.question import ItemView
 from study_app.session.pages import QuestionnairePage
@@ -58,7 +59,7 @@ class QuestionsPage(PageWidget):
         self.setAccessibleName(page.title)
         self.setAccessibleDescription(page.intro)
         self._progress = ProgressLine(page.progress, words, ANSWERING, self)
-        self._title, self._intro = QLabel(page.title, self), QLabel(page.intro, self)
+        self._title, self._intro = HeadingLabel(page.title, self), QLabel(page.intro, self)
         self._intro.setWordWrap(True)
         self._intro.setVisible(bool(page.intro))
         for label, ink in ((self._title, PARTICIPANT.text), (self._intro, PARTICIPANT.text2)):
