@@ -53,28 +53,26 @@ def aggregate(
         ``COLUMNS``. ``n`` counts valid answers, ``participants`` the people who gave them; ``median``, ``q1``, ``q3``
         and ``agree_percent`` (levels 5 to 7) are NaN without any.
     """
-    groups = dict(iter(answers.groupby(["code", "item"], sort=False)))
-    empty = answers.iloc[:0]
-    rows = [
-        {
-            "code": code,
-            "item": item,
-            "presented_excluded": excluded.get(code, 0),
-            **_measures(groups.get((code, item), empty), presented.get(code, 0)),
-        }
-        for code in codes
-        for item in items
-    ]
+    groups = answers.groupby(["code", "item"], sort=False).indices
+    filled = answers["response"].astype("Float64").to_numpy(na_value=np.nan)
+    responses = np.asarray(filled, dtype=np.float64)
+    cannot_judge = answers["cannot_judge"].astype("boolean").to_numpy(dtype=bool, na_value=False)
+    people, nowhere = answers["participant"].to_numpy(), np.zeros(0, np.intp)
+    rows = []
+    for code in codes:
+        for item in items:
+            at = groups.get((code, item), nowhere)
+            measured = _measures(responses[at], people[at], int(cannot_judge[at].sum()), presented.get(code, 0))
+            rows.append({"code": code, "item": item, "presented_excluded": excluded.get(code, 0), **measured})
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _measures(group: pd.DataFrame, presented: int) -> dict[str, float]:
-    valid = group[group["response"].notna()]
-    values = valid["response"].to_numpy(dtype=float)
-    cannot_judge = int(group["cannot_judge"].sum())
+def _measures(responses: Array, people: NDArray[Any], cannot_judge: int, presented: int) -> dict[str, float]:
+    there = ~np.isnan(responses)
+    values = responses[there]
     q1, median, q3 = quartiles(values)
     return {
-        "participants": valid["participant"].nunique(),
+        "participants": len(set(people[there])),
         "presented": presented,
         "n": len(values),
         "cannot_judge": cannot_judge,
