@@ -7,6 +7,7 @@ u is an adaptive Gauss-Hermite quadrature around each participant's mode; Liu & 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -110,7 +111,7 @@ def log_likelihood(values: Array, answers: Answers, nodes: int = NODES) -> tuple
     sd = float(values[-1])
     counts = np.diff(np.append(answers.starts, len(eta)))
     mode, curvature = _modes(cut, eta, sd, answers.level, answers.starts)
-    places, weights = np.polynomial.hermite.hermgauss(nodes)
+    places, weights = _quadrature(nodes)
     u = mode[:, None] + np.sqrt(2 / curvature)[:, None] * places
     at = np.repeat(u, counts, axis=0)
     parts = _cells(cut, eta[:, None] + sd * at, answers.level)
@@ -121,22 +122,37 @@ def log_likelihood(values: Array, answers: Answers, nodes: int = NODES) -> tuple
     return total, _gathered(parts, posterior, answers, at)
 
 
+@lru_cache
+def _quadrature(nodes: int) -> tuple[Array, Array]:
+    """Return places and weights of the Gauss-Hermite quadrature."""
+    places, weights = np.polynomial.hermite.hermgauss(nodes)
+    return places, weights
+
+
 def _cells(cut: Array, eta: Array, level: Whole) -> tuple[Array, Array, Array, Array, Array]:
     """Return log P of each answer (n, nodes) and its derivatives by η (first, second), upper and lower threshold.
 
     P = F(u) − F(l) is formed as F(u) (1 − F(l)) (1 − e^(l − u)), which does not cancel.
     """
-    ends = np.concatenate([[-ENDLESS], cut, [ENDLESS]])
+    ends = _ends(cut)
     low, up = ends[level][:, None] - eta, ends[level + 1][:, None] - eta
     part = -np.expm1(-(ends[level + 1] - ends[level]))[:, None]
-    below, above = expit(low), expit(-up)
     soft_low, soft_up = np.logaddexp(0.0, low), np.logaddexp(0.0, up)
     log_p = up - soft_up - soft_low + np.log(part)
-    first = below - above
-    second = -(below * (1 - below) + above * (1 - above))
+    first, second = _slopes(low, up)
     upper = np.exp(soft_low - soft_up) / part
     lower = -np.exp(soft_up - up - soft_low + low) / part
     return log_p, first, second, upper, lower
+
+
+def _ends(cut: Array) -> Array:
+    return np.concatenate([[-ENDLESS], cut, [ENDLESS]])
+
+
+def _slopes(low: Array, up: Array) -> tuple[Array, Array]:
+    """Return the first and the second derivative of log P by η, from θ − η of the lower and the upper threshold."""
+    below, above = expit(low), expit(-up)
+    return below - above, -(below * (1 - below) + above * (1 - above))
 
 
 def _modes(cut: Array, eta: Array, sd: float, level: Whole, starts: Whole) -> tuple[Array, Array]:
@@ -144,10 +160,13 @@ def _modes(cut: Array, eta: Array, sd: float, level: Whole, starts: Whole) -> tu
     counts = np.diff(np.append(starts, len(eta)))
     u: Array = np.zeros(len(counts))
     curvature: Array = np.ones(len(counts))
+    ends = _ends(cut)
+    lower, upper = ends[level], ends[level + 1]
     for _ in range(50):
-        parts = _cells(cut, (eta + sd * np.repeat(u, counts))[:, None], level)
-        slope = sd * np.add.reduceat(parts[1][:, 0], starts) - u
-        curvature = 1 - sd * sd * np.add.reduceat(parts[2][:, 0], starts)
+        at = eta + sd * np.repeat(u, counts)
+        first, second = _slopes(lower - at, upper - at)
+        slope = sd * np.add.reduceat(first, starts) - u
+        curvature = 1 - sd * sd * np.add.reduceat(second, starts)
         step = np.clip(slope / curvature, -2.0, 2.0)
         u = u + step
         if np.abs(step).max() < 1e-9:
