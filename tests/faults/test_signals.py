@@ -1,0 +1,62 @@
+"""The real program in a real window, ended from outside in a trial: zero force, unfinished, and it can be resumed."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from study_app.protocol.load import parse
+from study_app.protocol.source.files import source_bytes
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.reopen import check_can_go_on
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+from tests.faults.support import short
+from tests.end_to_end.real_windows import COMPILED_S, Program, needs_display, virtual_display, wait_for
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.nightly,
+    needs_servo,
+    needs_display,
+    pytest.mark.xvfb,
+    pytest.mark.timeout(300),
+]
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    with virtual_display() as number:
+        yield number
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_in_a_trial_leaves_a_session_that_can_be_resumed(
+    number: signal.Signals, display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    protocol = short.write(tmp_path)
+    protocol.write_text(protocol.read_text(encoding="utf-8").replace("min_s = 0.2", "min_s = 20"), encoding="utf-8")
+    words = ["run", str(protocol), "--participant", "P001", "--by", "AK", "--device", "scripted", "--windowed"]
+    program = Program(display, tmp_path, *words)
+    try:
+        wait_for(lambda: program.windows("^Study$"), "the study's window", COMPILED_S)
+        (study,) = program.windows("^Study$")
+        program.wait_for_event("page_shown")
+        program.key(study, "Return")  # agrees
+        while not program.events("trial_started"):
+            program.key(study, "space")
+        program.process.send_signal(number)
+        assert program.process.wait(30) == 128 + number
+    finally:
+        program.close()
+    (session,) = StudyFolder(tmp_path / "results" / "demo-scripted").sessions()
+    assert [one["outcome"] for one in program.events("trial_ended")] == ["interrupted"]
+    assert [one["by"] for one in program.events("paused")] == ["program"]
+    assert program.events("session_ended") == []
+    assert verify(tmp_path / "results" / "demo-scripted").errors == ()
+    source = source_bytes(str(protocol))
+    check_can_go_on(session.path, parse(source, "demo"), source)
