@@ -105,7 +105,7 @@ def replay(session_folder: Path) -> Replayed:
     if key.hash != kept["key_hash"]:
         raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
     lines = opened(journal.read(session.journal), key)
-    protocol, devices = _ran(session.receipt, kept, key, lines)
+    protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
     _again(records(SAMPLE, 0), Scene(), *devices[None], None)  # loads the compiled code: no part of what is measured
     found = _Found()
     intervals = {_which(line): line for line in lines if line["event"] == "interval_ended"}
@@ -125,7 +125,7 @@ def replay(session_folder: Path) -> Replayed:
         if not is_there(path):
             found.missing.append(f"{name}: {line['recording']} is missing, but the journal mentions it")
             continue
-        seed = link_seed(kept["seed"], kept["participant"], *_which(started))
+        seed = link_seed(drawn_from, participant, *_which(started))
         scene, steps = scene_presented(protocol, key, started, seed), steps_of(protocol, key, started, lines)
         recorded, checks = recording_files.read_samples(path), recording_files.read_checks(path)
         start = time.perf_counter()
@@ -375,8 +375,8 @@ def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None, str |
 
 def _ran(
     path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[Line]
-) -> tuple[Protocol, dict[str | None, tuple[float, Dynamics]]]:
-    """Return the protocol of the session whose receipt was ``kept`` at ``path``, and the devices that it ran on.
+) -> tuple[Protocol, dict[str | None, tuple[float, Dynamics]], tuple[int, str]]:
+    """Return what ran, by the receipt that was ``kept`` at ``path``: protocol, devices, and seed with participant.
 
     A device is its force limit [N] and its dynamics, by the time at which the session was resumed with it, or it was
     connected again; that of the session's beginning is under None.
@@ -387,7 +387,8 @@ def _ran(
         devices = {
             at: (float(device.get("force_limit_n", np.inf)), dynamics_from(device)) for at, device in described.items()
         }
-        return as_recorded(whole_protocol(kept["protocol"], key), kept, key), devices
+        whose = kept["seed"], kept["participant"]
+        return as_recorded(whole_protocol(kept["protocol"], key), kept, key), devices, whose
     except KeyError as lacking:
         raise StoreError(f"{path} lacks {lacking}: restore it from a copy") from lacking
     except (AttributeError, TypeError, ValueError):  # said without the reason, which would tell conditions

@@ -94,7 +94,7 @@ def test_a_session_without_recordings_proves_nothing(tmp_path: Path) -> None:
     assert (found.differences, found.missing, found.uncompared) == ((), (), ())
 
 
-@pytest.mark.parametrize("name", ["device", "protocol"])
+@pytest.mark.parametrize("name", ["device", "protocol", "seed", "participant"])
 def test_a_receipt_that_lacks_what_ran_is_one_sentence(rehearsed: Path, tmp_path: Path, name: str) -> None:
     place = copied(rehearsed, tmp_path / "receipt")
     receipt = json.loads((place / "receipt.json").read_text())
