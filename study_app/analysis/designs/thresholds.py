@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from study_app.analysis.results.level_results import ThresholdFound
+from study_app.analysis.results.level_results import ThresholdFound, compared_percent
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.psychometrics.goodness import drift, p_of_fit
 from study_app.analysis.statistics.psychometrics.posterior import fitted
@@ -25,7 +25,7 @@ from study_app.analysis.tables.measures import number_or_none
 from study_app.analysis.tables.tracks import TRACK, answers_of, setting_of
 from study_app.protocol.trials.psychometric import analysis_grid
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.psychophysics.families import CLIP, success
+from study_app.psychophysics.families import CLIP, level_at, success
 from study_app.psychophysics.grid import Grid
 
 
@@ -82,7 +82,7 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdFou
             if one["analysed"].any()
         ]
         if own:
-            yield _group(stimulus, standard, own)
+            yield _with_compared(stimulus, _group(stimulus, standard, own), own)
         yield from own
 
 
@@ -96,6 +96,9 @@ def _own(
     level_of = stimulus.level_of
     psi = success(grid.family, counts.levels, found.threshold, found.width, found.guess, found.lapse)
     psi = np.clip(psi, CLIP, 1 - CLIP)
+    percent, compared = compared_percent(block.published), math.nan
+    if percent is not None:
+        compared = level_at(grid.family, percent, found.threshold, found.width, found.guess, found.lapse)
     return ThresholdFound(
         participant=str(person),
         standard=number_or_none(standard),
@@ -113,6 +116,7 @@ def _own(
         drift=drift(rows["success"].to_numpy(dtype=bool), psi[counts.places]),
         reversal_mean=_reversal_mean(block, stimulus, heard),
         target_percent=None if block.method is None else block.method.target_percent,
+        compared=None if math.isnan(compared) else level_of(compared),
     )
 
 
@@ -129,6 +133,23 @@ def _reversal_mean(block: LevelBlock, stimulus: Stimulus, heard: pd.DataFrame) -
 
 
 def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdFound]) -> ThresholdFound:
-    mean = group_mean([stimulus.coordinate(one.threshold) for one in own], [one.variance or 0.0 for one in own])
+    mean, low, high = _mean(stimulus, [one.threshold for one in own], own)
+    return ThresholdFound(None, number_or_none(standard), len(own), mean, low, high)
+
+
+def _with_compared(stimulus: Stimulus, group: ThresholdFound, own: Sequence[ThresholdFound]) -> ThresholdFound:
+    """Return the group with its level at the published percentage, where all participants have theirs."""
+    compared = [one.compared for one in own if one.compared is not None]
+    if len(compared) < len(own):
+        return group
+    mean, low, high = _mean(stimulus, compared, own)
+    return replace(group, compared=mean, compared_low=low, compared_high=high)
+
+
+def _mean(
+    stimulus: Stimulus, levels: Sequence[float], own: Sequence[ThresholdFound]
+) -> tuple[float, float | None, float | None]:
+    """Return the random-effects mean of participants' levels with its interval, by the variances of thresholds."""
+    mean = group_mean([stimulus.coordinate(level) for level in levels], [one.variance or 0.0 for one in own])
     low, high = (None if end is None else stimulus.level_of(end) for end in (mean.low, mean.high))
-    return ThresholdFound(None, number_or_none(standard), mean.n, stimulus.level_of(mean.mean), low, high)
+    return stimulus.level_of(mean.mean), low, high

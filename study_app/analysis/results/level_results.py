@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, Protocol, TypeAlias
 
 from study_app.analysis.results.question_answers import GroupAnswers
 from study_app.analysis.statistics.psychometrics.goodness import WORST, drifts
@@ -61,6 +61,19 @@ class PublishedValue:
         return f"{source}{self.measure} {self.value:g}" + (f" ({', '.join(known)})" if known else "")
 
 
+class _Published(Protocol):
+    @property
+    def measure(self) -> str: ...
+    @property
+    def percent(self) -> float | None: ...
+
+
+def compared_percent(published: Iterable[_Published]) -> float | None:
+    """Return the percentage of successes at which published thresholds were measured; None: unknown, or several."""
+    percents = {one.percent for one in published if one.measure in {"weber", "threshold"}}
+    return percents.pop() if len(percents) == 1 else None
+
+
 @dataclass(frozen=True, slots=True)
 class ThresholdFound:
     """A participant's threshold at one standard or, where ``participant`` is None, the group's.
@@ -69,8 +82,9 @@ class ThresholdFound:
     are levels. ``width`` reaches from 5 to 95 % of the function's rise, in decades on log spacing.
     ``beyond`` says that the threshold lies above or below the levels presented; ``variance`` is the threshold's
     posterior variance in u. ``fit_p`` is that of the deviance, ``drift`` the correlation of trial number and deviance
-    residual. ``reversal_mean`` is the classical estimate of the up–down tracks, at ``target_percent`` successes. Of
-    the group only ``n`` (participants), threshold and interval are known.
+    residual. ``reversal_mean`` is the classical estimate of the up–down tracks, at ``target_percent`` successes.
+    ``compared`` is the level at the percentage of successes of the published value, see `compared_percent`. Of the
+    group only ``n`` (participants), threshold and ``compared`` are known, each with its interval.
     """
 
     participant: str | None
@@ -89,6 +103,9 @@ class ThresholdFound:
     drift: float | None = None
     reversal_mean: float | None = None
     target_percent: float | None = None
+    compared: float | None = None
+    compared_low: float | None = None
+    compared_high: float | None = None
 
     @property
     def fits(self) -> bool:
@@ -285,6 +302,12 @@ class LevelsFound:
         if self.device is None or one.standard is None or (self.vary, self.level_kind) != ("damping_nspm", "weber"):
             return None
         return one.threshold * one.standard / (one.standard + self.device.damping_nspm)
+
+    @property
+    def compared_percent(self) -> float | None:
+        """The percentage of successes at which thresholds are compared with published ones; None: at no other."""
+        known = any(one.compared is not None for one in self.thresholds)
+        return compared_percent(self.published) if known else None
 
     @property
     def exponent_name(self) -> str:

@@ -72,6 +72,13 @@ def test_weber_fractions_are_levels_or_differences_over_their_standards() -> Non
     ]
     assert weber_fractions(found("difference", *ones), "P001") == [(4.0, 0.025, 0.0125, 0.05)]
     assert weber_fractions(found("value", *ones), None) == []
+    published = (PublishedValue("weber", 0.2, None, None, None, 71.0, 10, "A"),)
+    shown = [replace(one, compared=one.threshold / 2, compared_low=0.01) for one in ones]
+    compared = replace(found("weber", *shown), published=published)
+    assert [(x, value, low, high) for x, value, low, high in weber_fractions(compared, None)] == [
+        (4.0, 0.1, 0.01, None),
+        (8.0, 0.15, 0.01, None),
+    ]
 
 
 def test_published_thresholds_are_weber_fractions_over_their_standard_alone() -> None:
@@ -136,7 +143,7 @@ def test_every_answer_has_a_mark_and_every_reversal_a_ring(opened_adaptive: Path
 def test_weber_fractions_are_drawn_where_there_are_two_standards(opened_adaptive: Path, plotted: Path) -> None:
     assert (plotted / "weber-staircase.png").exists()
     assert not (plotted / "weber-quest.png").exists()
-    assert {"4", "8", "Weber fraction"} < set(words_in(plotted / "weber-staircase.svg"))
+    assert {"4", "8", "Weber fraction at 71 % correct"} < set(words_in(plotted / "weber-staircase.svg"))
     assert "dotted: published 0.1917" in words_in(plotted / "weber-staircase.svg")
     caption = (plotted / "weber-staircase.txt").read_text(encoding="utf-8")
     assert "published values, Jones et al. 1997: weber 0.1917 (at 71 % correct, n = 10)." in caption

@@ -13,7 +13,9 @@ from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.results.level_results import ThresholdFound
 from study_app.analysis.statistics.psychometrics.goodness import p_of_fit
 from study_app.analysis.statistics.psychometrics.posterior import band, fitted
+from study_app.analysis.statistics.random_effects import group_mean
 from study_app.analysis.tables.level_blocks import LevelBlock
+from study_app.protocol.analysis_plan import Published
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.method import Heard, TrackSetting
 from study_app.protocol.trials.methods.questplus import QuestPlus
@@ -62,6 +64,37 @@ def test_planted_thresholds_are_found_per_participant_and_for_the_group() -> Non
     assert group.low is not None
     assert group.high is not None
     assert group.low < group.threshold < group.high
+
+
+def published(*percents: float | None, measure: str = "weber") -> tuple[Published, ...]:
+    return tuple(Published(block="b", measure=measure, value=0.19, percent=one) for one in percents)
+
+
+def test_thresholds_are_compared_with_published_ones_at_their_percentage() -> None:
+    people = {"P001": 0.1, "P002": 0.14, "P003": 0.2}
+    known = replace(block(), published=published(71.0, 71.0))
+    group, *own = thresholds(known, rows(people))
+    for one in own:
+        assert one.compared is not None
+        assert one.width is not None
+        assert one.lapse is not None
+        psi = success("weibull", math.log10(one.compared), math.log10(one.threshold), one.width, 0.5, one.lapse)
+        assert psi == pytest.approx(0.71)
+        assert one.compared < one.threshold
+    mean = group_mean([math.log10(one.compared or 0) for one in own], [one.variance or 0 for one in own])
+    assert group.compared == pytest.approx(10**mean.mean)
+    assert (group.compared_low, group.compared_high) == pytest.approx((10 ** (mean.low or 0), 10 ** (mean.high or 0)))
+
+
+@pytest.mark.parametrize("values", [(), published(71.0, 75.0), published(None), published(71.0, measure="exponent")])
+def test_without_one_known_percentage_there_is_no_comparison(values: tuple[Published, ...]) -> None:
+    found = list(thresholds(replace(block(), published=values), rows({"P001": 0.1})))
+    assert [one.compared for one in found] == [None, None]
+
+
+def test_a_percentage_that_the_function_never_has_is_not_compared() -> None:
+    found = list(thresholds(replace(block(), published=published(50.0)), rows({"P001": 0.1})))
+    assert [one.compared for one in found] == [None, None]
 
 
 def test_a_steep_function_has_its_own_width() -> None:

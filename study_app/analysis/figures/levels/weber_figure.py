@@ -30,24 +30,35 @@ def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
     """Return the Weber fractions of a participant or, of None, of the group, by standard.
 
     A threshold that is a difference is divided by its standard; standards of zero and levels that are values have none.
+    Where the percentage of the published values is known, the level at it is in the threshold's place.
     """
     if found.level_kind not in {"weber", "difference"}:
         return []
-    points = []
+    points, at_threshold = [], found.compared_percent is None
     for one in found.thresholds:
-        if one.participant != participant or one.standard is None or one.standard <= 0 or one.threshold <= 0:
+        shown = (one.threshold, one.low, one.high)
+        level, *ends = shown if at_threshold else (one.compared, one.compared_low, one.compared_high)
+        if one.participant != participant or one.standard is None or one.standard <= 0 or level is None or level <= 0:
             continue
         unit = one.standard if found.level_kind == "difference" else 1.0
-        low, high = (None if end is None or end <= 0 else end / unit for end in (one.low, one.high))
-        points.append((one.standard, one.threshold / unit, low, high))
+        low, high = (None if end is None or end <= 0 else end / unit for end in ends)
+        points.append((one.standard, level / unit, low, high))
     return points
+
+
+def _at(found: LevelsFound) -> str:
+    """Return at which percentage Weber fractions are shown."""
+    percent = found.compared_percent
+    if percent is None and found.guess_rate is not None:
+        percent = 50 * (1 + found.guess_rate)
+    return "" if percent is None else f" at {percent:.3g} % {found.counts}"
 
 
 def picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
     """Draw the Weber fractions of a block with thresholds at two standards or more."""
     files = files_of(partial(_draw, study, found), forms, f"{study.name}: {found.title}, Weber fractions")
     caption = (
-        f"{found.title}: Weber fraction of {found.quantity} at the threshold, over the standard. Thin: participants; "
+        f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, over the standard. Thin: participants; "
         f"thick: random-effects mean with its 95 % interval.{_published_words(found)} "
         f"{sample_words(study, len(found.people))}"
     )
@@ -58,7 +69,7 @@ def picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -
 def _draw(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
     sheet = Sheet(style.PAGE_WIDTH_PT / 2, HEIGHT_PT, fonts)
     sheet.heading(found.title, answer_figures.marks(study), (counted(study.n, "participant"), f"n = {study.n}"))
-    sheet.text(MARGIN_PT, 28, "Weber fraction", size=7, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(found)}", size=7, colour=style.TEXT_SOFT)
     axes = sheet.axes(LEFT_PT, TOP_PT, sheet.width_pt - LEFT_PT - RIGHT_PT, sheet.height_pt - TOP_PT - FOOT_PT)
     group = weber_fractions(found, None)
     own = [weber_fractions(found, person) for person in found.people]

@@ -15,6 +15,8 @@ def level_findings(found: LevelsFound) -> Iterator[str]:
         if one.participant is None:
             where = "" if one.standard is None else f", standard {with_unit(found, one.standard)}"
             percent = "" if found.guess_rate is None else f" at {50 * (1 + found.guess_rate):.3g} % {found.counts}"
+            if one.compared is not None:
+                percent += f", {one.compared:.3g} at {found.compared_percent:g} %"
             yield (
                 f"{found.title}{where}: threshold {one.threshold:.3g}{percent} ({level_words(found)}; "
                 f"{_interval(one, 3)}; {counted(one.n, 'participant')})."

@@ -60,7 +60,7 @@ def section(found: LevelsFound, pictures: Mapping[str, Picture]) -> Iterator[str
 def _thresholds(found: LevelsFound) -> str:
     """Return a row per standard and participant, the group first."""
     standards = len({one.standard for one in found.thresholds}) > 1
-    percent = _target_percent(found)
+    percent, compared = _target_percent(found), found.compared_percent
     with_device = any(found.with_device(one) is not None for one in found.thresholds)
     return table(
         (
@@ -69,6 +69,7 @@ def _thresholds(found: LevelsFound) -> str:
             "n",
             _threshold_name(found),
             "95 % interval",
+            *((f"at {compared:g} %",) if compared is not None else ()),
             *(("with device damping",) if with_device else ()),
             f"width [{WIDTHS[found.spacing]}]",
             "flat width prior",
@@ -83,6 +84,7 @@ def _thresholds(found: LevelsFound) -> str:
                 "–" if one.participant is None else str(one.n),
                 f"{BEYOND[one.beyond]}{one.threshold:.3g}",
                 "–" if one.low is None or one.high is None else f"{one.low:.3g} – {one.high:.3g}",
+                *((_level(one.compared, 3),) if compared is not None else ()),
                 *((_level(found.with_device(one), 3),) if with_device else ()),
                 "–" if one.width is None else f"{one.width:.2g}",
                 _level(one.flat_width, 3),
@@ -156,6 +158,11 @@ def _threshold_words(found: LevelsFound) -> str:
         if percent is None
         else f" The mean of reversals is the classical estimate of an up–down track, at {percent:.1f} % {found.counts}."
     )
+    compared = (
+        ""
+        if found.compared_percent is None
+        else f" “At {found.compared_percent:g} %” is the level at which the published value was measured."
+    )
     function = FAMILIES[found.family or ""]
     return (
         f"A threshold is the level ({level_words(found)}) at which the {function} function is half-way between "
@@ -164,8 +171,8 @@ def _threshold_words(found: LevelsFound) -> str:
         f"the next column is the threshold under a flat one. “Above” and “below” mark thresholds beyond the levels "
         f"presented. The group is the random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from "
         f"three participants on."
-        f"{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of trial "
-        f"number and deviance residual, with “!” beyond 2/√n. n counts answers{catch}."
+        f"{compared}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of "
+        f"trial number and deviance residual, with “!” beyond 2/√n. n counts answers{catch}."
     )
 
 
