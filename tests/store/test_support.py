@@ -140,6 +140,7 @@ def test_a_zip_that_cannot_be_written_is_a_sentence(tmp_path: Path) -> None:
         write_support(tmp_path / "missing" / "help.zip")
 
 
+@pytest.mark.slow
 def test_the_doctor_writes_one(tmp_path: Path) -> None:
     pytest.importorskip("numba")
     words = [

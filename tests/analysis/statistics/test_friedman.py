@@ -156,6 +156,7 @@ def test_the_exact_p_is_that_of_all_rearrangements(rows: list[list[int]]) -> Non
     assert result.smallest_p == pytest.approx(np.mean([value == max(every) for value in every]))
 
 
+@pytest.mark.slow
 @given(answers, st.permutations([0, 1, 2]), st.randoms(use_true_random=False))
 @settings(max_examples=40, deadline=None)
 def test_labels_people_and_the_direction_of_the_scale_do_not_matter(rows, order, random) -> None:  # type: ignore[no-untyped-def]

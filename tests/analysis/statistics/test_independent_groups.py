@@ -87,6 +87,7 @@ def test_missing_answers_and_what_cannot_be_tested() -> None:
         groups_differ(np.ones((2, 1)), ("A",))
 
 
+@pytest.mark.slow
 def test_p_is_uniform_at_most_where_groups_are_alike() -> None:
     rng = np.random.default_rng(5)
     ps = [groups_differ(rng.integers(1, 8, (10, 1)).astype(float), tuple("AAAAABBBBB")).p or 1.0 for _ in range(300)]

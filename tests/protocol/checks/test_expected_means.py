@@ -93,6 +93,7 @@ def test_many_trials_recover_the_d_prime_of_every_design(design: str, *, roving:
         assert plan.estimates(np.array([planted]), np.random.default_rng(2))[0] == pytest.approx(planted, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("design", ["2ifc", "abx", "oddity", "samedifferent"])
 def test_four_times_the_trials_halve_the_spread(design: str) -> None:
     few, many = (

@@ -205,6 +205,7 @@ def test_the_numbers_of_a_link_are_searched_for_as_leaks() -> None:
         assert words.in_text(f"a {text} b"), text
 
 
+@pytest.mark.slow
 def test_forcedelay_is_permitted_whole() -> None:
     one = load("forcedelay")
     assert one.format == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, get_args
 
 from study_app.session.transitions.commands import (
@@ -34,6 +35,7 @@ EVENTS = get_args(Event)
 LEFT = Write("choice", {"trial": 2, "item": "liquid", "value": 5}, waits=True)
 
 
+@cache
 def state_in(phase: Phase) -> SessionState:
     """Return a session in that phase, in its first main trial where there is one."""
     if phase is Phase.OPENING:
