@@ -103,8 +103,8 @@ class DesignerHeader(QWidget):
         row.setContentsMargins(SHADOW, 0, SHADOW, 0)
         row.setSpacing(10)
         self.title = label("Study designer", "title")
+        self.title.setContentsMargins(0, 0, 6, 0)  # room that goes with it where it is hidden
         row.addWidget(self.title)
-        row.addSpacing(6)
         row.addWidget(self.study)
         row.addWidget(self.problems)
         row.addWidget(self.draft)
