@@ -66,6 +66,7 @@ class Arrangement(QWidget):
         super().__init__()
         self.setProperty("role", "window")
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.setAccessibleName("Operator's window")
         self._pieces = p = pieces
         self._arranged: tuple[object, ...] = ()
         self.now = Card(padding=14, gap=10)
