@@ -1,9 +1,12 @@
 """Modules import one another without a cycle, those for type annotations included, and no more than they need."""
 
+import ast
 import pkgutil
+import re
 import subprocess
 import sys
 from graphlib import TopologicalSorter
+from pathlib import Path
 
 import grimp
 import pytest
@@ -14,6 +17,20 @@ pytestmark = pytest.mark.slow
 
 FIND_THEIR_MODULES = ("study_app.haptics.model.effects", "study_app.haptics.model.estimators")
 HEAVY = ("numba", "llvmlite", "PySide6", "pyqtgraph", "pandas", "scipy", "matplotlib", "numpy")
+ROOT = Path(__file__).resolve().parents[2] / "study_app"
+
+
+def test_modules_that_packages_describe_exist() -> None:
+    missing = []
+    for package in ROOT.rglob("__init__.py"):
+        source = package.read_text("utf-8")
+        described = re.findall(r"(?<!`)`([a-z_]+)`(?!`)", ast.get_docstring(ast.parse(source)) or "")
+        below = {path.stem for path in package.parent.rglob("*")}
+        defined = source.split('"""', 2)[-1]
+        missing += [
+            (package, name) for name in described if name not in below and not re.search(rf"\b{name}\b", defined)
+        ]
+    assert missing == []
 
 
 def test_no_module_imports_itself_through_others() -> None:

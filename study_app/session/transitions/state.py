@@ -1,4 +1,4 @@
-"""Where a session is: one frozen value, changed only by ``machine.advance``."""
+"""Where a session is: one frozen value, changed only by `table.advance`."""
 
 from __future__ import annotations
 
