@@ -88,6 +88,12 @@ def by_itself(bridge: Bridge) -> QWidget:
 
 WINDOWS = (participant, operator, repeating, leaving_out, ending, told, above_the_operator, by_itself)
 every_window = pytest.mark.parametrize("open_", WINDOWS, ids=lambda one: one.__name__)
+# What a key leads to is the same in all: that it arrives in each of them is `test_held_escape_stops_the_force`.
+two_windows = pytest.mark.parametrize(
+    "open_",
+    [*WINDOWS[:2], *(pytest.param(one, marks=pytest.mark.nightly) for one in WINDOWS[2:])],
+    ids=lambda one: one.__name__,
+)
 
 
 def in_focus(window: QWidget, qtbot: Any) -> QWindow:
@@ -113,7 +119,7 @@ def test_held_escape_stops_the_force(
     assert isinstance(bridge.participant.page, PausePage)
 
 
-@every_window
+@two_windows
 def test_tapped_escape_leaves_the_force(
     bridge: Bridge, world: World, qtbot: Any, open_: Callable[[Bridge], QWidget]
 ) -> None:
@@ -201,7 +207,7 @@ def real() -> Iterator[Real]:
 
 
 @needs_servo
-@every_window
+@two_windows
 def test_the_servo_sends_no_force_from_the_next_tick_on(
     make: Any, real: Real, qtbot: Any, open_: Callable[[Bridge], QWidget]
 ) -> None:

@@ -56,7 +56,7 @@ def test_intervals_of_1000_observers_cover_their_thresholds(trials):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ['kind = "questplus"', 'kind = "updown"', 'kind = "constant"'])
-@pytest.mark.parametrize("design", ["2ifc", "4ifc", "yesno"])
+@pytest.mark.parametrize("design", ["2ifc", pytest.param("4ifc", marks=pytest.mark.nightly), "yesno"])
 def test_more_trials_make_every_method_more_precise(method, design):
     plan = plan_of(study(method, design=design))
     few, many = (expected(plan.with_trials(trials)) for trials in (28, 140))
