@@ -22,6 +22,8 @@ from study_app.video.camera import Camera, _Numbers
 from tests.video.clips import number_in
 from tests.video.test_footage import pixels_of
 
+pytestmark = pytest.mark.slow
+
 SENDER = Path(__file__).with_name("camera_process.py")
 SIZE = ("--size", "320x180")
 PERIOD_S = 1 / 30

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
@@ -11,6 +12,8 @@ from shiboken6 import isValid
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.viewmodels.designer.requests import SetValue
+
+pytestmark = pytest.mark.slow
 
 LEFT = Qt.MouseButton.LeftButton
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from PySide6.QtCore import QEvent, QPointF
 from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
@@ -11,6 +12,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 from study_app.authoring.study_facts import facts
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.requests import SetValue
+
+pytestmark = pytest.mark.slow
 
 
 def enter(part: QWidget) -> None:

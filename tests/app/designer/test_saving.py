@@ -14,6 +14,8 @@ from study_app.protocol.source.files import protocol_hash
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.viewmodels.designer.requests import SetText, SetValue
 
+pytestmark = pytest.mark.slow
+
 VERSION = ("study", "version")
 TITLE = ("pages", "welcome", "title")
 

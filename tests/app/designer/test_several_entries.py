@@ -13,6 +13,8 @@ from study_app.authoring.edited_study import Study
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.requests import DuplicateEntries, MoveEntries
 
+pytestmark = pytest.mark.slow
+
 CONDITIONS = ("blocks", "liquids", "conditions")
 ITEMS = ("questionnaires", "liquid", "items")
 SHIFT, CONTROL, ALT = (

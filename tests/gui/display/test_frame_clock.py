@@ -40,6 +40,7 @@ class Screen:
 def screen(request, qapp):
     made = Screen(request.param)
     made.frames.start()
+    made.timer.stop()  # before a late computer lets it go off by itself
     return made
 
 

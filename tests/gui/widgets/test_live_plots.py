@@ -20,6 +20,7 @@ def place(name: Any) -> QRectF:
     return name.textItem.mapRectToScene(name.textItem.boundingRect())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(320, 150), (420, 200), (900, 420)])
 @pytest.mark.parametrize("p99_us", [3.0, 66.0, 700.0, 2000.0, 9000.0])
 @pytest.mark.parametrize("decades", [4, 5, 6])
