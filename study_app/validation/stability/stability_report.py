@@ -221,5 +221,5 @@ def _cases_csv(swept: Swept) -> str:
 
 
 def _markdown(swept: Swept, fidelities: Sequence[Fidelity]) -> str:
-    lines = ("# Where it stays stable", "", "```", summary(swept, fidelities), "```", "", "![Map](map.png)", "")
+    lines = ("# When the simulation is stable", "", "```", summary(swept, fidelities), "```", "", "![Map](map.png)", "")
     return "\n".join((*lines, *(f"- unstable with safety on: `{verdict.case}`" for verdict in swept.unstable), ""))

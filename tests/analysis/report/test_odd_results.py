@@ -35,7 +35,7 @@ def test_one_participant_all_equal_and_missing_answers_give_a_report_that_says_s
     rek.open()
     report(rek.folder, tmp_path / "one")
     alone = read(tmp_path / "one")
-    assert "about this person alone" in alone
+    assert "concern this person alone" in alone
     assert not re.search(r"\b1 participants", alone)
     assert run_in_r(tmp_path / "one").returncode == 0
     assert "1 pairs" not in alone
