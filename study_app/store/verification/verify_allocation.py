@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection
 
 from study_app.protocol.groups.allocation import group_of
@@ -42,6 +43,7 @@ def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[
             found.error(path, f"is missing, though participant {participant} has entry {entry}")
         elif holders.get(participant) != entry:
             found.error(path, f"is not of participant {participant}, whose journal has entry {entry}")
+    shared = Counter(begun.values())
     for participant, entry in begun.items():
-        if sum(other == entry for other in begun.values()) > 1:
+        if shared[entry] > 1:
             found.error(study.allocated, f"entry {entry} of participant {participant} is another participant's, too")
