@@ -103,7 +103,7 @@ class MainController(QObject):
                 "help": self._help,
             },
             theme=theme_named(self.machine.settings.theme),
-            prepares={"lab": self._prepare_lab},
+            prepares={"lab": self._prepare_lab, "designer": self._prepare_designer},
         )
         self._lab_first: InitialSettings | None = None
         self._preparing = Background(self)
@@ -297,6 +297,10 @@ class MainController(QObject):
             self._preparing.run(_prepare_lab)
         return None if self._lab_first is None else self._fill_lab()
 
+    def _prepare_designer(self) -> Iterator[None] | None:
+        """Return the step to the designer; None while a thread loads what it needs: a click must not wait for that."""
+        return None if self._preparing.busy else iter((None,))
+
     def _fill_lab(self) -> Iterator[None]:
         """Make the lab's form, then its styles: where it is first shown, it is only laid out and painted."""
         yield
@@ -310,7 +314,8 @@ class MainController(QObject):
 
     def _lab_prepared(self, first: InitialSettings) -> None:
         self._lab_first = first
-        self.window.prepared("lab")
+        for name in ("lab", "designer"):
+            self.window.prepared(name)
 
     def _lab(self) -> LabPlace:
         from study_app.app.lab.controller import compose_lab  # noqa: PLC0415 - pyqtgraph: only once it is needed
