@@ -14,8 +14,8 @@ from study_app.store.folders import StudyFolder
 from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
-from tests.faults.support import short
 from tests.end_to_end.real_windows import COMPILED_S, Program, needs_display, virtual_display, wait_for
+from tests.faults.support import short
 
 pytestmark = [
     pytest.mark.slow,
