@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.designs.track_courses import courses
+from study_app.analysis.figures.levels.panels import over_trials
 from study_app.analysis.figures.levels.weber_figure import published_fractions, weber_fractions
 from study_app.analysis.figures.plotting import plot
 from study_app.analysis.results.level_results import LevelsFound, PublishedValue, ThresholdFound
@@ -61,6 +63,16 @@ def test_courses_are_in_the_order_of_the_trials_and_end_at_the_threshold() -> No
     _, estimated, _ = thresholds(block(), frame)
     assert (one.low[-1], one.high[-1]) == pytest.approx((estimated.low, estimated.high))
     assert len(list(courses(block(), frame, most=1))) == 1
+
+
+@pytest.mark.parametrize(
+    ("ends", "shown"),
+    [((2.7, 11.3), [3, 5, 7, 10]), ((0.05, 0.9), [0.05, 0.1, 0.2, 0.5]), ((5.5, 9.5), [6, 7, 8, 9])],
+)
+def test_ticks_of_levels_leave_room_for_their_numbers(ends: tuple[float, float], shown: list[float]) -> None:
+    axes = Figure().add_subplot()
+    over_trials(axes, replace(found("value"), spacing="log"), 4, ends, first=True)
+    assert axes.get_yticks().tolist() == pytest.approx(shown)
 
 
 def test_weber_fractions_are_levels_or_differences_over_their_standards() -> None:

@@ -80,7 +80,7 @@ def _level_ticks(found: LevelsFound, ends: tuple[float, float]) -> list[float]:
         step *= next(times for times in (0.1, 0.2, 0.5, 1.0, 2.0) if (high - low) / (step * times) <= 6)
         return [float(f"{number * step:.12g}") for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    for digits in ((1,), (1, 3), (1, 2, 5), tuple(range(1, 10))):
+    for digits in ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), tuple(range(1, 10))):
         found_ = [float(f"{digit}e{decade}") for decade in decades for digit in digits]
         inside = [tick for tick in found_ if low <= tick <= high]
         if len(inside) >= LEAST_LEVELS:
