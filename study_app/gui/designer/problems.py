@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label
@@ -105,6 +105,8 @@ class ProblemsCard(Card):
         self.lines: list[ProblemLine] = []
         self._element: object = None
         self._here_only = False
+        self._listed: tuple[ProblemRow, ...] | None = None
+        self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
         self._at: ProblemRow | None = None
         self.heading = label("", "card")
         self.limit = Segments("Problems of")
@@ -132,26 +134,22 @@ class ProblemsCard(Card):
         self, rows: tuple[ProblemRow, ...], element: object, repairs: Mapping[ProblemRow, tuple[str, ...]]
     ) -> None:
         """Show problems; ``element`` is the selected one."""
-        unchanged = (rows, element if self._here_only else None) == (
-            self.rows,
-            self._element if self._here_only else None,
-        )
-        self.rows, self._element = rows, element
+        self.rows, self._element, self._repairs = rows, element, dict(repairs)
         self.heading.setText(f"{len(rows)} problem{'s' * (len(rows) != 1)}" if rows else "No problems")
         self.limit.show_values(((False, "All"), (True, "Here only")), self._here_only)
         self.next.setEnabled(bool(rows))
         wanted = min(HIGHEST, HEAD_PX + (ROW_PX + 1) * max(1, len(rows)))
         self.setFixedHeight(max(wanted, self.height()) if self.under_pointer else wanted)
-        if unchanged and self.lines:
+        listed = tuple(row for row in rows if not self._here_only or row.element == element)
+        if listed == self._listed:
             return
+        self._listed = listed
         inside = QWidget()
         column = QVBoxLayout(inside)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         self.lines = []
-        for row in rows:
-            if self._here_only and row.element != element:
-                continue
+        for row in listed:
             made = ProblemLine(row, repairs.get(row, ()), narrow=(self.parentWidget() or self).width() < 900)
             made.opened.connect(lambda row=row: self._open(row))
             made.repair_asked.connect(lambda words, row=row: self.repair_asked.emit(row, words))
@@ -161,7 +159,10 @@ class ProblemsCard(Card):
             self.lines.append(made)
         column.addStretch()
         apply_theme_within(inside, self.theme)
+        old = self.area.takeWidget()
         self.area.setWidget(inside)
+        if old is not None:
+            remove_widget(old)  # later: a button of it may have been pressed just now
 
     @property
     def under_pointer(self) -> bool:
@@ -171,12 +172,13 @@ class ProblemsCard(Card):
     def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
         """Take the height that the problems need; without any the list is closed."""
         super().leaveEvent(event)
-        self.show_problems(self.rows, self._element, {})
+        self.show_problems(self.rows, self._element, self._repairs)
         if not self.rows:
             self.close_asked.emit()
 
     def show_repairs(self, row: ProblemRow, repairs: tuple[str, ...]) -> None:
         """Offer the repairs of a problem."""
+        self._repairs[row] = repairs
         for line in self.lines:
             if line.row == row:
                 line.show_repairs(repairs)
@@ -197,5 +199,5 @@ class ProblemsCard(Card):
         self.opened.emit(row)
 
     def _limit(self, here_only: object) -> None:
-        self._here_only, self.lines = bool(here_only), []
-        self.show_problems(self.rows, self._element, {})
+        self._here_only = bool(here_only)
+        self.show_problems(self.rows, self._element, self._repairs)

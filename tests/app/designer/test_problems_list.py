@@ -47,6 +47,25 @@ def test_the_list_keeps_its_height_and_stays_while_the_pointer_is_over_it(design
     assert not problems.isVisible()
 
 
+def test_the_list_is_not_made_anew_while_the_pointer_leaves_it(qtbot: Any, designer: Any) -> None:
+    """Qt says that the pointer leaves when what is under it is replaced: to replace it then would never end."""
+    text = designer.file.read_text()
+    designer.file.write_text(text.replace("force_limit_n = 6", "force_limit_n = 60"))
+    designer.controller.open("kitchen")
+    designer.place.header.problems.click()
+    problems = designer.place.problems
+    qtbot.waitUntil(lambda: bool(problems.lines[0].repairs))
+    offered = [button.text() for button in problems.lines[0].repairs]
+    for here_only in (True, False):
+        problems.limit.chosen.emit(here_only)
+    assert [button.text() for line in problems.lines for button in line.repairs] == offered
+    enter(problems)
+    designer.editing.type_text("Correct the file", text)
+    before = problems.area.widget()
+    leave(problems)
+    assert problems.area.widget() is before
+
+
 def test_a_text_that_is_missing_hides_no_force_and_is_counted_the_same_everywhere(designer: Any) -> None:
     text = shipped_file("rek2024").read_text().replace('name = "rek2024"', 'name = "kitchen"')
     designer.file.write_text(text.replace('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'))
