@@ -18,7 +18,7 @@ from study_app.errors import StoreError
 from study_app.store.journals.parsing import parse_json
 from study_app.user_folder import data_folder
 
-REST_S: Final = 0.5
+REST_S: Final = 0.25
 """A draft is written so long after the first edit that it does not hold [s]."""
 Selection: TypeAlias = tuple[str | int, ...]
 
