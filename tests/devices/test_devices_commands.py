@@ -109,7 +109,7 @@ class TestDoctorOverASocket:
         with self.serving(tmp_path, "busy"):
             told = liquid_study("doctor", "--device", f"falcon-socket:{tmp_path / 'falcon'}")
         assert told.exit_code == 3
-        assert "cause: another program holds it" in told.output
+        assert "cause: another program uses it" in told.output
 
     def test_nobody_there(self, tmp_path):
         told = liquid_study("doctor", "--device", f"falcon-socket:{tmp_path / 'falcon'}")
