@@ -25,7 +25,7 @@ class Costs:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """How far a scene is from the definition by the letter (``evaluation.reference_model``), along programmed paths.
+    """How far a scene is from the exact definition (``evaluation.reference_model``), along programmed paths.
 
     ``wake`` is the largest difference as a share of Σ|e|/S, ``force_n`` that of the forces [N]; None where there is no
     reference. ``lag_s`` is how late the velocity filter is on a motion that speeds up evenly. ``left_out`` are effects

@@ -84,7 +84,7 @@ def preflight_view(
 ) -> PreflightView:
     """Return what to show of ``facts``; ``goes_on`` are the rows of a session that goes on (`resumed_rows`).
 
-    ``error_n`` is the largest difference of a scene's force from the definition by the letter [N], None while it is not
+    ``error_n`` is the largest difference of a scene's force from the exact definition [N], None while it is not
     known; where no one was asked (``asked_error``) its line is left out.
     """
     return PreflightView(

@@ -101,10 +101,10 @@ class _Panel:
         self._strip = [row for row in self._points.values() if row.error.rms < ROUNDED]
         names = ", ".join(dict.fromkeys(row.truth for row in rows))
         if self._numerical:
-            self._heading = "Numerical truth: the definition by the letter"
+            self._heading = "Numerical error: compared with the exact sums"
             text = f"{rows[0].liquid}, {found.motion}; drag{' and wake' if self._strip[1:] else ''} summed exactly"
         else:
-            self._heading = "Physical truth: what a real ball meets"
+            self._heading = "Physical error: compared with solved and measured flows"
             text = f"{rows[0].liquid}; {names}"
         self._text = textwrap.wrap(text, LETTERS)
         self._top_pt = 6 + HEADING_PT + LINE_PT * len(self._text) + 13
