@@ -20,7 +20,6 @@ from study_app.errors import StoreError
 from study_app.outlets.session_outlets import SampleChoice
 from study_app.protocol.source.problems import faults_of
 from study_app.store.atomic import cannot_read, cannot_write, write_file
-from study_app.store.journals.parsing import parse_json
 from study_app.user_folder import FOLDER_VARIABLE, settings_file
 from study_app.workspace import Workspace, setting_of, workspace
 
@@ -201,12 +200,12 @@ def load() -> MachineSettings:
     """
     path = settings_file()
     try:
-        document = parse_json(path.read_bytes())
+        document = json.loads(path.read_bytes())
     except FileNotFoundError:
         return DEFAULTS
     except OSError as error:
         raise cannot_read(path, error) from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise _unusable(path, f"it is not JSON ({error})") from error
     if not isinstance(document, dict):
         raise _unusable(path, "it is not a table of settings")
