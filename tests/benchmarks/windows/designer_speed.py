@@ -92,7 +92,10 @@ def main(edits: int = 60) -> None:
         row = next(one for one in controller.place.form.rows if one.row.row.path == (*ITEM, "text"))
         field = (row.field.findChildren(QLineEdit) or row.field.findChildren(QPlainTextEdit))[0]
         field.setFocus()
-        keys = [timed(lambda: QTest.keyClick(field, Qt.Key.Key_A)) for _ in range(edits)]
+        keys = []
+        for _ in range(edits):
+            keys.append(timed(lambda: QTest.keyClick(field, Qt.Key.Key_A), QApplication.sendPostedEvents))
+            QApplication.processEvents()
         rows.append(("key press → letter", "16", keys))
         painted = []
         for _ in range(edits):
