@@ -75,9 +75,11 @@ def run_session(chosen: NewSession, progress: Callable[[str], object] | None) ->
 
 def load_windows() -> None:
     """Load the modules of a session's windows while the note is shown: a third of a second; no object is made."""
-    from study_app.store import receipt, recording_writer  # noqa: F401, PLC0415 - and pyarrow, for the recorder
+    import study_app.app.session.preflight_controller  # noqa: PLC0415
+    import study_app.app.session.session_windows  # noqa: PLC0415
+    import study_app.store.recording_writer  # noqa: PLC0415 - and pyarrow, which the recorder is made with
 
-    receipt.versions()  # read from the disk once
+    study_app.store.receipt.versions()  # read from the disk once
 
 
 class LiveSession(QObject):
