@@ -62,7 +62,7 @@ def test_what_is_connected_is_named():
 
 
 @pytest.mark.parametrize(
-    ("platform", "words"), [("linux", "this account"), ("win32", "driver"), ("darwin", "driver of FTDI")]
+    ("platform", "words"), [("linux", "this account"), ("win32", "driver"), ("darwin", "FTDI driver")]
 )
 def test_one_that_does_not_tell_its_number_says_why_that_may_be(platform, words):
     from study_app.devices.falcon.emulator.emulator import Emulator

@@ -6,9 +6,15 @@ import contextlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from study_app.app.session.live_session import run_session
+from PySide6.QtCore import QEventLoop, QTimer
+
+from study_app.app.session.garbage_collection import collecting_here
+from study_app.app.session.live_session import LiveSession
+from study_app.app.session.termination import ended_from_outside
 from study_app.devices.names import DEFAULT_DEVICE
 from study_app.errors import StoreError
+from study_app.gui.application import application_here
+from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
 from study_app.session.request import NewSession, draw_seed, resumed, study_results
 from study_app.session.resume import is_rehearsal
@@ -132,3 +138,18 @@ def resume(
     )
     check(chosen, chosen.read_protocol())
     return run_session(chosen, progress)
+
+
+def run_session(chosen: NewSession, progress: Callable[[str], object] | None) -> int:
+    """Open a session's windows and return when they are closed."""
+    application_here()
+    live = LiveSession(chosen, LIGHT, progress)
+    loop = QEventLoop()
+    live.over.connect(loop.quit)
+    with collecting_here(), ended_from_outside(live.end_by_signal):
+        QTimer.singleShot(0, live.open)
+        loop.exec()
+        live.wait(live.patience_s)
+    if live.error is not None:
+        raise live.error
+    return live.code

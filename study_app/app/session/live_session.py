@@ -15,23 +15,21 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices_controller import diagnosis
-from study_app.app.session.garbage_collection import collecting_here
-from study_app.app.session.termination import BY_SIGNAL_S, ended_from_outside
+from study_app.app.session.termination import BY_SIGNAL_S
 from study_app.app.workstation_controller import described, screen_number, settings_here, text_scale_on
 from study_app.authoring.versions.contents import keep_content
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.errors import SessionError, StoreError, StudyError
-from study_app.gui.application import application_here
 from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.home.startup_window import OpeningWindow
-from study_app.gui.theme.theme import LIGHT, Theme
+from study_app.gui.theme.theme import Theme
 from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse
 from study_app.protocol.wording.without_force import without_force
@@ -56,21 +54,6 @@ NOT_EXAMINED = (
     "There is nothing to diagnose",
     "This device has no diagnosis.",
 )
-
-
-def run_session(chosen: NewSession, progress: Callable[[str], object] | None) -> int:
-    """Open a session's windows and return when they are closed."""
-    application_here()
-    live = LiveSession(chosen, LIGHT, progress)
-    loop = QEventLoop()
-    live.over.connect(loop.quit)
-    with collecting_here(), ended_from_outside(live.end_by_signal):
-        QTimer.singleShot(0, live.open)
-        loop.exec()
-        live.wait(live.patience_s)
-    if live.error is not None:
-        raise live.error
-    return live.code
 
 
 def load_windows() -> None:
