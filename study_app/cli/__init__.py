@@ -69,7 +69,7 @@ commands.add_command(emulate_falcon)
 
 def _shortened(message: str) -> str:
     """Return a message with the first `SHOWN` letters of any longer word, such as a path, that it repeats."""
-    return re.sub(rf"(\S{{{SHOWN}}})\S{{{SHOWN},}}", r"\1…", message)
+    return re.sub(rf"(\S{{{SHOWN}}})\S+", r"\1…", message)
 
 
 def main() -> None:
@@ -92,7 +92,7 @@ def main() -> None:
         click.echo(f"liquid-study: {_shortened(str(error))}", err=True)
         sys.exit(EXIT_USER_ERROR)
     except Exception as error:
-        if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:  # of a name that was given
+        if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG and error.filename:
             click.echo(f"liquid-study: {_shortened(str(error.filename))}: the file name is too long", err=True)
             sys.exit(EXIT_USER_ERROR)
         logging.getLogger(__name__).critical("a bug ended the program", exc_info=True)

@@ -18,7 +18,7 @@ from study_app.protocol.texts import Brief, Id
 
 LATER: Final = frozenset({"participants", "precision", "published"})
 """Keys that format 1 does not have."""
-Reported = Annotated[float, within(-1e9, 1e9, "thresholds are numbers of a protocol, exponents and shares less")]
+Reported = Annotated[float, within(-1e9, 1e9, "no published value is larger")]
 LISTS = ("primary", "names", "rising", "falling")
 
 

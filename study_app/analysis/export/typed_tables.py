@@ -27,7 +27,7 @@ _BY_NAME: Final = {column.name: column for column in (*TRIALS_2, *RESPONSES)}
 
 OPENED: Final = (
     Column("condition", "text", "Id of the condition that the code stands for."),
-    Column("liquid", "text", "ID of the liquid that was presented."),
+    Column("liquid", "text", "Id of the liquid that was presented."),
     Column("delay_ms", "number", "Requested visual delay.", "ms", minimum=0),
 )
 ACHIEVED: Final = optional(

@@ -101,8 +101,8 @@ def _common(results: Results, blocks: list[BlockFound]) -> Iterator[str]:
         )
     elif decided.made:
         yield (
-            "The decisions about the analysis changed between sessions, so all results are exploratory; those of the "
-            f"first session were used (alpha = {decided.alpha:g})."
+            "The decisions about the analysis changed between sessions, so all results are exploratory; the "
+            f"decisions of the first session were used (alpha = {decided.alpha:g})."
         )
     else:
         yield f"No decisions were made beforehand: all results are exploratory, with alpha = {decided.alpha:g}."

@@ -47,7 +47,6 @@ if TYPE_CHECKING:
 @click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
 @click.option("--cases", type=click.IntRange(1), metavar="N", help="Only simulate N cases of each group.")
 @click.option(
-    "--group",
     "--only",
     metavar="TEXT",
     help='Only simulate groups with this text in their name, such as "non-Newtonian".',
@@ -63,7 +62,7 @@ def stability(
     estimated: int | None,
     seed: str,
     cases: int | None,
-    group: str | None,
+    only: str | None,
     workers: Workers,
 ) -> None:
     """Simulate thousands of closed loops with the safety layer off and on, and print the unstable ones.
@@ -86,7 +85,7 @@ def stability(
         velocity=velocity,
         delayed=delayed,
         estimation=estimated,
-        group=group,
+        only=only,
     )
     if to is not None:
         make_folder(to)
@@ -116,14 +115,14 @@ def stability(
         return
     with progress() as show, executor_for(workers) as executor:
         swept = found.run_sweep(
-            some(sweep(seed), cases) if group is None else (),
-            groups(seed, cases) if group is None else _named(groups(seed, cases), group),
+            some(sweep(seed), cases) if only is None else (),
+            groups(seed, cases) if only is None else _named(groups(seed, cases), only),
             executor,
             lambda done, of: show(f"{done} of {of} verdicts", done / of),
         )
         show("comparing forces")
-        compared = fidelities(executor=executor) if group is None else ()
-    click.echo(found.summary(swept, compared) if group is None else found.group_table(swept))
+        compared = fidelities(executor=executor) if only is None else ()
+    click.echo(found.summary(swept, compared) if only is None else found.group_table(swept))
     if to is not None:
         click.echo("\n" + "\n".join(str(file) for file in found.write(to, swept, compared)))
     if swept.unstable:

@@ -218,7 +218,7 @@ def compares(parts: Draft) -> Iterator[Fault]:
         if block.phase != "main" or block.design is not None or len(presented) < len(block.conditions):
             continue
         varied = [of for of, key in VARIED.items() if len({getattr(one, key) for one in presented}) > 1]
-        if block.compares == "views" and "delays" in varied:
+        if block.compares == "views" and {"views", "delays"} <= {*varied}:
             varied.remove("delays")
         if len(varied) > 1:
             differ = " and in ".join(one.removesuffix("s") for one in varied)

@@ -214,7 +214,7 @@ def _standard(protocol: Protocol, block: Block, stimulus: Stimulus, standard: fl
     place = ("stimuli", str(block.stimulus))
     if stimulus.vary in OF_CONDITION and not 0 <= standard <= OF_CONDITION[stimulus.vary]:
         permitted = f"from 0 to {OF_CONDITION[stimulus.vary]:g}"
-        return Fault((*place, "standards"), f"{standard:g}: {stimulus.vary} may be {permitted}", permitted)
+        return Fault((*place, "standards"), f"{standard:g} is not possible for {stimulus.vary}", permitted)
     if (why := _presented(protocol, stimulus, standard)) is not None:
         return Fault((*place, "standards"), f"{standard:g}: {why}")
     least = LEAST_MS if stimulus.vary.endswith("_ms") else LEAST_SHARE * (abs(standard) or 1.0)

@@ -12,7 +12,7 @@ from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id
 
-Weight = Annotated[float, within(-1e6, 1e6, "no instrument weights answers more")]
+Weight = Annotated[float, within(-1e6, 1e6, "no instrument has larger weights")]
 
 
 class Score(Table):

@@ -145,7 +145,8 @@ def _default(key: str, part: Node, node: Node) -> str:
 def _meaning(part: Node, root: Node) -> str:
     """Return the description of a key, or of its only alternative to null, or of the only model that it holds."""
     alternatives = [branch for branch in part.get("anyOf", ()) if branch.get("type") != "null"]
-    described = next((one for one in (part, *alternatives[:1]) if "description" in one), None)
+    meant = (part, *alternatives) if len(alternatives) == 1 else (part,)
+    described = next((one for one in meant if "description" in one), None)
     models = list(dict.fromkeys(name for name, _ in _models(part, "")))
     if described or len(models) != 1:
         return str((described or {}).get("description", ""))

@@ -65,8 +65,8 @@ def check_table(
     if differing := _differing_lines(content, expected):
         beginning = expected.startswith(content)
         behind = all(map(may_be_behind, differing)) and (beginning or _is_behind(content, expected, name))
-        progress = found.warning if behind else found.error
-        progress(path, f"differs from the journal, from line {differing[0]} on; rebuild renews it")
+        report = found.warning if behind else found.error
+        report(path, f"differs from the journal, from line {differing[0]} on; rebuild renews it")
         if behind and beginning:  # a program killed while it wrote a row
             return
     for problem in table_checks.problems(content, columns):

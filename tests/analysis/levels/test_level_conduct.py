@@ -78,13 +78,13 @@ def test_the_report_states_errors_reasons_estimator_and_the_rule(opened: pd.Data
     page = "".join(level_conduct_section.section(found, "kalman"))
     for words in (
         "Standard [N·s/m]", "−0.0033", "0.0200", "0.090", "−0.020", "with the velocity estimator kalman",
-        "Limits that intervals exceeded: pace error in two intervals and level error in 1 interval.",
+        "Limits that intervals did not keep: pace error in two intervals and level error in 1 interval.",
         "kept: at most 50 %", "excluded: above 50 %",
     ):  # fmt: skip
         assert words in page
     clean = replace(found, conduct=(replace(found.conduct[0], reasons={}, apparent_mass_kg=None),), catches=())
     page = "".join(level_conduct_section.section(clean, None))
-    assert "No interval exceeded a limit." in page
+    assert "Every interval kept its limits." in page
     assert "estimator" not in page
     assert "Catch trials" not in page
 

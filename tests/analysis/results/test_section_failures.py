@@ -34,7 +34,7 @@ TESTS = {
 WRITING = {
     "figures.answer_figures.render": "figure liquids",
     "report.write_report.methods": "texts: methods",
-    "report.write_report.summary.findings": "texts: findings",
+    "report.write_report.findings_summary.findings": "texts: findings",
     "report.write_report.r_script": "report.R",
     "report.number_files.motion_csv": "motion.csv",
     "findings.lowest_delay.table": "lowest delay",

@@ -54,7 +54,7 @@ REST = '[pages.rest]\nkind = "break"\ntitle = "Rest"\nbody = "Rest."\n'
              ("levels = [0.1, 0.8]", "levels = [5, 100]"), ("[0.2, 0.4, 0.8]", "3")],
             "",
             "standards",
-            "-1: delay_ms may be from 0 to 1000",
+            "-1 is not possible for delay_ms (from 0 to 1000)",
         ),
         (
             [('vary = "viscosity_pa_s"', 'vary = "delay_ms"'), ("standards = [1, 2]", "standards = [0]"),

@@ -306,7 +306,7 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
 @pytest.mark.nightly
 @compiled
 def test_the_command_judges_only_the_groups_that_are_named():
-    ran = command("--group", "non-Newtonian", "--cases", "2")
+    ran = command("--only", "non-Newtonian", "--cases", "2")
     assert ran.exception is None
     _, *lines = ran.stdout.splitlines()
     assert len(lines) == sum("non-Newtonian" in group.name for group in groups(count=2)) == 10
@@ -317,8 +317,8 @@ def test_the_command_judges_only_the_groups_that_are_named():
     ("words", "said"),
     [
         (("--only", "mercury"), "no group has 'mercury' in its name: there are second plant, held, "),
-        (("--group", "lost", "--withheld"), "--withheld and --group exclude each other"),
-        (("--group", "lost", "--velocity"), "--velocity and --group exclude each other"),
+        (("--only", "lost", "--withheld"), "--withheld and --only exclude each other"),
+        (("--only", "lost", "--velocity"), "--velocity and --only exclude each other"),
         (("--withheld", "--to", "shares"), "--to and --withheld exclude each other"),
     ],
 )

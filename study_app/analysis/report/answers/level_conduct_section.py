@@ -70,7 +70,7 @@ def _words(found: LevelsFound, estimator: str | None) -> str:
     return (
         "Level error: delivered less requested level, from the recorded samples (delays: from the frames); fits take "
         f"delivered levels.{mass if any(one.apparent_mass_kg is not None for one in found.conduct) else ''} "
-        f"{'Limits that intervals exceeded: ' + repeated + '.' if reasons else 'No interval exceeded a limit.'}"
+        f"{'Limits that intervals did not keep: ' + repeated + '.' if reasons else 'Every interval kept its limits.'}"
     )
 
 

@@ -30,7 +30,7 @@ class Adjustment(Method):
     repetitions: Annotated[int, Field(ge=1, le=1000)] = Field(
         default=10, description="How many settings each track has."
     )
-    step_size: Annotated[float, within(1e-6, 1e6, "a lesser step changes nothing")] | None = Field(
+    step_size: Annotated[float, within(1e-6, 1e6, "a step is at least 1e-6 and at most 1e6")] | None = Field(
         default=None, description="A step: a factor on log spacing, else a difference; default: a 40th of the span."
     )
     most_s: Annotated[float, within(2, 600, "a hand needs 2 s to feel a change, and tires within minutes")] = Field(

@@ -37,7 +37,7 @@ class UpDown(Adaptive):
         description="1down1up: a step down after each success; 2down1up: after 2 successes in a row; 3down1up: after "
         "3; 4down1up: after 4.",
     )
-    step_up: Annotated[float, within(1e-6, 1e6, "a lesser step changes nothing")] | None = Field(
+    step_up: Annotated[float, within(1e-6, 1e6, "a step is at least 1e-6 and at most 1e6")] | None = Field(
         default=None,
         description="Step after a failure: a factor on log spacing, else a difference; default: a tenth of the span.",
     )
