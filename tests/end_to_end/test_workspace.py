@@ -187,7 +187,7 @@ def test_a_protocol_file_of_a_command_is_among_the_recent_ones_and_its_results_i
     start_folder(tmp_path / "start", monkeypatch)
     keep_workspace(Workspace(tmp_path / "kept"))
     held = []
-    monkeypatch.setattr("study_app.app.session.entry.run_session", lambda chosen, _tell: held.append(chosen) or 0)
+    monkeypatch.setattr("study_app.app.session.entry.run_session", lambda chosen, _progress: held.append(chosen) or 0)
     Path("mine.toml").write_bytes(source_bytes("demo"))
     assert run("mine.toml", participant="P001") == 0
     assert held[0].results == tmp_path / "kept" / "results" / "demo"

@@ -122,7 +122,7 @@ def test_row_that_decides_nothing_is_refused(square: Path, source: str, row_of: 
 
 def test_run_takes_the_row_of_a_participant(square: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[NewSession] = []
-    monkeypatch.setattr(entry, "run_session", lambda chosen, _tell: asked.append(chosen) or 0)
+    monkeypatch.setattr(entry, "run_session", lambda chosen, _progress: asked.append(chosen) or 0)
     words = ["run", str(square), "--participant", "P025", "--row-of", "P002", "--results", str(square.parent / "r")]
     assert CliRunner().invoke(commands, words).exit_code == 0
     assert [one.row_of for one in asked] == ["P002"]

@@ -32,7 +32,7 @@ def begun(tmp_path: Path) -> SessionStore:
 def windows(monkeypatch: pytest.MonkeyPatch) -> list[NewSession]:
     """Open no window; return the sessions for which they would have been."""
     asked: list[NewSession] = []
-    monkeypatch.setattr(entry, "run_session", lambda chosen, _tell: asked.append(chosen) or 0)
+    monkeypatch.setattr(entry, "run_session", lambda chosen, _progress: asked.append(chosen) or 0)
     return asked
 
 

@@ -61,7 +61,7 @@ def test_conditions_say_liquid_delay_and_force(qtbot: Any, designer: Any) -> Non
         ("latin", 1, "balanced at 2, 4, 6 …"),
     ],
 )
-def test_an_order_says_with_how_many_it_is_even(designer: Any, order: str, repetitions: int, words: str) -> None:
+def test_an_order_states_with_how_many_it_is_balanced(designer: Any, order: str, repetitions: int, words: str) -> None:
     text = designer.file.read_text().replace('order = "shuffled"', f'order = "{order}"')
     designer.file.write_text(text.replace("repetitions = 1", f"repetitions = {repetitions}"))
     designer.controller.open("kitchen")

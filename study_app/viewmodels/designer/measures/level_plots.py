@@ -302,5 +302,5 @@ def _clipped_words(of: LevelBlock, clipped: int) -> str:
     limits = (("the force limit", of.limits.force), ("the limit of the loop", of.limits.loop))
     known = [f"above {rounded(at)} {of.words.value_unit} {name}" for name, at in limits if at is not None]
     begins = " and ".join(known) or "the limits"
-    levels_ = "level" if clipped == 1 else "levels"
-    return f"{begins[:1].upper()}{begins[1:]} reduces the force: {clipped} {levels_} have the same force."
+    reduced = "the force of 1 level" if clipped == 1 else f"the force: {clipped} levels have the same force"
+    return f"{begins[:1].upper()}{begins[1:]} reduces {reduced}."

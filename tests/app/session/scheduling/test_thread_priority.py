@@ -29,7 +29,7 @@ def kept():
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), before)
 
 
-def test_it_hurries_and_rests(kept):
+def test_it_raises_and_restores_its_priority(kept):
     made = ThreadPriority()
     if not made.raise_priority():
         pytest.skip("this user may not")
