@@ -63,7 +63,8 @@ def _of_people(
 ) -> Delivered:
     """Return a table of what was found for each participant in a block, named first."""
     rows = [
-        _person(study, tracks, one.participant) | {"block": block, **_named(one, header(columns))} for block, one in own
+        _person(study, tracks, one.participant) | {"block": block, "levels": one.n, **_named(one, header(columns))}
+        for block, one in own
     ]
     return delivered(name, (*_OF_PERSON, *columns), _frame(rows, (*_OF_PERSON, *columns)))
 

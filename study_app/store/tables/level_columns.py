@@ -76,7 +76,7 @@ SETTINGS: Final[tuple[Column, ...]] = (
 
 EXPONENTS: Final[tuple[Column, ...]] = (
     Column("block", "text", "Id of the block."),
-    Column("n", "integer", "Levels with answers that count.", minimum=2),
+    Column("levels", "integer", "Levels with answers that count.", minimum=2),
     Column(
         "exponent",
         "number",

@@ -129,7 +129,7 @@ def test_the_export_has_the_exponents_of_the_report(thickness: Path, tmp_path: P
     with (tmp_path / "study-thickness_description-exponents_data.csv").open(newline="", encoding="utf-8") as file:
         table = list(csv.DictReader(file))
     (found,) = levels_found(load_study(thickness))
-    assert [(row["participant"], row["block"], int(row["n"]), float(row["exponent"])) for row in table] == [
+    assert [(row["participant"], row["block"], int(row["levels"]), float(row["exponent"])) for row in table] == [
         (one.participant, "thickness", one.n, pytest.approx(one.exponent, rel=1e-12)) for one in found.exponents[1:]
     ]
     assert list(table[0])[5:] == list(header(EXPONENTS))
