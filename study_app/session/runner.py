@@ -114,6 +114,7 @@ class Runner:
         self._busy = False
         self._retry_s = 0.0  # when a disk that took nothing is tried again
         self._ending: tuple[Finish, float] | None = None
+        self._cause = ""
         self._listeners: list[Callable[[SessionState], None]] = []
 
     @property
@@ -135,6 +136,11 @@ class Runner:
     def stalled(self) -> str | None:
         """Why the disk takes nothing, for the operator; None while it does."""
         return None if self._state.stall is None else self._state.stall.reason
+
+    @property
+    def cause(self) -> str:
+        """What failed last, for the operator and the log; "" where nothing did since the device was connected again."""
+        return self._cause
 
     @property
     def task(self) -> TaskView | None:
@@ -239,7 +245,10 @@ class Runner:
                 return
         stall = self._state.stall
         self._state, commands = advance(self._state, event)
-        if isinstance(event, Reconnected):
+        if isinstance(event, Broke):
+            self._cause = event.what
+        elif isinstance(event, Reconnected):
+            self._cause = ""
             self._recording.forget()
         if self._carry_out_all(commands, event.at_s):
             self._tell()

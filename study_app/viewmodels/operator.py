@@ -185,13 +185,13 @@ def operator_view(
 ) -> OperatorView:
     """Return what the operator sees at ``now_s`` on the session's clock.
 
-    ``trouble`` is what no journal could say; ``device_ready`` and ``faults`` (how many there were since the program
+    ``trouble`` is what the journal does not say; ``device_ready`` and ``faults`` (how many there were since the program
     was started) are the servo's own, whatever other trouble there is; ``forces`` are shown where a study is
     single-blind; ``lost`` says of trials why their recordings were lost, also where no journal tells it yet;
     ``dropped`` counts the samples that the recording of the trial under way lacks by now; ``outlets_lost`` says why
     outlets to other programs failed.
     """
-    trouble = progress.broke or trouble
+    trouble = trouble or progress.broke
     state = _state(progress, force_on=force_on, trouble=trouble)
     waits = waits and not progress.broke
     trial = session.trial(progress)

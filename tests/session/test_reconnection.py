@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
 from study_app.errors import DeviceLost, SessionError
-from study_app.session.transitions.commands import FadeIn, StartTrial, StopForce, Write
+from study_app.session.transitions.commands import Command, FadeIn, StartTrial, StopForce, Write
 from study_app.session.transitions.events import Broke, PauseAsked, Reconnected, ResumeAsked, broken
 from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import advance
+from study_app.store.journals.journal_events import CAUSE_WITHHELD
 from study_app.store.tables import session_tables
 from tests.faults.support.worlds import StoredWorld
 from tests.session.transitions.states import state_in
@@ -83,6 +88,28 @@ def test_the_rows_of_the_trial_and_of_its_repetition_say_that_the_device_failed(
     world.until(Phase.COMPLETE)
     others = [row["notes"] for row in session_tables.trials(world.lines) if row["trial"] != number]
     assert set(others) == {None}
+
+
+@pytest.mark.parametrize("what", [FAULT, "a video of the study stopped (no picture for 1 s): check camera and files"])
+def test_in_a_study_with_videos_journal_and_tables_do_not_say_what_failed(what: str) -> None:
+    """Only some conditions show a video, so that its failure tells what a code stands for."""
+    state = state_in(Phase.TASK)
+    first, *others = state.plan.protocol.conditions
+    conditions = state.plan.protocol.conditions
+    seen = {**conditions, first: conditions[first].model_copy(update={"view": "camera"})}
+    protocol = state.plan.protocol.model_copy(update={"conditions": seen})
+    assert others
+    state = replace(state, plan=replace(state.plan, protocol=protocol))
+    trouble, commands = advance(state, Broke(20.0, what, "device"))
+    assert trouble.lost_device
+    assert fields_of(commands, "broke") == {"what": CAUSE_WITHHELD}
+    _, commands = advance(state, Broke(20.0, "a bug"))
+    assert fields_of(commands, "broke") == {"what": "a bug"}
+
+
+def fields_of(commands: Sequence[Command], event: str) -> Mapping[str, Any]:
+    (written,) = [one for one in commands if isinstance(one, Write) and one.event == event]
+    return written.fields
 
 
 def test_the_journal_says_what_device_goes_on() -> None:

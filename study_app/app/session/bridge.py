@@ -269,7 +269,7 @@ class SessionBridge(QObject):
         lost, before = self.runner.state.lost_device, self._lost
         self._lost = lost
         if lost and not before:
-            log.info(DEVICE_FAILED, ServoFault(self.parts.journal.progress.broke))
+            log.info(DEVICE_FAILED, ServoFault(self.runner.cause))
         self._show()
         if self.runner.finished and self._leaves:
             QTimer.singleShot(0, self, self._leave)
@@ -287,7 +287,8 @@ class SessionBridge(QObject):
 
     def view(self) -> OperatorView:
         """Return what the operator is to see now."""
-        view, again = self.monitor.view(self.trouble, self.runner.stalled), self.reconnection
+        trouble = (self.parts.journal.progress.broke and self.runner.cause) or self.trouble
+        view, again = self.monitor.view(trouble, self.runner.stalled), self.reconnection
         if again is None or not self.runner.state.lost_device:
             return view
         return replace(view, may_reconnect=True, reconnects=again.under_way, reconnection=again.line)

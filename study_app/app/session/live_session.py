@@ -323,7 +323,7 @@ class LiveSession(QObject):
         if self._progress is not None and self._store is not None:
             status, folder = self.bridge.parts.journal.progress.ended, self._store.folder.path
             self._progress(f"session {status}: {folder}" if status else f"session not finished: {folder}")
-        trouble = self.bridge.trouble or self.bridge.runner.stalled or self.bridge.parts.journal.progress.broke
+        trouble = self.bridge.trouble or self.bridge.runner.stalled or self.bridge.runner.cause
         if trouble and isinstance(self.bridge.failure, StudyError | None):
             self.error = StudyError(f"the session was stopped: {trouble}; all answers so far are on disk")
         elif trouble:

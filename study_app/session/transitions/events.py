@@ -132,7 +132,7 @@ class EndAsked(_Timed):
 
 @dataclass(frozen=True, slots=True)
 class Broke(_Timed):
-    """Device, servo or program failed; ``what`` is for the operator and the journal, not for the participant.
+    """Device, servo or program failed; ``what`` is for the operator and the log, not for the participant.
 
     After a failure ``by`` the device (its servo, or a video) the session can go on, see `Reconnected`.
     """

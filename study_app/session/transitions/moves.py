@@ -58,6 +58,7 @@ from study_app.session.transitions.steps import (
     start_trial,
     which,
 )
+from study_app.store.journals.journal_events import CAUSE_WITHHELD
 from study_app.store.tables.delivered import delay_error_ms, missed
 
 STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK, Phase.PAUSED}
@@ -236,13 +237,16 @@ def end(state: SessionState, event: EndAsked) -> Result:
 def call_operator(state: SessionState, event: Broke) -> Result:
     """Keep the force off and everything on the disk, and wait for the operator.
 
-    Where the device failed, ``interrupted`` keeps what the session goes back to once it is connected again.
+    Where the device failed, ``interrupted`` keeps what the session goes back to once it is connected again. In a study
+    with videos the journal does not say whether a device or a video failed: that would tell the trial's condition.
     """
     waits = state.phase in {Phase.OPENING, Phase.PAUSED, Phase.TROUBLE}
     before = state.interrupted if waits else state.phase
     interrupted = before if event.by == "device" else None
     trouble = replace(state, phase=Phase.TROUBLE, interrupted=interrupted, force_off=True)
-    written = (Write("broke", {"what": event.what}), WriteTables())
+    videos = any(one.shows_video for one in state.plan.protocol.conditions.values())
+    what = CAUSE_WITHHELD if videos and event.by == "device" else event.what
+    written = (Write("broke", {"what": what}), WriteTables())
     return trouble, (StopForce(), *break_off(state), *written, show(trouble))
 
 

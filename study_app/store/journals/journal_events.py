@@ -13,6 +13,9 @@ from study_app.store.tables.columns import DELIVERED, TRIALS, VIDEO
 
 SHOWN = 200  # characters of a bad value that a message repeats
 
+CAUSE_WITHHELD = "the session was stopped"
+"""What `broke` says where a device or a video failed in a study with videos: the cause would tell the condition."""
+
 
 @dataclass(frozen=True, slots=True)
 class Event:
@@ -108,7 +111,11 @@ EVENTS: tuple[Event, ...] = (
     Event("force_restored", "The force was turned on again.", ("by",)),
     Event("note", "The operator wrote a note, or marked the trial.", ("kind", "text")),
     Event("repeat", "The operator repeated the trial.", ("trial", "reason")),
-    Event("broke", "Device, servo or program failed.", ("what",)),
+    Event(
+        "broke",
+        "Device, servo or program failed. In a study with videos `what` does not say whether a device or a video did.",
+        ("what",),
+    ),
     Event(
         "device_reconnected",
         "The failed device, or video, was opened again; `described` is the device from then on. The force stayed off "

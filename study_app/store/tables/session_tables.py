@@ -12,6 +12,7 @@ from typing import Any
 from study_app.errors import StoreError
 from study_app.store.broken_limits import within_limits
 from study_app.store.journals.journal import Line
+from study_app.store.journals.journal_events import CAUSE_WITHHELD
 from study_app.store.progress import is_of_intervals, progress_of
 from study_app.store.tables.column import Column, header, unsealed
 from study_app.store.tables.columns import DELIVERED, TRIALS, VIDEO, tables_of
@@ -107,7 +108,9 @@ class SessionRows:
             case "broke":
                 self._broke = line["what"]
             case "device_reconnected" if self.trials:
-                self._reconnected = f"the device failed and was connected again ({self._broke})"
+                withheld = self._broke == CAUSE_WITHHELD
+                failed = f"the device failed and was connected again ({self._broke})"
+                self._reconnected = f"{CAUSE_WITHHELD} and continued" if withheld else failed
                 _note(self._last(), self._reconnected)
             case "note" if self.trials:
                 _note(self._last(), line["text"], mark=line["kind"] == "mark")

@@ -25,6 +25,7 @@ from study_app.session.pages import PausePage, TroublePage
 from study_app.store import workstation
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.unblinding import unblind
+from study_app.store.journals.journal_events import CAUSE_WITHHELD
 from study_app.store.recording_files import read_frames
 from study_app.store.verification.verify_study import verify
 from study_app.store.workstation import MachineSettings
@@ -120,12 +121,16 @@ def test_a_camera_that_is_not_there_is_refused(study: Path, run: Any, results: P
 
 
 class Operator(Person):
-    """Reconnects what failed as soon as that is offered, and resumes; ``forces`` says whether one was on meanwhile."""
+    """Reconnects what failed as soon as that is offered, and resumes.
+
+    ``forces`` says whether one was on meanwhile, ``troubles`` what was shown to have failed.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.bridge: SessionBridge | None = None
         self.forces: list[bool] = []
+        self.troubles: set[str] = set()
 
     def look(self) -> None:
         participant, operator = window(ParticipantWindow), window(OperatorWindow)
@@ -134,6 +139,8 @@ class Operator(Person):
             super().look()
             return
         self.forces.append(self.bridge.parts.servo.force_is_on)
+        if isinstance(page, TroublePage):
+            self.troubles.add(self.bridge.view().trouble)
         if isinstance(page, PausePage):
             operator.resume_asked.emit()
         elif operator.banner.reconnect.isVisible() and operator.banner.reconnect.isEnabled():
@@ -170,7 +177,8 @@ def test_footage_that_stops_is_opened_again_by_the_operator(
     lines = events(results)
     (broke,) = [line for line in lines if line["event"] == "broke"]
     (again,) = [line for line in lines if line["event"] == "device_reconnected"]
-    assert broke["what"] == "a video of the study stopped (the file is gone): check camera and files"
+    assert broke["what"] == CAUSE_WITHHELD
+    assert operator.troubles == {"a video of the study stopped (the file is gone): check camera and files"}
     assert again["device"] == "scripted"
     assert reconnected == []
     assert lines[-1]["status"] == "completed"
@@ -178,7 +186,8 @@ def test_footage_that_stops_is_opened_again_by_the_operator(
     assert not any(operator.forces)
     first, second = [row for row in rows(results, "trials") if row["notes"] != "n/a"]
     assert (first["outcome"], second["outcome"]) == ("interrupted", "complete")
-    assert first["notes"] == f"the device failed and was connected again ({broke['what']})"
+    assert first["notes"] == "the session was stopped and continued"
+    assert second["notes"] == "presented again: the session was stopped and continued"
     assert "the file is gone" in caplog.text
     caplog.clear()
 
