@@ -14,7 +14,7 @@ from scipy.signal import savgol_filter
 
 from study_app.errors import StudyError
 from study_app.evaluation.hand_motions import vectors_x
-from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES, Floats, Motion
+from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES, Floats, Motion, refuse_device
 
 FORCES: Final = ("fx_n", "fy_n", "fz_n")
 ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")
@@ -63,9 +63,8 @@ def read(path: Path) -> Measured | FlowCurve:
     StudyError
         The file cannot be read or used; the first thing wrong with it in one line.
     """
-    if path.is_char_device():
-        raise StudyError(f"cannot read {path}: it is a device, which may have no end; name a CSV file of {HEADER}")
     try:
+        refuse_device(path)
         with path.open(newline="", encoding="utf-8-sig") as file:
             numbered = [(number, line) for number, line in enumerate(file, start=1) if line.strip()]
     except OSError as error:

@@ -61,9 +61,8 @@ def read(path: Path) -> Motion:
     StudyError
         The file cannot be read.
     """
-    if path.is_char_device():
-        raise StudyError(f"cannot read the motion {path}: it is a device, which may have no end; name a CSV file")
     try:
+        refuse_device(path)
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = list(csv.reader(file, strict=True))
     except OSError as error:
@@ -81,6 +80,20 @@ def read(path: Path) -> Motion:
         raise ProtocolError(str(path), (Problem("rows", "there are none", hint="give at least one"),))
     rows = _numbers(path, lines[1:], len(header))
     return Motion(rows[:, 0], rows[:, 1:4], rows[:, 4:] if len(header) > len(PLACES) else None)
+
+
+def refuse_device(path: Path) -> None:
+    """Refuse to read a device, such as ``/dev/zero``, which may have no end.
+
+    Raises
+    ------
+    StudyError
+        It is one.
+    OSError
+        The system cannot say what it is.
+    """
+    if path.is_char_device():
+        raise StudyError(f"cannot read {path}: it is a device, which may have no end; name a CSV file")
 
 
 def _numbers(path: Path, lines: list[list[str]], columns: int) -> Floats:

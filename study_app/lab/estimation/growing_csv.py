@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES
+from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES, refuse_device
 from study_app.lab.estimation.rows import FORCES, CentredVelocity, Floats, Rows, no_rows
 
 HEADER: Final = f"{','.join(PLACES + FORCES)}, with {','.join(VELOCITIES)} where they are known"
@@ -69,9 +69,8 @@ class GrowingCsv:
 
     def _bytes(self) -> list[str]:
         """Return the whole lines that were not read yet."""
-        if self.path.is_char_device():
-            raise StudyError(f"cannot read {self.path}: it is a device, which may have no end; name a CSV file")
         try:
+            refuse_device(self.path)
             with self.path.open("rb") as file:
                 size = file.seek(0, 2)
                 if size < self._read:

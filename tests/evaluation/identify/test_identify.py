@@ -330,3 +330,8 @@ def test_a_device_is_not_read():
     """One such as /dev/zero has no end."""
     with pytest.raises(StudyError, match="it is a device, which may have no end"):
         measured_force.read(Path("/dev/null"))
+
+
+def test_a_file_that_the_system_does_not_look_at_is_refused(tmp_path):
+    with pytest.raises(StudyError, match=r"cannot read .*: File name too long; name a CSV file"):
+        measured_force.read(tmp_path / f"{'x' * 300}.csv")

@@ -149,3 +149,9 @@ def test_a_device_is_not_read(tmp_path):
     with pytest.raises(StudyError, match="it is a device, which may have no end"):
         read(Path("/dev/null"))
     assert len("".join(problems(tmp_path, "x" * 5000 + ",0,0,0"))) < 300
+
+
+def test_a_file_that_the_system_does_not_look_at_is_refused(tmp_path):
+    """As one below a folder without permission to enter it."""
+    with pytest.raises(StudyError, match=r"cannot read the motion .*: File name too long; name a CSV file"):
+        read(tmp_path / f"{'x' * 300}.csv")
