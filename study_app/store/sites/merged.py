@@ -15,6 +15,7 @@ site nor an ID holds a dash, so that equal IDs of two sites are two participants
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -126,8 +127,13 @@ def _is_site(site: Site) -> bool:
 def _refuse_links(merged: Merged) -> None:
     """Refuse a folder of a site that lies elsewhere: it would be read as if it were the copy."""
     for folder in map(merged.folder, merged.names):
-        if not folder.resolve().is_relative_to(merged.path.resolve()):
-            raise StoreError(f"{folder} leads out of {merged.path}, to {folder.resolve()}: put the folder itself there")
+        if not (real := _real(folder)).is_relative_to(_real(merged.path)):
+            raise StoreError(f"{folder} leads out of {merged.path}, to {real}: put the folder itself there")
+
+
+def _real(path: Path) -> Path:
+    """Return a path without links; a loop of links, for which `Path.resolve` raises RuntimeError, stays."""
+    return Path(os.path.realpath(path))
 
 
 def folders_of(folder: Path) -> dict[str, Path]:
@@ -197,7 +203,7 @@ def sessions_in(folders: Iterable[Path]) -> tuple[SessionFolder, ...]:
 
 def merged_above(folder: Path) -> Path | None:
     """Return the merged study of which ``folder`` is a copy of a site; None where it is none."""
-    place = folder.resolve()
+    place = _real(folder)
     inside = place.parent.name == FOLDER and (place.parents[1] / MANIFEST).is_file()
     return place.parents[1] if inside else None
 

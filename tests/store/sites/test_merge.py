@@ -264,6 +264,14 @@ def test_a_site_elsewhere_is_not_read(pooled: Path, tmp_path: Path) -> None:
         read_merged(pooled)
 
 
+def test_a_site_that_is_a_loop_of_links_is_missing(pooled: Path) -> None:
+    shutil.rmtree(pooled / "sites/B")
+    (pooled / "sites/B").symlink_to("B")
+    assert "sites/B: is missing, but sites.json lists site B" in "\n".join(map(str, verify_folder(pooled).errors))
+    with pytest.raises(StoreError, match="is the copy of a site in the merged study"):
+        check_study(StudyFolder(pooled / "sites/B"), "demo")
+
+
 def test_a_list_of_sites_that_was_changed_is_an_error(pooled: Path) -> None:
     path = pooled / "sites.json"
     held = json.loads(path.read_text())
