@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterable
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import TypeVar
 
@@ -102,7 +103,9 @@ def _compare(merged: Merged, site: Site, found: Gathered) -> None:
     if (name := described_study(study)) not in (None, merged.study):
         found.error(study.path, f"is of study {name}, but {merged.manifest.name} lists sites of {merged.study}")
     with contextlib.suppress(StoreError):  # said when the site is checked
-        erased = sum(len(one.sessions) for one in tombstones(study).values())
+        merged_at = datetime.fromisoformat(site.merged_at)
+        since = [one for one in tombstones(study).values() if datetime.fromisoformat(one.at) >= merged_at]
+        erased = sum(len(one.sessions) for one in since)
         if (there := len(study.sessions())) + erased < site.sessions:
             which = f"{there} of the {site.sessions} sessions that {merged.manifest.name} lists"
             found.error(study.path, f"has {which}: restore the others from a copy")

@@ -12,6 +12,7 @@ from study_app.errors import StoreError
 from study_app.store.atomic import append_line, cannot_read, open_regular, read_regular
 from study_app.store.checksums import read_checksums, sha256
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
+from study_app.store.journals.journal_events import holds
 from study_app.store.journals.parsing import parse_json
 from study_app.store.verification.fingerprints import fingerprint
 
@@ -40,7 +41,7 @@ class ErasedSession:
 
 @dataclass(frozen=True, slots=True)
 class Tombstone:
-    """One withdrawal; a line of ``withdrawals.jsonl``."""
+    """One withdrawal; a line of ``withdrawals.jsonl``. ``at`` is when the data were erased from that folder."""
 
     participant: str
     at: str
@@ -103,9 +104,9 @@ def _tombstone(path: Path, number: int, line: bytes) -> Tombstone:
         sessions = tuple(ErasedSession(**one) for one in held.pop("sessions"))
         made = Tombstone(**held, sessions=sessions)
         proofs = (text for one in sessions for text in (one.begun, one.checksums, one.fingerprint))
-        texts = (made.participant, made.at, made.by, made.reason, *proofs)
+        texts = (made.participant, made.by, made.reason, *proofs)
         typed = all(isinstance(text, str) for text in texts) and all(isinstance(one.session, int) for one in sessions)
-        if typed and ID_PATTERN.fullmatch(made.participant):
+        if typed and holds("at", made.at) and ID_PATTERN.fullmatch(made.participant):
             return made
     except (ValueError, KeyError, TypeError, AttributeError):
         pass

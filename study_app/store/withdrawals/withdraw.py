@@ -115,7 +115,7 @@ def withdraw(
         try:
             if others := _others(copy, tombstone):
                 left += [f"{other} is not a session that was erased: {copy.path} was left" for other in others]
-            elif _erase(copy, tombstone):
+            elif _erase(copy, replace(tombstone, at=at)):
                 erased.append(copy.path)
                 left += _names(copy, participant)
             reached += [copy.path] if _is_buried(copy, tombstone) else []

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -293,6 +294,31 @@ def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[s
     shutil.rmtree(pooled / "sites/A/data/sub-P002")
     said = "sites/A: has 1 of the 2 sessions that sites.json lists: restore the others from a copy"
     assert said in list(map(str, verify_folder(pooled).errors))
+
+
+def test_a_withdrawal_before_merging_excuses_no_session_that_was_deleted_later(
+    labs: dict[str, Path], results: Path
+) -> None:
+    lab = Path(shutil.copytree(labs["A"], results / "lab"))
+    before = datetime.now().astimezone() - timedelta(hours=1)
+    withdraw(lab, "P001", by="AK", reason="asked", now=before)
+    unfinished(lab / "data/sub-P002/ses-01")
+    pooled = merge({"A": lab, "B": labs["B"]}, results / "pooled").path
+    assert verify_folder(pooled).sound
+    shutil.rmtree(pooled / "sites/A/data/sub-P002")
+    said = "sites/A: has 0 of the 1 sessions that sites.json lists: restore the others from a copy"
+    assert said in list(map(str, verify_folder(pooled).errors))
+
+
+def test_a_withdrawal_that_reaches_an_older_copy_after_merging_is_no_error(
+    labs: dict[str, Path], results: Path, tmp_path: Path
+) -> None:
+    """The site withdrew the participant, then a copy from before was merged, and then withdrawn from."""
+    lab, older = (Path(shutil.copytree(labs["A"], tmp_path / name)) for name in ("lab", "older"))
+    withdraw(lab, "P001", by="AK", reason="asked", now=datetime.now().astimezone() - timedelta(hours=1))
+    pooled = merge({"A": older, "B": labs["B"]}, results / "pooled").path
+    assert withdraw(lab, "P001", by="AK", reason="asked", also=[results]).folders == (pooled / "sites/A",)
+    assert verify_folder(pooled).sound
 
 
 def unfinished(session: Path) -> None:

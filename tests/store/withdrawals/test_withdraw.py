@@ -226,6 +226,15 @@ def test_a_forged_tombstone_leads_out_of_no_folder(study: Path) -> None:
     assert not verify(study).sound
 
 
+def test_a_tombstone_without_a_moment_is_no_tombstone(study: Path) -> None:
+    erase(study)
+    line = (study / "withdrawals.jsonl").read_text()
+    for wrong in ("yesterday", "2026-11-22T09:30:00", ""):
+        (study / "withdrawals.jsonl").write_text(line.replace("2026-11-22T09:30:00+00:00", wrong))
+        with pytest.raises(StoreError, match=r"withdrawals.jsonl, line 1 is not a withdrawal"):
+            tombstones(StudyFolder(study))
+
+
 def test_a_running_session_is_not_erased(study: Path) -> None:
     opening = open_alone(study / "data" / f"sub-{PERSON}" / "ses-01")
     before = contents(study)
