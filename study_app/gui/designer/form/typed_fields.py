@@ -179,14 +179,15 @@ class TypedText(_Typed, QPlainTextEdit):
         self.setUndoRedoEnabled(False)
         self.setFont(font("label", weight=400))
         self.setFixedHeight(118)
-        self._known = ""
+        self._known, self._showing = "", False
         self.textChanged.connect(self._note_change)
 
     def _note_change(self) -> None:
         """Note what was typed; Qt says so of another font or margin, too."""
         if self.words() != self._known:
             self._known = self.words()
-            self.note()
+            if not self._showing:
+                self.note()
 
     def words(self) -> str:
         """Return the text."""
@@ -199,8 +200,9 @@ class TypedText(_Typed, QPlainTextEdit):
     def show_text(self, text: str) -> None:
         """Show a text, unless something else is being typed."""
         if not self.pending and text != self.words():
-            self._known = text
-            self.setPlainText(text)
+            self._showing = True
+            self.setPlainText(text)  # Qt makes a paragraph of each separator of lines: the words may be others
+            self._showing = False
 
 
 class TypedSentence(TypedText):
