@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from PySide6.QtCore import QMimeData
 
 from study_app.gui.designer.form.typed_fields import HAND_ON_MS, TypedSentence, TypedText
 
@@ -26,3 +27,22 @@ def test_a_shown_text_that_qt_normalises_is_no_edit(qtbot: Any, kind: type[Typed
     assert field.pending
     field.flush()
     assert typed == ["ca\nb"]
+
+
+@pytest.mark.parametrize(
+    ("pasted", "whole"),
+    [
+        (" thick", "very thick"),
+        ("  thick  ", "very  thick  "),
+        (" thick \n and\r\nslow", "very thick and slow"),
+        ("\u2028thick\u2029slow", "very thick slow"),
+    ],
+)
+def test_a_pasted_text_keeps_its_spaces_but_no_line_break(qtbot: Any, pasted: str, whole: str) -> None:
+    field = TypedSentence("Text")
+    qtbot.addWidget(field)
+    field.insertPlainText("very")
+    data = QMimeData()
+    data.setText(pasted)
+    field.insertFromMimeData(data)
+    assert field.words() == whole

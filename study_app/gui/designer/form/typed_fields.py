@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QEvent, QMimeData, QSize, Qt, QTimer, Signal
@@ -18,6 +19,7 @@ CLICK_MS = 10
 FIELD_PX = 34
 MOST_LINES, SENTENCE_EDGE_PX = 6, 16
 """How many lines a sentence has at most, and what its field needs above and below them [px]."""
+LINE_BREAK = re.compile(r"\s*[\r\n\u2028\u2029]+\s*")
 KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
 
 if TYPE_CHECKING:
@@ -243,5 +245,5 @@ class TypedSentence(TypedText):
             super().keyPressEvent(event)
 
     def insertFromMimeData(self, source: QMimeData) -> None:  # noqa: N802 - Qt's name
-        """Paste a text as one paragraph."""
-        self.insertPlainText(" ".join(source.text().split()))
+        """Paste a text as one paragraph: a space for each line break, other spaces as they are."""
+        self.insertPlainText(LINE_BREAK.sub(" ", source.text()))
