@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
@@ -31,6 +31,7 @@ ROW_PX = FIELD_PX + 7
 INFINITE_PX = 1 << 24
 FOOT_FROM = 460
 """The height of the form from which it has a foot [px]."""
+SHOWN_OR_HIDDEN = Qt.WidgetAttribute.WA_WState_ExplicitShowHide
 BELOW = 2
 """Where the keys of an element begin in a path, after its section and its id."""
 
@@ -136,9 +137,24 @@ class FormCard(Card):
         apply_theme_within(inside, self.theme)
         self._replace(inside)
         self.area.verticalScrollBar().setValue(down_px)
-        QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(down_px))
+        QTimer.singleShot(0, self.area, lambda: self._settle(down_px, other=before is None))
         if focused is not None:
             self.focus(focused)
+
+    def _settle(self, down_px: int, *, other: bool) -> None:
+        """Scroll once the editors have their places: in another element to the row that got the keyboard meanwhile."""
+        if other and self._focused is not None:
+            self._reveal(self._focused)
+        else:
+            self.area.verticalScrollBar().setValue(down_px)
+
+    def _reveal(self, row: RowWidget) -> None:
+        """Scroll to a row, and in a high row to the part with the keyboard; rows made just now are laid out before."""
+        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
+        self.area.ensureWidgetVisible(row, 0, 40)
+        keyboard = self.window().focusWidget()
+        if keyboard is not None and row.isAncestorOf(keyboard):
+            self.area.ensureWidgetVisible(keyboard, 0, 40)
 
     def _fill(self, form: Form, whole: QVBoxLayout) -> Iterator[int]:
         """Make the editors from top to bottom; yield how high each part is, about [px]."""
@@ -194,8 +210,10 @@ class FormCard(Card):
             for _height in unmade:
                 pass
             apply_theme_within(self.inside, self.theme)
-            for row in (*self._made, *self.others):
-                row.show()
+            for around in (self.inside, *self.inside.findChildren(Panel)):
+                for part in around.children():  # Qt shows them later: what is hidden takes no keyboard and no room
+                    if isinstance(part, QWidget) and not part.testAttribute(SHOWN_OR_HIDDEN):
+                        part.show()
             self.show_repairs(self._known)
             self.show_selected(self._together)
 
@@ -292,7 +310,7 @@ class FormCard(Card):
             return False
         found.field.take_keyboard()
         self._come(found)
-        self.area.ensureWidgetVisible(found, 0, 40)
+        self._reveal(found)
         return True
 
     def focus_first(self) -> None:
@@ -312,7 +330,9 @@ class FormCard(Card):
             return
         found.setFocus(Qt.FocusReason.OtherFocusReason)
         found.selectAll()
-        self.area.ensureWidgetVisible(found, 0, 60)
+        row = next(row for row in self.rows if row.isAncestorOf(found))
+        self._come(row)
+        self._reveal(row)
 
     def refuse(self, path: tuple[str | int, ...], sentence: str) -> None:
         """Say at the field of a place why it was not changed."""

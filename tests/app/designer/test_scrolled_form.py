@@ -1,0 +1,48 @@
+"""The form in a small window: the row with the keyboard is seen, and Tab goes from row to row."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QPoint, QRect
+from PySide6.QtWidgets import QApplication, QWidget
+
+pytestmark = pytest.mark.slow
+
+BLOCK = ("blocks", "liquids")
+
+
+@pytest.fixture
+def form(designer: Any) -> Any:
+    """The form of a page, in a window that shows only the first rows of a block."""
+    designer.controller.open("kitchen")
+    designer.window.resize(1024, 640)
+    designer.select(("pages", "welcome"))
+    return designer.place.form
+
+
+def is_seen(form: Any, part: QWidget) -> bool:
+    viewport = form.area.viewport()
+    return viewport.rect().contains(QRect(part.mapTo(viewport, QPoint()), part.size()))
+
+
+def test_a_row_below_the_fold_of_another_element_is_scrolled_to(qtbot: Any, designer: Any, form: Any) -> None:
+    designer.editing.select(BLOCK)
+    last = form.form.rows[-1].row.path
+    assert form.focus(last)
+    for _ in range(2):
+        row = designer.row(*last)
+        assert row.isAncestorOf(QApplication.focusWidget())
+        assert is_seen(form, row)
+        qtbot.wait(50)
+    assert form.area.verticalScrollBar().value() > 0
+
+
+def test_another_element_is_shown_from_its_top(qtbot: Any, designer: Any, form: Any) -> None:
+    designer.select(BLOCK)
+    form.focus(form.form.rows[-1].row.path)
+    qtbot.wait(50)
+    designer.select(("liquids", "thin"))
+    qtbot.wait(50)
+    assert form.area.verticalScrollBar().value() == 0
