@@ -91,12 +91,14 @@ class LabOpening(QObject):
     def _open(self, name: str, cancelled: threading.Event) -> None:
         """Compile, open and start, in a thread of its own; whatever comes of it goes to ``_end``."""
         try:
+            loads = self._open_live is None
             if self._open_live is None:
                 from study_app.lab.live import open_live  # noqa: PLC0415 - the compiler: only once it is needed
 
                 self._open_live = partial(open_live, options=self._options)
             made: object = self._open_live(name, progress=self.said.emit, cancelled=cancelled.is_set)
-            gc.freeze()  # the windows' thread need not look through all that was loaded here
+            if loads:
+                gc.freeze()  # the windows' thread need not look through all that was loaded here
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
         self._done.emit((made, cancelled))

@@ -6,12 +6,14 @@ collection is therefore off, and a timer of their own thread collects as often a
 
 A collection of everything takes as long as ten frames. Collections therefore pass over (``gc.freeze``) what a thread
 has loaded, all there was when a session began, until its end, and what made a collection of everything take long, until
-the next session has ended.
+the next session has ended, or was cancelled. Between sessions, objects that were passed over and became garbage since
+are bounded: beyond ``MOST_FROZEN`` objects, the next collection looks at everything.
 """
 
 from __future__ import annotations
 
 import gc
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +23,8 @@ from PySide6.QtCore import QTimer
 PERIOD_MS = 200
 YOUNG, OLDEST = 1, 2  # generations; collecting up to the first takes no time
 LONG_S = 0.02
+MOST_FROZEN = 500_000  # objects; the modules of home, designer, lab and session have 170 000
+_session_runs = threading.Event()
 
 
 def collect_if_due() -> int | None:
@@ -34,10 +38,12 @@ def collect_if_due() -> int | None:
 
 
 def _collect() -> None:
-    """Collect what is due; pass over all there is once that took long."""
+    """Collect what is due; pass over all there is once that took long, up to a bound between sessions."""
     began_s = time.thread_time()
     if collect_if_due() == OLDEST and time.thread_time() - began_s > LONG_S:
         gc.freeze()
+        if not _session_runs.is_set() and gc.get_freeze_count() > MOST_FROZEN:
+            gc.unfreeze()
 
 
 def freeze_garbage() -> None:
@@ -45,12 +51,14 @@ def freeze_garbage() -> None:
 
     A collection of all that a session is made of takes as long as several frames; of what comes later, next to nothing.
     """
+    _session_runs.set()
     gc.collect(YOUNG)
     gc.freeze()
 
 
 def unfreeze_garbage() -> None:
     """Look at everything again when a collection is due."""
+    _session_runs.clear()
     gc.unfreeze()
 
 
@@ -66,7 +74,7 @@ def collecting_here() -> Iterator[None]:
         yield
     finally:
         timer.stop()
-        gc.unfreeze()
+        unfreeze_garbage()
         if before:
             gc.collect()
             gc.enable()

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices_controller import diagnosis
+from study_app.app.session.garbage_collection import unfreeze_garbage
 from study_app.app.session.termination import BY_SIGNAL_S
 from study_app.app.workstation_controller import described, screen_number, settings_here, text_scale_on
 from study_app.authoring.versions.contents import keep_content
@@ -167,7 +168,8 @@ class LiveSession(QObject):
                 videos = videos_of(self.chosen, study, self.settings.camera, rig)
                 facts = measured(rig, self.chosen, videos, sleep=self._ending.wait)
                 made: object = Ready(rig, facts, outlets=outlets, videos=videos)
-            gc.freeze()  # the windows' thread need not look through all that was loaded here
+            if not self._closed:
+                gc.freeze()  # the windows' thread need not look through all that was loaded here
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
             with suppress(Exception):  # what came first says why
@@ -341,6 +343,8 @@ class LiveSession(QObject):
             return
         self._closed = True
         self._ending.set()
+        if self.bridge is None:
+            unfreeze_garbage()  # a bridge does it when it leaves
         try:
             self._close_note()
             self._close_preflight()

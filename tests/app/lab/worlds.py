@@ -75,7 +75,7 @@ class SlowDevices:
         self.most = 0
         self.gate = threading.Event()
 
-    def __call__(self, name: str, *, progress: Any, cancelled: Any) -> Any:
+    def __call__(self, name: str, *, progress: Any, cancelled: Any, **_: Any) -> Any:
         self.asked.append(name)
         self.open += 1
         self.most = max(self.most, self.open)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -109,3 +110,12 @@ def test_a_device_that_fails_between_two_steps_ends_the_session(qtbot: Any) -> N
     session._open_windows(SessionError("the device sends nothing"))
     qtbot.wait(20)
     assert (session.taken, ended, str(session.error)) == ([0], [True], "the device sends nothing")
+
+
+@pytest.mark.usefixtures("qapp")
+def test_a_session_that_never_began_leaves_no_garbage_frozen() -> None:
+    session = Stepped()
+    session._open_windows(READY)
+    gc.freeze()
+    session.cancel()
+    assert gc.get_freeze_count() == 0
