@@ -44,6 +44,7 @@ from study_app.store.folders import StudyFolder
 if TYPE_CHECKING:
     from study_app.app.session.bridge import SessionBridge
     from study_app.app.session.preflight_controller import Preflight
+    from study_app.gui.operator import OperatorWindow
     from study_app.outlets.session_outlets import Outlets
     from study_app.store.sessions.open_session import SessionStore
     from study_app.video.sources import Videos
@@ -58,12 +59,13 @@ NOT_EXAMINED = (
 
 
 def load_windows() -> None:
-    """Load the modules of a session's windows while the note is shown: a third of a second; no object is made."""
+    """Load what a session's windows need while the note is shown: modules, and versions, read from the disk once."""
     import study_app.app.session.preflight_controller  # noqa: PLC0415
     import study_app.app.session.session_windows  # noqa: PLC0415
+    import study_app.store.receipt  # noqa: PLC0415
     import study_app.store.recording_writer  # noqa: PLC0415 - and pyarrow, which the recorder is made with
 
-    study_app.store.receipt.versions()  # read from the disk once
+    study_app.store.receipt.versions()
 
 
 class LiveSession(QObject):
@@ -101,6 +103,7 @@ class LiveSession(QObject):
         self._ending = threading.Event()
         self._working = False
         self._steps: Iterator[None] | None = None
+        self._operator: OperatorWindow | None = None  # until the bridge has it
         self.patience_s = OPENING_PATIENCE_S
         self._opening: threading.Thread | None = None
         self._ready.connect(self._begin, Qt.ConnectionType.QueuedConnection)
@@ -241,7 +244,7 @@ class LiveSession(QObject):
         self._pass_checks(found)
         screens = described(self.settings, shown_on, operated_on)
         yield
-        operator = make_cockpit(chosen, protocol, rig, self.theme)
+        operator = self._operator = make_cockpit(chosen, protocol, rig, self.theme)
         yield  # the last one: no session is on the disk without its windows
         self._store = open_store(chosen, protocol, source, rig, screens, made.masking, made.outlets, made.videos)
         if not chosen.played:
@@ -268,6 +271,7 @@ class LiveSession(QObject):
             photodiode=self.settings.photodiode,
             videos=made.videos,
         )
+        self._operator = None
         self.bridge.done.connect(self._finished)
         self.bridge.diagnose_asked.connect(self.diagnose)
         self._close_note()
@@ -348,6 +352,9 @@ class LiveSession(QObject):
         try:
             self._close_note()
             self._close_preflight()
+            self._steps = None
+            if self._operator is not None:
+                self._operator.deleteLater()
             self._let_go()
         except StudyError as error:
             self.error = self.error or error  # what came first says why

@@ -9,11 +9,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QEvent, QTimer
+from PySide6.QtWidgets import QApplication
 
 from study_app.app.session import live_session
 from study_app.app.session.live_session import LiveSession
 from study_app.errors import SessionError
+from study_app.gui.operator import OperatorWindow
 from study_app.gui.theme.theme import LIGHT
 from study_app.session.request import NewSession
 from study_app.session.start import Ready
@@ -119,3 +121,38 @@ def test_a_session_that_never_began_leaves_no_garbage_frozen() -> None:
     gc.freeze()
     session.cancel()
     assert gc.get_freeze_count() == 0
+
+
+class Measured(Ready):
+    """What was made ready, with facts that no check looks at."""
+
+    def facts_with(self, refresh_hz: float, scaling: float) -> Any:
+        return self.facts
+
+
+def cockpits() -> list[Any]:
+    return [window for window in QApplication.topLevelWidgets() if isinstance(window, OperatorWindow)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["cancelled", "refused"])
+def test_no_cockpit_stays_of_a_session_that_never_began(qtbot: Any, monkeypatch: pytest.MonkeyPatch, how: str) -> None:
+    rig: Any = SimpleNamespace(device=SimpleNamespace(workspace_m=(0.1, 0.1, 0.1)), stop=lambda: None)
+    made: list[OperatorWindow] = []
+    monkeypatch.setattr(live_session, "checks", lambda *_: ())
+    monkeypatch.setattr(live_session, "open_store", refuse)
+    session = LiveSession(CHOSEN, LIGHT)
+    session.over.connect(lambda: made.extend(cockpits()))
+    if how == "cancelled":
+        steps = session.open_windows(Measured(rig, SimpleNamespace()))
+        session._steps = steps
+        next(steps)
+        next(steps)
+        session.cancel()
+    else:
+        session._open_windows(Measured(rig, SimpleNamespace()))
+        qtbot.waitUntil(lambda: session.error is not None)
+        assert str(session.error) == "the device sends nothing"
+    assert len(made) == 1
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    assert cockpits() == []
