@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Final, NamedTuple
 
 from study_app.errors import AnalysisError, StoreError
-from study_app.store.atomic import sweep_old, temporary_path, write_through
+from study_app.store.atomic import cause, open_regular, sweep_old, temporary_path, write_through, write_whole
+
+_CHUNK_BYTES: Final = 1 << 20
 
 
-def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
+class FileCopy(NamedTuple):
+    """A file to copy in parts, since it may be larger than the memory, and the SHA-256 that it must have."""
+
+    source: Path
+    sha256: str
+
+
+def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, ...]:
     """Put ``files`` (name to content) into the folder ``to``, which is created; older files of these names give way.
 
     All are written under temporary names and flushed to the disk before the first takes its name, so that a full disk
@@ -19,7 +31,8 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     Raises
     ------
     AnalysisError
-        The folder cannot be written, or a file would lie outside of it; it is as before.
+        The folder cannot be written, a file would lie outside of it, or one to copy cannot be read or has another
+        SHA-256; the folder is as before.
     """
     for name in files:
         if not (to / name).resolve().is_relative_to(to.resolve()):
@@ -32,16 +45,21 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
         for folder in created:
             folder.mkdir(exist_ok=True)
         for name, content in files.items():
-            write_through(staged[name], content)
+            if isinstance(content, FileCopy):
+                _copy(content, staged[name])
+            else:
+                write_through(staged[name], content)
         for name, path in staged.items():
             path.replace(to / name)
-    except OSError as error:
+    except (OSError, AnalysisError) as error:
         for path in staged.values():
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
         for folder in reversed(created):
             with contextlib.suppress(OSError):
                 folder.rmdir()
+        if isinstance(error, AnalysisError):
+            raise
         why = "it is a file, not a folder" if to.is_file() else error.strerror or type(error).__name__
         raise AnalysisError(
             f"{to} cannot be written ({why}): choose another folder with --to, free disk space, or correct the "
@@ -50,6 +68,31 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     for folder in {path.parent for path in staged.values()}:
         sweep_old(folder)
     return tuple(to / name for name in files)
+
+
+def _copy(copied: FileCopy, to: Path) -> None:
+    """Write a new file ``to``, and flush it to the disk."""
+    with to.open("xb", buffering=0) as file:
+        for part in _parts(copied):
+            write_whole(file, part)
+        os.fsync(file.fileno())
+
+
+def _parts(copied: FileCopy) -> Iterator[bytes]:
+    """Yield the content of a file to copy; its errors name it, not the folder that is written."""
+    digest = hashlib.sha256()
+    try:
+        with open_regular(copied.source) as file:
+            while part := file.read(_CHUNK_BYTES):
+                digest.update(part)
+                yield part
+    except OSError as error:
+        raise AnalysisError(
+            f"{copied.source} cannot be read ({cause(error)}): nothing was written; correct its permissions, or "
+            "restore it from a copy"
+        ) from error
+    if digest.hexdigest() != copied.sha256:
+        raise AnalysisError(f"{copied.source} changed while it was copied: nothing was written; repeat the command")
 
 
 def make_folder(to: Path) -> None:

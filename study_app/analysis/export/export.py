@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 from study_app.analysis.export import psychds_dataset, spss
@@ -12,6 +12,7 @@ from study_app.analysis.export.typed_tables import deliver
 from study_app.analysis.export.wide_table import wide
 from study_app.analysis.results.section_failures import Failure, Progress, silent
 from study_app.analysis.tables.study_tables import Study, load_study
+from study_app.store.output_files import FileCopy
 from study_app.store.withdrawals.output_log import write_output
 
 
@@ -64,7 +65,7 @@ def export(
     return written
 
 
-def _files(study: Study, extras: Collection[Extra]) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
+def _files(study: Study, extras: Collection[Extra]) -> tuple[Mapping[str, bytes | FileCopy], tuple[Failure, ...]]:
     """Return all files by their names, and the sections of the report to share that failed."""
     across, cells = wide(study) if extras else (None, {})
     tables = [*deliver(study), *([] if across is None else [across])]

@@ -13,6 +13,7 @@ from study_app.analysis.export.materials import materials
 from study_app.analysis.tables.compared_blocks import spoken
 from study_app.analysis.tables.study_tables import Study
 from study_app.protocol.texts import text_in
+from study_app.store.output_files import FileCopy
 from study_app.store.tables.cells import variable
 from study_app.store.tables.column import Column
 
@@ -27,7 +28,7 @@ CREDITS: Final = {"authors": "author", "license": "license", "citation": "citati
 
 def dataset_files(
     study: Study, tables: Mapping[str, bytes], columns: Mapping[str, tuple[Column, ...]], report: Mapping[str, bytes]
-) -> dict[str, bytes]:
+) -> dict[str, bytes | FileCopy]:
     """Return the folder's files by their paths.
 
     ``tables`` and ``columns`` go by the names of the tables' files; ``report`` has the files of the report, its own
@@ -36,7 +37,7 @@ def dataset_files(
     shown = {name: content for name, content in report.items() if name not in tables and name != SCRIPT}
     description = _description(study, columns)
     own = materials(study)
-    files = {
+    files: dict[str, bytes | FileCopy] = {
         "dataset_description.json": _json(description),
         "data/file_metadata.json": _json({key: description[key] for key in description if key != VARIABLES}),
         **{f"data/{PurePosixPath(name).stem}.json": _sidecar(study, name, columns[name]) for name in tables},

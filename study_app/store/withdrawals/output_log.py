@@ -17,7 +17,7 @@ from typing import Final
 from study_app.errors import StoreError
 from study_app.store.atomic import append_line, cannot_write
 from study_app.store.journals.parsing import parse_json
-from study_app.store.output_files import write_files
+from study_app.store.output_files import FileCopy, write_files
 from study_app.user_folder import data_folder
 
 NAME: Final = "outputs.jsonl"
@@ -37,7 +37,7 @@ class Output:
         return tuple(path for name in self.files if (path := self.to / name).is_file())
 
 
-def write_output(study: Path, to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
+def write_output(study: Path, to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, ...]:
     """Write ``files`` of the results in ``study`` into the folder ``to`` (as `write_files`), and note where they are.
 
     Raises

@@ -12,11 +12,15 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.analysis.export.export import export
+from study_app.analysis.export.materials import materials
 from study_app.analysis.export.psychds_dataset import FOLDER
+from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
+from study_app.errors import AnalysisError
 from study_app.protocol.source.files import shipped_file
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.blinding import reveal
+from study_app.store.output_files import FileCopy, write_files
 from study_app.store.verification.psychds import validate
 
 pytestmark = pytest.mark.slow
@@ -81,14 +85,53 @@ def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path,
 def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -> None:
     digest = hashlib.sha256(FOOTAGE).hexdigest()
     footage = tmp_path / "protocols" / "waves.mp4"
-    for change in (lambda: footage.write_bytes(b"other waves"), footage.unlink):
+    for change, why in (
+        (lambda: footage.write_bytes(b"other waves"), "the file of this name has another SHA-256"),
+        (footage.unlink, "cannot be read: No such file or directory"),
+    ):
         change()
         export(kitchen, tmp_path / "out", extras=["psych-ds"])
         folder = tmp_path / "out" / FOLDER
         assert (folder / "materials" / "kitchen.toml").is_file()
         assert not (folder / "materials" / "waves.mp4").exists()
         readme = (folder / "README.md").read_text(encoding="utf-8")
-        assert f"Missing in `materials`: waves.mp4 (SHA-256 {digest}). Add them." in readme
+        assert f"Missing in `materials`: waves.mp4 (SHA-256 {digest}; {why}). Add them." in readme
+
+
+def test_only_the_footage_of_the_study_is_read_and_never_at_once(
+    kitchen: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    protocols, hashed = tmp_path / "protocols", list[str]()
+    text = (protocols / "kitchen.toml").read_text(encoding="utf-8")
+    other = text.replace('"kitchen"', '"aquarium"', 1).replace("waves.mp4", "fish.mp4", 1)
+    (protocols / "aquarium.toml").write_text(other, encoding="utf-8")
+    (protocols / "fish.mp4").write_bytes(b"fish")
+
+    def watched(path: Path) -> str:
+        hashed.append(path.name)
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+
+    monkeypatch.setattr("study_app.protocol.source.liquid_files.file_hash", watched)
+    shared = materials(load_study(kitchen))
+    assert set(hashed) == {"waves.mp4"}
+    assert shared.files["waves.mp4"] == FileCopy(protocols / "waves.mp4", hashlib.sha256(FOOTAGE).hexdigest())
+
+
+def test_footage_that_changes_while_it_is_copied_leaves_nothing(tmp_path: Path) -> None:
+    source, to = tmp_path / "waves.mp4", tmp_path / "out"
+    copied = FileCopy(source, hashlib.sha256(FOOTAGE).hexdigest())
+    for content, says in (
+        (None, r"waves.mp4 cannot be read \(No such file"),
+        (b"other", "changed while it was copied"),
+    ):
+        if content is not None:
+            source.write_bytes(content)
+        with pytest.raises(AnalysisError, match=says):
+            write_files(to, {"README.md": b"x", "materials/waves.mp4": copied})
+        assert list(to.rglob("*")) == []
+    source.write_bytes(FOOTAGE)
+    write_files(to, {"materials/waves.mp4": copied})
+    assert (to / "materials" / "waves.mp4").read_bytes() == FOOTAGE
 
 
 def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path, tmp_path: Path) -> None:
