@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPoint, QRect
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
 pytestmark = pytest.mark.slow
@@ -46,3 +46,19 @@ def test_another_element_is_shown_from_its_top(qtbot: Any, designer: Any, form: 
     designer.select(("liquids", "thin"))
     qtbot.wait(50)
     assert form.area.verticalScrollBar().value() == 0
+
+
+def test_tab_goes_from_the_rows_seen_at_first_to_those_made_later(qtbot: Any, designer: Any, form: Any) -> None:
+    designer.editing.select(BLOCK)
+    early = len(form._made)
+    assert 0 < early < len(form.form.rows)
+    rows = form.rows
+    QApplication.processEvents()
+    rows[0].field.take_keyboard()
+    met = [rows[0]]
+    while met[-1] is not rows[-1]:
+        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
+        keyboard = QApplication.focusWidget()
+        assert form.inside.isAncestorOf(keyboard), keyboard
+        met += [row for row in rows if row.isAncestorOf(keyboard) and row is not met[-1]]
+    assert met == rows
