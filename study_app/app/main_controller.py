@@ -117,6 +117,7 @@ class MainController(QObject):
         self.designer: DesignerController | None = None
         self.lab: LabController | None = None
         self._for_lab: LabLiquids | None = None
+        self._for_designer: tuple[Callable[[DesignerController], None], ...] = ()
         self.window.closed.connect(self._leave)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
@@ -239,6 +240,7 @@ class MainController(QObject):
         self.designer.feeling.asked.connect(self._feel)
         self.designer.editing.opened_other.connect(self._forget_study)
         self.designer.feeling.returned.connect(lambda: self.window.go("designer"))
+        QTimer.singleShot(0, self, self._act_in_designer)  # once the window shows what the place says
         return self.designer.place
 
     def _show_saved(self, _file: Path) -> None:
@@ -249,25 +251,34 @@ class MainController(QObject):
 
     def open_designer(self, source: str) -> None:
         """Go to the study designer with a study."""
-        self.window.place("designer")
-        assert self.designer is not None  # noqa: S101 - made with its place
-        self.designer.open(source)
-        self.window.go("designer")
+        self._go_to_designer(lambda designer: designer.open(source))
 
     def show_version(self, session: SessionFacts) -> None:
         """Go to the study designer, to what changed in a session's study since it was run."""
-        self.open_designer(session.study)
-        assert self.designer is not None  # noqa: S101 - made with its place
-        self.designer.changes.compare_with_session(session.study, session.folder)
+        self._go_to_designer(
+            lambda designer: designer.open(session.study),
+            lambda designer: designer.changes.compare_with_session(session.study, session.folder),
+        )
 
     def begin_study(self, source: str = "", name: str = "") -> None:
         """Go to the study designer with what a new study can begin from; with a name begin it at once."""
-        self.window.place("designer")
-        assert self.designer is not None  # noqa: S101 - made with its place
+        self._go_to_designer(
+            lambda designer: designer.ask_for_new(source),
+            lambda designer: designer.begin(source, name) if name else None,
+        )
+
+    def _go_to_designer(self, *actions: Callable[[DesignerController], None]) -> None:
+        """Go to the study designer and act there once it is made: the window's thread does not wait for its modules."""
+        self._for_designer = actions
+        self._act_in_designer()
         self.window.go("designer")
-        self.designer.ask_for_new(source)
-        if name:
-            self.designer.begin(source, name)
+
+    def _act_in_designer(self) -> None:
+        """Do what waits for the designer, once that is made."""
+        if self.designer is not None:
+            actions, self._for_designer = self._for_designer, ()
+            for act in actions:
+                act(self.designer)
 
     def _feel(self, liquids: LabLiquids) -> None:
         """Go to the lab with liquids of the study that is edited."""
@@ -299,6 +310,8 @@ class MainController(QObject):
 
     def _prepare_designer(self) -> Iterator[None] | None:
         """Return the step to the designer; None while a thread loads what it needs: a click must not wait for that."""
+        if self._lab_first is None and not self._preparing.busy:
+            self._prepare_lab()
         return None if self._preparing.busy else iter((None,))
 
     def _fill_lab(self) -> Iterator[None]:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from study_app.app import main_controller
+from study_app.app.lab.initial_settings import prepare_initial_settings
 from study_app.app.main_controller import MainController
 
 
@@ -27,5 +28,37 @@ def test_a_place_is_not_made_while_a_thread_loads_what_it_needs(
     assert (visit.window.here, made) == (name, [])
     assert wanted == [main_controller._prepare_lab]
     visit.window.go("home")
+    visit.window.close()
+    visit.end()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("asked", ["edit", "new"])
+def test_a_study_that_was_asked_for_opens_once_the_designer_is_loaded(
+    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: str
+) -> None:
+    wanted: list[object] = []
+    monkeypatch.setattr(main_controller.Background, "_begin", lambda _self, job: wanted.append(job))
+    visit = MainController(tmp_path / "results")
+    qtbot.addWidget(visit.window)
+    visit.window.show()
+    if asked == "edit":
+        visit.open_designer("demo")
+    else:
+        visit.begin_study()
+    assert (visit.window.here, visit.designer) == ("designer", None)
+    assert wanted == [main_controller._prepare_lab], "loading begins at once"
+    visit._preparing._wanted = None
+    visit._lab_prepared(prepare_initial_settings())
+    qtbot.waitUntil(lambda: visit.designer is not None and visit.designer.place.isVisible())
+    assert visit.designer is not None
+    opened = visit.designer.editing.opened
+    if asked == "edit":
+        assert opened is not None
+        assert opened.study.document["study"]["name"] == "demo"
+    else:
+        new_page = visit.designer.place.new_page
+        assert (opened, new_page.isVisible()) == (None, True)
+        assert visit.window.focusWidget() is new_page.card.questions.title
     visit.window.close()
     visit.end()

@@ -31,6 +31,7 @@ def visit(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
     made.window.resize(1600, 1000)
     made.window.show()
     made.open_designer("kitchen")
+    qtbot.waitUntil(lambda: made.designer is not None and made.designer.editing.opened is not None, timeout=OPENS_MS)
     yield made
     made.window.close()
     made.end()

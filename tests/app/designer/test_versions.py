@@ -273,6 +273,7 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     assert card.version.isEnabled()
     table.clicked.emit(table.model().index(0, 3))
     assert visit.window.here == "designer"
+    qtbot.waitUntil(lambda: visit.designer is not None and visit.designer.place.isVisible(), timeout=20_000)
     assert visit.designer is not None
     changes = visit.designer.changes.card
     assert changes.view.chosen == protocol_hash(source)
