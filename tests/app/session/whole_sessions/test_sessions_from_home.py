@@ -20,6 +20,16 @@ from tests.compiled import needs_servo
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp", "nobody_stays", "quick_preflight")]
 
 
+def begin(asked):
+    """Start the session and return whether it starts; where the busy computer did not pass, measure again."""
+    starts = asked.start.isEnabled()
+    if starts:
+        asked.start.click()
+    elif asked.again.isEnabled():
+        asked.again.click()
+    return starts
+
+
 def test_home_closes_with_exit_code_0(tmp_path):
     QTimer.singleShot(0, lambda: QTimer.singleShot(0, lambda: window(MainWindow).close()))
     assert app.home(tmp_path / "results") == 0
@@ -40,8 +50,8 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
             home.dialog.begin.click()
         elif steps == ["asked"] and window(PreflightWindow) is not None:
             assert not (tmp_path / "results").exists()
-            steps.append("looked")
-            window(PreflightWindow).start.click()
+            if begin(window(PreflightWindow)):
+                steps.append("looked")
         elif steps == ["asked", "looked"] and operator is not None and operator.buttons.end.isEnabled():
             steps.append("ended")
             operator.end_asked.emit("withdrawn", "")
@@ -74,7 +84,7 @@ def test_going_back_before_the_session_leaves_nothing(tmp_path, monkeypatch):
             steps.append("again")
             asked.again.click()
             assert not asked.start.isEnabled()
-        elif steps == ["asked", "again"] and asked is not None and asked.start.isEnabled():
+        elif steps == ["asked", "again"] and asked is not None and (asked.start.isEnabled() or asked.again.isEnabled()):
             steps.append("back")
             asked.cancel.click()
         elif steps == ["asked", "again", "back"] and home is not None:
@@ -160,7 +170,7 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
             steps.append(home.banner.line.text())
             home.banner.resume.click()
         elif len(steps) == 2 and window(PreflightWindow) is not None:
-            window(PreflightWindow).start.click()
+            begin(window(PreflightWindow))
         elif len(steps) == 2 and operator is not None and operator.buttons.end.isEnabled():
             steps.append(operator.rail.heading.text())
             operator.end_asked.emit("withdrawn", "")
