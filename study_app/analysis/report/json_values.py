@@ -16,7 +16,7 @@ from study_app.errors import AnalysisError
 OF_FORMAT_2: Final = {
     Results: frozenset({"questions", "scores", "levels", "site_thresholds"}),
     LevelsFound: frozenset({"withheld"}),
-    Setting: frozenset({"link"}),
+    Setting: frozenset({"link", "view"}),
 }
 """Results that reports of earlier versions do not have; omitted where there are none."""
 

@@ -39,7 +39,7 @@ class Setting:
     """What was presented under a code; all but the code is None until the key is opened.
 
     ``label`` is the item that names what was felt, where one does, ``link`` how its force was sent if not promptly,
-    ``view`` what was seen. A track ("8/1") has neither liquid nor delay.
+    ``view`` what was seen, empty for the drawn tank. A track ("8/1") has neither liquid nor delay.
     """
 
     code: str
@@ -48,7 +48,7 @@ class Setting:
     delay_ms: float | None = None
     label: str | None = None
     link: str = ""
-    view: str = "tank"
+    view: str = ""
 
     @property
     def standard(self) -> str | None:
@@ -122,6 +122,7 @@ def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
     liquids = " + ".join(key.liquids(block, code))
     link = ", ".join(link_words(*(condition.get(name, 0.0) for name in OF_LINK)))
     view = condition.get("view", "tank") + (" alone" if condition.get("overlay") == "hidden" else "")
+    view = "" if view == "tank" else view
     return Setting(code, presented, liquids, key.delay_ms(block, code), condition.get("label"), link, view)
 
 
@@ -190,7 +191,7 @@ def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
         return setting.code if setting.standard is None else f"Standard {setting.standard}"
     liquid = setting.liquid.replace("_", " ")
     named = liquid[:1].upper() + liquid[1:]
-    named = f"{named}, {setting.view}" if len({other.view for other in others}) > 1 else named
+    named = f"{named}, {setting.view or 'tank'}" if len({other.view for other in others}) > 1 else named
     named = f"{named}, {setting.delay_ms:g} ms" if len({other.delay_ms for other in others}) > 1 else named
     return f"{named}, {setting.link}" if setting.link else named
 

@@ -214,7 +214,7 @@ def test_a_falcon_that_has_gone_is_told_of(tmp_path, monkeypatch, capsys):
     said = capsys.readouterr()
     assert said.out == "ready\n"
     assert said.err.startswith("the Falcon may still push: ")
-    assert said.err.endswith("; switch it off\n")
+    assert said.err.endswith("; turn it off\n")
 
 
 def test_patience_ends(monkeypatch, tmp_path):
