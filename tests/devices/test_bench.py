@@ -225,6 +225,7 @@ def test_position_that_is_not_finite_is_passed_over():
     assert not probe.forces_n[-1].any()
 
 
+@pytest.mark.nightly
 def test_fault_during_a_bench_has_the_message_of_the_driver():
     from study_app.devices.bench.excitation import BenchDriver
     from study_app.haptics.runtime.clocks.clock import VirtualClock

@@ -66,6 +66,7 @@ def test_a_process_that_is_stopped_right_after_the_first_frame_has_the_trial_int
     held_with_a_freeze(tmp_path, "frame")
 
 
+@pytest.mark.nightly
 def test_a_window_that_shows_the_first_frame_until_the_trial_is_over_has_it_interrupted(tmp_path: Path) -> None:
     """The servo ran on: the hand felt a liquid whose tank stood still."""
     frozen, _ = held_with_a_freeze(tmp_path, "window")

@@ -158,6 +158,7 @@ def test_trials_are_rounded_to_what_the_method_divides_them_into() -> None:
     assert plans(load("rek2024"), (30,)) == {}
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_command_writes_the_same_bytes_with_one_worker_two_and_a_cluster(
     worker_options: tuple[tuple[str, str], ...], tmp_path: Path

@@ -140,6 +140,7 @@ def three_answers(store: SessionStore) -> None:
         store.append("responses", trial=number, attempt=1, items=[item])
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_of_a_journal_cut_at_any_byte_everything_whole_is_rebuilt_and_the_journal_left_alone(
     start: Callable[..., SessionStore],

@@ -87,6 +87,7 @@ def look_beside(study: Path, *programs: tuple[Callable[..., None], tuple[Any, ..
     return looks, running, errors
 
 
+@pytest.mark.nightly
 @needs_fork
 def test_sessions_that_are_begun_and_ended_beside_it_are_never_called_unsound(tmp_path: Path) -> None:
     """Two programs write to one study, with all that begins and ends a session."""
