@@ -19,29 +19,20 @@ from study_app.evaluation.appraisal import Costs, Errors
 from study_app.evaluation.appraisal_worker import Question
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.runtime.clocks.grants import NO_THREAD
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load
 from study_app.protocol.trials.tasks.explore import Explore
 from study_app.protocol.trials.tasks.reach import Reach
 from study_app.protocol.trials.tasks.stroke import Stroke
-from study_app.session.preflight import Facts, Screen
+from study_app.session.preflight import Facts
 from study_app.session.request import NewSession
 from study_app.session.start import Ready
+from tests.session import small
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
-FACTS = Facts(
-    device="mouse",
-    fresh_share=1.0,
-    timing=Timing(2000, 1000.0, 6e-5, 2e-3, 0),
-    sample_age_s=0.001,
-    screen=Screen(60.0, 1.0),
-    probe_s=0.002,
-    probe_fault="",
-    free_bytes=10**11,
-    participant="P001",
-    recordings=True,
-)
+FACTS = replace(small.WELL, timing=Timing(2000, 1000.0, 6e-5, 2e-3, 0), participant="P001", grant=NO_THREAD)
 COSTS = Costs(tick_ns=146.0, rest_ns=40.0, effects=())
 
 

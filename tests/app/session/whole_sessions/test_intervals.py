@@ -60,24 +60,28 @@ class Attentive(Person):
             super().look()
 
 
-def test_a_session_of_pairs_is_attended_by_keys_alone(tmp_path: Path) -> None:
-    text = HEAD + BLOCK + PAIRS
-    for old, new in EDITS:
+def run_study(folder: Path, text: str, edits: tuple[tuple[str, str], ...]) -> int:
+    """Run a study in its windows, with such edits of its text; return the exit code."""
+    for old, new in edits:
         assert old in text
         text = text.replace(old, new)
-    (tmp_path / "levels.toml").write_text(text)
-    results = tmp_path / "results" / "levels"
-    person = Attentive()
-    code = app.run(
-        str(tmp_path / "levels.toml"),
+    (folder / "levels.toml").write_text(text)
+    return app.run(
+        str(folder / "levels.toml"),
         participant="P001",
         seed=5,
         device="scripted",
         windowed=True,
         operator="AK",
-        results=results,
+        results=folder / "results" / "levels",
         progress=lambda _line: None,
     )
+
+
+def test_a_session_of_pairs_is_attended_by_keys_alone(tmp_path: Path) -> None:
+    results = tmp_path / "results" / "levels"
+    person = Attentive()
+    code = run_study(tmp_path, HEAD + BLOCK + PAIRS, EDITS)
     tanks = {trial: {id(tank) for one, tank in person.tanks if one == trial} for trial, _ in person.tanks}
     person.deleteLater()
     assert code == 0
@@ -144,23 +148,9 @@ class Adjusting(Person):
 
 
 def test_levels_are_set_by_keys_alone(tmp_path: Path) -> None:
-    text = HEAD + SETTING
-    for old, new in (EDITS[2], *EDITS[4:]):
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / "levels.toml").write_text(text)
     results = tmp_path / "results" / "levels"
     person = Adjusting()
-    code = app.run(
-        str(tmp_path / "levels.toml"),
-        participant="P001",
-        seed=5,
-        device="scripted",
-        windowed=True,
-        operator="AK",
-        results=results,
-        progress=lambda _line: None,
-    )
+    code = run_study(tmp_path, HEAD + SETTING, (EDITS[2], *EDITS[4:]))
     person.deleteLater()
     assert code == 0
     journal = events(results)
