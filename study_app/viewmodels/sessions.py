@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeAlias
 from study_app.authoring.versions.runs import run_of
 from study_app.errors import StoreError
 from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.folders import StudyFolder
+from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sites.merged import session_in
@@ -30,8 +30,7 @@ class SessionFacts:
 
     ``status`` is the table's, or "running" where a program has the session open. ``excluded`` is why the analysis
     excludes all of it, None where it does not; ``lost`` counts recordings that could not be stored, ``reconnected`` how
-    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed. ``version`` is the
-    study's version that it was run with, "" where its receipt does not say.
+    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed.
     """
 
     participant: str
@@ -49,7 +48,12 @@ class SessionFacts:
     lost: int = 0
     reconnected: int = 0
     outlets_lost: int = 0
-    version: str = ""
+
+    @property
+    def version(self) -> str:
+        """The study's version that it was run with, by its receipt, which is read then; "" where that does not say."""
+        run = run_of(SessionFolder(self.folder, self.participant, self.session).receipt)
+        return "" if run is None else run.version
 
     @property
     def kind(self) -> Kind:
@@ -117,7 +121,6 @@ def session_facts(
             lost=lost,
             reconnected=reconnected,
             outlets_lost=outlets_lost,
-            version="" if (run := run_of(session.receipt)) is None else run.version,
         )
         for (row, session), (lost, reconnected, outlets_lost) in zip(placed, counts, strict=True)
     ]
