@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -119,8 +120,8 @@ class QuestPlus(Adaptive):
         """Return successes and failures at each level."""
         coordinates = _coordinates(track)
         counts = ([0] * len(coordinates), [0] * len(coordinates))
-        for one in heard:
-            counts[0 if one.success else 1][_nearest(coordinates, track.stimulus.coordinate(one.level))] += 1
+        for (level, success), number in Counter((one.level, bool(one.success)) for one in heard).items():
+            counts[0 if success else 1][_nearest(coordinates, track.stimulus.coordinate(level))] += number
         return counts
 
 
