@@ -76,9 +76,9 @@ def draw(found: Accuracy) -> Figure:
 
 
 _KEY: Final = (
-    "A point is a model and its error against the truth it misses most; a thin line leads down to the one it misses "
-    "least. Ring: what the gate chooses and the program runs. Joined: no other model is both faster and truer; "
-    "that fewer ticks a second also cost stability is not shown. "
+    "Points: the greatest error of each model over its references; a thin line extends to the smallest. Ring: the "
+    "model that the program runs. Connected: no other model is both faster and more accurate. How fewer ticks per "
+    "second affect stability is not shown. "
 )
 
 
@@ -104,7 +104,7 @@ class _Panel:
             self._heading = "Numerical error: compared with the exact sums"
             text = f"{rows[0].liquid}, {found.motion}; drag{' and wake' if self._strip[1:] else ''} summed exactly"
         else:
-            self._heading = "Physical error: compared with solved and measured flows"
+            self._heading = "Physical error: compared with references"
             text = f"{rows[0].liquid}; {names}"
         self._text = textwrap.wrap(text, LETTERS)
         self._top_pt = 6 + HEADING_PT + LINE_PT * len(self._text) + 13
@@ -147,7 +147,7 @@ class _Panel:
         axes.spines["bottom"].set_visible(lowest)
         axes.axvline(BUDGET_NS, color=style.TEXT, linewidth=0.8, linestyle=(0, (1, 1.5)))
         if lowest and last:
-            axes.set_xlabel("Computing time for 1 ms of motion (at 1 kHz: a tick)", fontsize=SMALL + 0.4, labelpad=2)
+            axes.set_xlabel("Computation time of 1 ms of motion (one tick at 1 kHz)", fontsize=SMALL + 0.4, labelpad=2)
         for one, other in zip(self._front, self._front[1:], strict=False):
             times, errors = (one.ns_per_ms, other.ns_per_ms), (100 * one.error.rms, 100 * other.error.rms)
             axes.plot(times, errors, color=style.ZERO, linewidth=1.2, zorder=2)

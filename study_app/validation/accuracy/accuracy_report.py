@@ -66,12 +66,12 @@ def markdown(found: Accuracy) -> str:
 
 
 _WHAT: Final = (
-    "Times are computing times of one thread: medians over repeats, in one interleaved run, of the median and the 99th "
-    "percentile of batches of 1,000 ticks; what other programs take is left out. RMS error in % of the RMS of the true "
-    "force, greatest in % of the greatest. Direction: RMS angle where the true force is felt. Fewer ticks a second: "
-    "the error of the force alone, not what they cost in stability. Unsteady drag meets each motion of the fluid "
-    "solver with constants fitted to the other motions. ● no model is both faster, in times of real time, and truer, "
-    "each against the truth that it misses most; ◎ what the gate chooses, and the program runs."
+    "Times are computation times of one thread, without that of other programs: medians over repeats, in one "
+    "interleaved run, of the median and the 99th percentile of batches of 1,000 ticks. Errors: RMS in % of the RMS of "
+    "the reference's force, greatest in % of its greatest. Direction: RMS angle where the reference's force is "
+    "perceptible. Fewer ticks per second: the error of the force alone, without its effect on stability. Unsteady drag "
+    "is compared with each motion of the fluid solver with constants fitted to the other motions. ● no other model is "
+    "both faster, in real time, and more accurate, each by its greatest error; ◎ the model that the program runs."
 )
 _HEADINGS: Final = (
     "", "model", "ns per tick", "p99", "RMS error [N]", "max [N]", "RMS [%]", "max [%]", "direction [°]",
