@@ -26,7 +26,7 @@ from study_app.validation.stability.damping_boundary import (
 from study_app.validation.stability.verdict import Verdict
 
 FORMATS: Final = ("png", "svg")
-HEIGHT_PT: Final = 246.0
+HEIGHT_PT: Final = 256.0
 PLOT_PT: Final = 146.0
 FOOT_PT: Final = 62.0
 FRICTIONS_NSPM: Final = (0.1, 0.3, 1.0, 3.0, 10.0)
@@ -34,9 +34,9 @@ MAP_DELAYS: Final = (0, 1, 2, 4)
 LIMIT_DELAYS: Final = (1, 2, 4)
 COLOURS: Final = dict(zip(MAP_DELAYS, (style.STEPS[0], style.STEPS[1], style.STEPS[3], style.STEPS[4]), strict=True))
 CAPTION: Final = (
-    "Lines: measured on the servo's own tick, encoder exact, safety off. Dashed: b = B·α/(2 − α) and its like with a "
-    "delay; below it no hand can make the loop unstable. Bars: the limits that ship; only 1 kHz with up to one tick of "
-    "delay has more than half of a free handle's limit."
+    "Lines: boundary measured with the servo's own tick, exact encoder, safety off. Dashed: b = B·α/(2 − α), extended "
+    "to a delay; no hand can make the loop unstable below it. Bars: limits in use; only at 1 kHz with up to one tick "
+    "of delay are they more than half of the boundary."
 )
 CAPTION_LETTERS: Final = 112
 MARKS: Final = dict(zip(MAP_DELAYS, "osD^", strict=True))
@@ -80,7 +80,7 @@ def _boundary(axes: Axes) -> None:
         axes.plot(FRICTIONS_NSPM, measured, marker=MARKS[delay], markersize=3, label=str(delay), **look)
         axes.plot(FRICTIONS_NSPM, proved, linestyle=(0, (3, 2)), linewidth=0.9, **look)
     _logarithmic(axes, FRICTIONS_NSPM, (1, 10, 100))
-    axes.set_title(f"Maximum stable damping B [N·s/m] of {FREE_HANDLE_KG:g} kg at 1 kHz", pad=26)
+    axes.set_title(f"Maximum stable damping B [N·s/m]\nof {FREE_HANDLE_KG:g} kg at 1 kHz", pad=26)
     axes.set_xlabel("Friction b of the handle [N·s/m]", loc="right", labelpad=1)
     _name_curves(axes, 4)
 
@@ -96,7 +96,7 @@ def _limits(axes: Axes) -> None:
         for period_ms, limit in zip(periods_ms, allowed, strict=True):
             axes.plot((period_ms / 1.18, period_ms * 1.18), (limit, limit), linewidth=2.2, **look)
     _logarithmic(axes, periods_ms, (3, 10, 30, 100))
-    axes.set_title("Boundary, and limit of B (bars)", pad=26)
+    axes.set_title("Boundary and limit (bars)\nof B [N·s/m]", pad=26)
     axes.set_xlabel("Time between ticks [ms]", loc="right", labelpad=1)
     _name_curves(axes, 3)
 
@@ -117,7 +117,7 @@ def _found(axes: Axes, off: Sequence[Verdict]) -> None:
         axes.text(column, row, f"{share:.0%}", ha="center", va="center", color=colour)
     axes.set_xticks(range(len(rates_hz)), [f"{1e3 / rate_hz:g}" for rate_hz in rates_hz])
     axes.set_yticks(range(len(DELAYS)), [str(delay) for delay in DELAYS])
-    axes.set_title("Of the sweep, unstable with\nsafety off, by ticks of delay", pad=5)
+    axes.set_title("Unstable cases, safety off,\nby ticks of delay", pad=5)
     axes.set_xlabel("Time between ticks [ms]", loc="right", labelpad=1)
 
 
