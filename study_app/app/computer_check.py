@@ -31,6 +31,7 @@ class ComputerCheck(QObject):
         self.window = ComputerWindow(parent, theme)
         self._background = Background(self)
         self._background.done.connect(self._show)
+        self._background.failed.connect(self._tell_bug)
         self._compiled.connect(self.window.show_compiled, Qt.ConnectionType.QueuedConnection)
         self.window.asked.connect(self.measure)
         self.window.finished.connect(self._close)
@@ -76,6 +77,9 @@ class ComputerCheck(QObject):
         if not self._background.busy:
             self.window.deleteLater()
             self.deleteLater()
+
+    def _tell_bug(self, error: BaseException) -> None:
+        self._show(StudyError(f"{type(error).__name__}: {error}; the terminal shows the details"))
 
     def _show(self, found: tuple[Check, ...] | StudyError) -> None:
         if self._closed:

@@ -108,6 +108,7 @@ class MainController(QObject):
         self._lab_first: InitialSettings | None = None
         self._preparing = Background(self)
         self._preparing.done.connect(self._lab_prepared)
+        self._preparing.failed.connect(self.window.not_prepared)
         self.loop = QEventLoop()
         self.code = 0
         self.live: LiveSession | None = None

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import pytest
 
+from study_app.app.computer_check import ComputerCheck
 from study_app.app.main_controller import MainController
 from study_app.viewmodels.computer_check import OF_THE_COMPUTER
 from tests.compiled import needs_servo
@@ -31,3 +33,30 @@ def test_the_machines_place_opens_it_and_it_measures_this_computer(visit: MainCo
     assert not check.window.isVisible()
     with qtbot.waitSignal(check.destroyed, timeout=120_000):
         pass
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_bug_while_it_measures_is_a_sentence_and_leaves_no_window(
+    visit: MainController, qtbot: Any, monkeypatch: pytest.MonkeyPatch, closed: bool
+) -> None:
+    may_fail = threading.Event()
+
+    def fail(_self: ComputerCheck) -> None:
+        may_fail.wait(10)
+        raise RuntimeError("a module is missing")
+
+    monkeypatch.setattr(ComputerCheck, "_look", fail)
+    visit.check_computer()
+    check = visit.check
+    assert check is not None
+    if closed:
+        check.window.go_on.click()
+    else:
+        may_fail.set()
+        qtbot.waitUntil(check.window.back.isEnabled)
+        assert "a module is missing" in check.window.state.text()
+    with qtbot.waitSignal(check.destroyed):
+        may_fail.set()
+        if not closed:
+            check.window.go_on.click()

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtWidgets import QLabel
 
 from study_app.app import main_controller
 from study_app.app.lab.initial_settings import prepare_initial_settings
@@ -60,5 +61,34 @@ def test_a_study_that_was_asked_for_opens_once_the_designer_is_loaded(
         new_page = visit.designer.place.new_page
         assert (opened, new_page.isVisible()) == (None, True)
         assert visit.window.focusWidget() is new_page.card.questions.title
+    visit.window.close()
+    visit.end()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("name", ["lab", "designer"])
+def test_nothing_waits_for_a_place_that_cannot_be_loaded_and_a_second_entry_tries_again(
+    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    tried: list[str] = []
+
+    def fail() -> None:
+        tried.append(name)
+        raise RuntimeError("a module is missing")
+
+    monkeypatch.setattr(main_controller, "_prepare_lab", fail)
+    visit = MainController(tmp_path / "results")
+    qtbot.addWidget(visit.window)
+    visit.window.show()
+    for _ in range(2):
+        visit.window.go(name)
+        assert visit.window.here == name
+        qtbot.waitUntil(lambda: visit.window.notice is not None)
+        assert visit.window.here == "home"
+        said = " ".join(one.text() for one in visit.window.notice.findChildren(QLabel))
+        assert "a module is missing" in said
+        visit.window.notice.close()
+        visit.window.notice = None
+    assert tried == [name, name]
     visit.window.close()
     visit.end()

@@ -142,6 +142,13 @@ class MainWindow(QMainWindow):
         if self._asked == name:
             self.go(name)
 
+    def not_prepared(self, error: BaseException) -> None:
+        """Say what failed, at the first place, if one waits for a place; asked for again, it is prepared again."""
+        if self.stack.currentWidget() is self._waiting:
+            self.go(next(iter(self._makers)))
+            what = f"{type(error).__name__}: {error}"
+            self.show_message("This page could not be opened", f"{what}. The terminal shows the details.")
+
     def _now(self) -> Place:
         """Return the place one is at, or the line that stands there until it is prepared."""
         return self._places.get(self._here, self._waiting)

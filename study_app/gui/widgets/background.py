@@ -16,10 +16,11 @@ class Background(QObject):
     """Runs one job at a time in a thread; ``done`` carries what the last job that was asked for returned.
 
     A job that was asked for while another runs begins after it, unless a newer one takes its place. The job returns
-    refusals (`StudyError`) as values; what else it raises goes to ``threading.excepthook``, and ``done`` does not come.
+    refusals (`StudyError`) as values; what else it raises goes to ``threading.excepthook`` and comes by ``failed``.
     """
 
     done = Signal(object)
+    failed = Signal(object)
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
@@ -48,6 +49,9 @@ class Background(QObject):
             found, whole = None, False
             try:
                 found, whole = job(), True
+            except BaseException as error:
+                found = error
+                raise
             finally:
                 made.put((job, whole, found))
 
@@ -68,3 +72,5 @@ class Background(QObject):
         self._wanted = None
         if whole:
             self.done.emit(found)
+        else:
+            self.failed.emit(found)
