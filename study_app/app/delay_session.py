@@ -18,7 +18,12 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.garbage_collection import collecting_here
-from study_app.app.session.session_windows import make_cockpit, open_windows
+from study_app.app.session.session_windows import (
+    connect_windows,
+    make_cockpit,
+    make_participant_window,
+    show_windows,
+)
 from study_app.app.session.termination import ended_from_outside
 from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import SessionError, StudyError
@@ -29,6 +34,7 @@ from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.session.request import NewSession
+from study_app.session.resume import FIRST
 from study_app.session.start import open_store
 from study_app.store.recording_files import read_frames
 from study_app.store.sessions.open_session import SessionStore
@@ -165,9 +171,17 @@ class _Showing:
         try:
             with open_store(self._chosen, self._protocol, self._source, rig, {}) as store:
                 operator = make_cockpit(self._chosen, self._protocol, rig, LIGHT)
-                bridge = open_windows(
-                    self._chosen, self._protocol, schedule, store, rig, operator, refresh_hz=self._refresh_hz
+                screens = choose_screens(self._chosen.screen)
+                participant = make_participant_window(
+                    self._chosen,
+                    store.clock.seconds,
+                    shares_screen=screens[0] is screens[1],
+                    in_step=self._refresh_hz is None,
                 )
+                plan = self._protocol, schedule, FIRST
+                rate_hz = self._refresh_hz or screens[0].refreshRate()
+                bridge = connect_windows(self._chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz)
+                show_windows(bridge, *screens)
                 self._size(bridge)
                 self._run(bridge)
                 paced = bridge.paced

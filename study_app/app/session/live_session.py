@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QScreen
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices_controller import diagnosis
@@ -33,18 +33,13 @@ from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.theme.theme import Theme
 from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse
-from study_app.protocol.wording.without_force import without_force
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.request import NewSession
-from study_app.session.resume import FIRST, resume_at
 from study_app.session.start import Ready, check, measured, open_outlets, open_store, videos_of
-from study_app.store.blinded.allocation import session_protocol
-from study_app.store.folders import StudyFolder
 
 if TYPE_CHECKING:
     from study_app.app.session.bridge import SessionBridge
     from study_app.app.session.preflight_controller import Preflight
-    from study_app.gui.operator import OperatorWindow
     from study_app.outlets.session_outlets import Outlets
     from study_app.store.sessions.open_session import SessionStore
     from study_app.video.sources import Videos
@@ -103,7 +98,7 @@ class LiveSession(QObject):
         self._ending = threading.Event()
         self._working = False
         self._steps: Iterator[None] | None = None
-        self._operator: OperatorWindow | None = None  # until the bridge has it
+        self._windows: list[QWidget] = []  # until the bridge has them
         self.patience_s = OPENING_PATIENCE_S
         self._opening: threading.Thread | None = None
         self._ready.connect(self._begin, Qt.ConnectionType.QueuedConnection)
@@ -234,7 +229,7 @@ class LiveSession(QObject):
         """Go on with what the thread made ready, or raise what it met; what comes up to a yield takes a few frames."""
         if not isinstance(made, Ready):
             raise made if isinstance(made, Exception) else TypeError(made)
-        from study_app.app.session.session_windows import make_cockpit, open_windows  # noqa: PLC0415 - pyqtgraph: once needed
+        from study_app.app.session import session_windows  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         chosen, rig = self.chosen, made.rig
         source = chosen.read_source()
@@ -244,39 +239,43 @@ class LiveSession(QObject):
         self._pass_checks(found)
         screens = described(self.settings, shown_on, operated_on)
         yield
-        operator = self._operator = make_cockpit(chosen, protocol, rig, self.theme)
-        yield  # the last one: no session is on the disk without its windows
-        self._store = open_store(chosen, protocol, source, rig, screens, made.masking, made.outlets, made.videos)
+        operator = session_windows.make_cockpit(chosen, protocol, rig, self.theme)
+        self._windows.append(operator)
+        yield
+        participant = session_windows.make_participant_window(
+            chosen,
+            self._seconds,
+            shares_screen=shown_on is operated_on,
+            text_scale=text_scale_on(self.settings, shown_on),
+            photodiode=self.settings.photodiode,
+        )
+        self._windows.append(participant)
+        yield  # up to the next one all is done at once: no session is on the disk without a bridge, which leaves it
+        parts = made.masking, made.outlets, made.videos
+        store = self._store = open_store(chosen, protocol, source, rig, screens, *parts)
         if not chosen.played:
             with suppress(StoreError):  # only the designer's comparisons would miss it
                 keep_content(source)
-        self._crash_trace = CrashTrace(self._store.folder.crash)
-        self._store.append("preflight", checks=[one.entry for one in found])
-        protocol = self._store.as_recorded(protocol)
-        protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
-        schedule = chosen.schedule(protocol)
-        lines, key = self._store.lines, self._store.key
-        start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, lines, key, exactly=chosen.played)
-        if descriptor_of(chosen.device).kind == "seen":
-            protocol = without_force(protocol)
-        self.bridge = open_windows(
-            chosen,
-            protocol,
-            schedule,
-            self._store,
-            rig,
-            operator,
-            start,
-            text_scale=text_scale_on(self.settings, shown_on),
-            photodiode=self.settings.photodiode,
-            videos=made.videos,
+        self._crash_trace = CrashTrace(store.folder.crash)
+        store.append("preflight", checks=[one.entry for one in found])
+        plan = session_windows.planned(chosen, protocol, store)
+        rate_hz = shown_on.refreshRate()
+        self.bridge = session_windows.connect_windows(
+            chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz, videos=made.videos
         )
-        self._operator = None
+        self._windows.clear()
         self.bridge.done.connect(self._finished)
         self.bridge.diagnose_asked.connect(self.diagnose)
+        yield
+        session_windows.show_windows(self.bridge, shown_on, operated_on, played=chosen.played)
         self._close_note()
         self._close_preflight()
+        yield
         self.bridge.start()
+
+    def _seconds(self) -> float:
+        """Return the time since the session's origin [s]; 0 while it is not on the disk."""
+        return 0.0 if self._store is None else self._store.clock.seconds()
 
     def screens(self) -> tuple[QScreen, QScreen]:
         """Return the participant's and the operator's screen: as chosen, or as set for this machine."""
@@ -350,12 +349,15 @@ class LiveSession(QObject):
         if self.bridge is None:
             unfreeze_garbage()  # a bridge does it when it leaves
         try:
-            self._close_note()
-            self._close_preflight()
-            self._steps = None
-            if self._operator is not None:
-                self._operator.deleteLater()
-            self._let_go()
+            with ExitStack() as closing:
+                closing.callback(self._let_go)  # even where a window cannot be closed
+                if self.bridge is not None:
+                    self.bridge.leave_now()  # where it failed before it could: no window stays without its session
+                for window in self._windows:
+                    window.deleteLater()
+                self._close_note()
+                self._close_preflight()
+                self._steps = None
         except StudyError as error:
             self.error = self.error or error  # what came first says why
         except Exception:  # noqa: BLE001 - printed; whoever waits for the end must be notified

@@ -10,7 +10,7 @@ from study_app.app.session.parts import Parts
 from study_app.devices.registry import descriptor_of
 from study_app.devices.simulated.hand_commands import HandOrders, hand_of
 from study_app.gui.display.opengl import has_card
-from study_app.gui.display.screens import choose_screens, place
+from study_app.gui.display.screens import place
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.strip import Strip
 from study_app.gui.operator.watch import WatchedJournal
@@ -20,16 +20,21 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.schedule import Schedule, stream
 from study_app.protocol.wording.languages import words
+from study_app.protocol.wording.without_force import without_force
 from study_app.session.pages import Page, TaskPage
-from study_app.session.resume import FIRST, Start
+from study_app.session.resume import FIRST, Start, resume_at
 from study_app.session.simulated.observers import Hand, hand_for, rest
+from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.sealing import opened
 from study_app.store.exclusions import exclude
+from study_app.store.folders import StudyFolder
 from study_app.store.progress import progress_of
 from study_app.viewmodels.operator import Session
 from study_app.viewmodels.session.stages import stages
 
 if TYPE_CHECKING:
+    from PySide6.QtGui import QScreen
+
     from study_app.devices.base import Device
     from study_app.devices.rig import Rig
     from study_app.gui.theme.theme import Theme
@@ -53,43 +58,66 @@ def make_cockpit(chosen: NewSession, protocol: Protocol, rig: Rig, theme: Theme)
     )
 
 
-def open_windows(
+def make_participant_window(
     chosen: NewSession,
-    protocol: Protocol,
-    schedule: Schedule,
+    clock: Callable[[], float],
+    *,
+    shares_screen: bool,
+    text_scale: float = 1.0,
+    photodiode: bool = True,
+    in_step: bool = True,
+) -> ParticipantWindow:
+    """Return the participant's window, not shown yet.
+
+    ``clock`` gives the session's time [s] once the session is on the disk; ``shares_screen`` is whether the operator's
+    window is on the same screen, ``text_scale`` how much larger than designed the words must be at least,
+    ``photodiode`` whether the tank has a corner for one, ``in_step`` whether it may be drawn in step with the screen.
+    """
+    return ParticipantWindow(
+        words(chosen.language),
+        clock=clock,
+        windowed=chosen.windowed,
+        captures_pointer=descriptor_of(chosen.device).pointer,
+        pilot=chosen.pilot,
+        on_card=in_step and has_card(),
+        text_scale=text_scale,
+        photodiode=photodiode,
+        strip=Strip() if shares_screen and not chosen.played else None,
+    )
+
+
+def planned(chosen: NewSession, protocol: Protocol, store: SessionStore) -> tuple[Protocol, Schedule, Start]:
+    """Return what is run in a session that is on the disk, in what order, and where it begins or goes on."""
+    protocol = store.as_recorded(protocol)
+    protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
+    schedule, start = chosen.schedule(protocol), FIRST
+    if chosen.resumes is not None:
+        start = resume_at(protocol, schedule, store.lines, store.key, exactly=chosen.played)
+    if descriptor_of(chosen.device).kind == "seen":
+        protocol = without_force(protocol)
+    return protocol, schedule, start
+
+
+def connect_windows(
+    chosen: NewSession,
+    plan: tuple[Protocol, Schedule, Start],
     store: SessionStore,
     rig: Rig,
     operator: OperatorWindow,
-    start: Start = FIRST,
+    participant: ParticipantWindow,
     *,
-    text_scale: float = 1.0,
-    photodiode: bool = True,
-    refresh_hz: float | None = None,
+    refresh_hz: float,
     videos: Videos | None = None,
 ) -> SessionBridge:
-    """Open the operator's and the participant's window; the bridge returned is to be started.
+    """Connect the operator's and the participant's window, made before; they are to be shown, and the bridge started.
 
-    ``operator`` is the cockpit, made before; ``start`` is where a resumed session goes on, ``text_scale`` how much
-    larger than designed the participant's words must be at least, ``photodiode`` whether the tank has a corner for one.
-    With ``refresh_hz`` there are so many frames a second by the clock, at any refresh rate of the screen. ``videos``
-    are open.
+    ``plan`` is what is run, in what order, and where it begins; ``refresh_hz`` how many frames a second there are.
+    ``videos`` are open.
     """
     clock, device, servo = store.clock.seconds, rig.device, rig.servo
     journal = WatchedJournal(store, progress_of(opened(store.lines, store.key)), clock)
     described = descriptor_of(chosen.device)
-    shown_on, operated_on = choose_screens(chosen.screen)
-    strip = Strip() if shown_on is operated_on and not chosen.played else None
-    participant = ParticipantWindow(
-        words(chosen.language),
-        clock=clock,
-        windowed=chosen.windowed,
-        captures_pointer=described.pointer,
-        pilot=chosen.pilot,
-        on_card=refresh_hz is None and has_card(),
-        text_scale=text_scale,
-        photodiode=photodiode,
-        strip=strip,
-    )
+    protocol, schedule, start = plan
     hand = hand_of(device)
     parts = Parts(
         session=_facts(chosen, protocol, schedule, rig),
@@ -110,13 +138,16 @@ def open_windows(
         press=getattr(device, "press", None) if described.pointer else None,
         hand_for=_hands(hand, chosen, clock) if hand is not None and described.moves_by_itself else None,
     )
-    rate_hz = refresh_hz or shown_on.refreshRate() or 60.0
-    bridge = SessionBridge(parts, participant, operator, refresh_hz=rate_hz, strip=strip)
-    if not chosen.played:
-        place(operator, operated_on, corner=shown_on is operated_on)
-        operator.show()
-    participant.open_on(shown_on)
-    return bridge
+    strip = participant.strip if isinstance(participant.strip, Strip) else None
+    return SessionBridge(parts, participant, operator, refresh_hz=refresh_hz or 60.0, strip=strip)
+
+
+def show_windows(bridge: SessionBridge, shown_on: QScreen, operated_on: QScreen, *, played: bool = False) -> None:
+    """Show both windows on their screens; of a session that is played the participant's alone."""
+    if not played:
+        place(bridge.operator, operated_on, corner=shown_on is operated_on)
+        bridge.operator.show()
+    bridge.participant.open_on(shown_on)
 
 
 def _reconnecting(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any]]:

@@ -100,7 +100,7 @@ class ParticipantWindow(QWidget):
     ) -> None:
         super().__init__()
         load_fonts()
-        self._strip = strip
+        self.strip = strip
         self._on_card = on_card
         self._photodiode = photodiode
         self._words = said
@@ -267,9 +267,9 @@ class ParticipantWindow(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Let the page fill the window."""
         super().resizeEvent(event)
-        if self._strip is not None:
+        if self.strip is not None:
             room = self._room()
-            self._strip.setGeometry(room.left(), self.frame_px, room.width(), self._strip.height())
+            self.strip.setGeometry(room.left(), self.frame_px, room.width(), self.strip.height())
         self._widget.setGeometry(self._room())
         self._ahead.start()
 
@@ -319,7 +319,7 @@ class ParticipantWindow(QWidget):
     def _room(self) -> QRect:
         """Return where pages are."""
         frame = self.frame_px
-        above = self._strip.height() if self._strip is not None else 0
+        above = self.strip.height() if self.strip is not None else 0
         return self.rect().adjusted(frame, frame + above, -frame, -frame)
 
     def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import gc
+import sys
+import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,12 +16,15 @@ from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.session import live_session
-from study_app.app.session.live_session import LiveSession
+from study_app.app.session.live_session import BUG, LiveSession
 from study_app.errors import SessionError
+from study_app.gui.display.frame_clock import Frames
 from study_app.gui.operator import OperatorWindow
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import LIGHT
 from study_app.session.request import NewSession
 from study_app.session.start import Ready
+from tests.compiled import needs_servo
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "scripted", True, None, Path("nowhere"))
 
@@ -130,29 +136,53 @@ class Measured(Ready):
         return self.facts
 
 
-def cockpits() -> list[Any]:
-    return [window for window in QApplication.topLevelWidgets() if isinstance(window, OperatorWindow)]
+def windows() -> list[str]:
+    mine = [one for one in QApplication.topLevelWidgets() if isinstance(one, OperatorWindow | ParticipantWindow)]
+    return sorted(type(one).__name__ for one in mine)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("how", ["cancelled", "refused"])
-def test_no_cockpit_stays_of_a_session_that_never_began(qtbot: Any, monkeypatch: pytest.MonkeyPatch, how: str) -> None:
+def test_no_window_stays_of_a_session_that_never_began(qtbot: Any, monkeypatch: pytest.MonkeyPatch, how: str) -> None:
     rig: Any = SimpleNamespace(device=SimpleNamespace(workspace_m=(0.1, 0.1, 0.1)), stop=lambda: None)
-    made: list[OperatorWindow] = []
+    made: list[str] = []
     monkeypatch.setattr(live_session, "checks", lambda *_: ())
     monkeypatch.setattr(live_session, "open_store", refuse)
     session = LiveSession(CHOSEN, LIGHT)
-    session.over.connect(lambda: made.extend(cockpits()))
+    session.over.connect(lambda: made.extend(windows()))
     if how == "cancelled":
         steps = session.open_windows(Measured(rig, SimpleNamespace()))
         session._steps = steps
-        next(steps)
-        next(steps)
+        for _ in range(3):
+            next(steps)
         session.cancel()
     else:
         session._open_windows(Measured(rig, SimpleNamespace()))
         qtbot.waitUntil(lambda: session.error is not None)
         assert str(session.error) == "the device sends nothing"
-    assert len(made) == 1
+    assert made == ["OperatorWindow", "ParticipantWindow"]
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-    assert cockpits() == []
+    assert windows() == []
+
+
+@pytest.mark.slow
+@needs_servo
+@pytest.mark.usefixtures("quick_preflight")
+@pytest.mark.parametrize(("part", "step"), [(ParticipantWindow, "open_on"), (Frames, "start")])
+def test_no_window_stays_where_opening_or_starting_fails(
+    qtbot: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, part: type, step: str
+) -> None:
+    def fail(*_: Any) -> None:
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(part, step, fail)
+    hook = sys.excepthook
+    session = LiveSession(replace(CHOSEN, results=tmp_path / "results"), LIGHT)
+    with qtbot.waitSignal(session.over, timeout=60_000):
+        session.open()
+    assert session.code == BUG
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    assert (windows(), sys.excepthook) == ([], hook)
+    assert "servo" not in {thread.name for thread in threading.enumerate()}
+    (unfinished,) = (tmp_path / "results").rglob("journal.jsonl")
+    assert '"session_ended"' not in unfinished.read_text()

@@ -1,0 +1,73 @@
+"""A session stands on the screens that are set for the machine, where the command names none."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.compiled import needs_servo
+
+pytestmark = [pytest.mark.slow, pytest.mark.nightly, needs_servo]
+
+SCREENS = [
+    {"name": name, "x": x, "y": 0, "width": 1600, "height": 1000, "logicalDpi": 96, "logicalBaseDpi": 96, "dpr": 1}
+    for name, x in (("left", 0), ("right", 1600))
+]
+
+PROGRAM = """
+import json, sys
+from pathlib import Path
+from PySide6.QtCore import QEventLoop, QTimer
+from study_app.app.session.live_session import LiveSession
+from study_app.gui.application import application_here
+from study_app.gui.theme.theme import LIGHT
+from study_app.session import start
+from study_app.session.request import NewSession
+
+start.MEASURED_S = 0.1
+application_here()
+chosen = NewSession("demo", "P001", 1, 1, "", "en", "scripted", False, None, Path(sys.argv[1]))
+live, loop, found = LiveSession(chosen, LIGHT), QEventLoop(), []
+live.settings = live.settings.model_copy(update={"screen": "left", "screen_number": 1})
+
+def look():
+    if live.bridge is None or live.bridge.participant.page is None:
+        return
+    timer.stop()
+    windows = live.bridge.participant, live.bridge.operator
+    found.extend([window.screen().name(), window.geometry().x()] for window in windows)
+    found.append(live.bridge.strip is None)
+    live.end_by_signal(15)
+
+timer = QTimer()
+timer.timeout.connect(look)
+timer.start(20)
+live.over.connect(loop.quit)
+live.open()
+loop.exec()
+live.wait()
+print(json.dumps(found))
+"""
+
+
+def test_both_windows_stand_on_the_screens_that_are_set(tmp_path: Path) -> None:
+    screens = tmp_path / "screens.json"
+    screens.write_text(json.dumps({"screens": SCREENS}), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(tmp_path / "results")],
+        env=os.environ | {"QT_QPA_PLATFORM": f"offscreen:configfile={screens}", "XDG_CONFIG_HOME": str(tmp_path)},
+        cwd=Path(__file__).parents[3],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    (participant, participant_x), (operator, operator_x), no_strip = json.loads(done.stdout.splitlines()[-1])
+    assert (participant, operator, no_strip) == ("left", "right", True)
+    assert participant_x < 1600 <= operator_x
