@@ -241,7 +241,6 @@ class MainController(QObject):
         self.designer.feeling.asked.connect(self._feel)
         self.designer.editing.opened_other.connect(self._forget_study)
         self.designer.feeling.returned.connect(lambda: self.window.go("designer"))
-        QTimer.singleShot(0, self, self._act_in_designer)  # once the window shows what the place says
         return self.designer.place
 
     def _show_saved(self, _file: Path) -> None:
@@ -313,11 +312,14 @@ class MainController(QObject):
         """Return the step to the designer; None while a thread loads what it needs: a click must not wait for that."""
         if self._lab_first is None and not self._preparing.busy:
             self._prepare_lab()
-        return None if self._preparing.busy else iter((None,))
+        return None if self._preparing.busy else self._fill_designer()
+
+    def _fill_designer(self) -> Iterator[None]:
+        self._act_in_designer()  # the window already shows what the place says
+        yield
 
     def _fill_lab(self) -> Iterator[None]:
         """Make the lab's form, then its styles: where it is first shown, it is only laid out and painted."""
-        yield
         lab = self.lab
         assert lab is not None  # noqa: S101 - made with its place
         lab.place.show_view(lab.view())

@@ -65,6 +65,7 @@ class MainWindow(QMainWindow):
         self._makers = makers
         self._prepares = prepares
         self._places: dict[str, Place] = {}
+        self._made: dict[str, Place] = {}  # and not yet among the places
         self._waiting = _waiting_place()
         self._here = next(iter(makers))
         self._asked = self._here
@@ -97,7 +98,7 @@ class MainWindow(QMainWindow):
     def place(self, name: str) -> Place:
         """Return a place, made on first use."""
         if name not in self._places:
-            made = self._makers[name]()
+            made = self._made.pop(name, None) or self._makers[name]()
             made.message.connect(self.show_message)
             made.go_asked.connect(self.go)
             self._places[name] = made
@@ -119,12 +120,15 @@ class MainWindow(QMainWindow):
             self._show(name, self._waiting)
 
     def _fill(self, name: str, steps: Iterator[None]) -> None:
-        """Take the next step to a place; show it after the last."""
-        self.place(name)
-        for _ in steps:
-            QTimer.singleShot(0, self, lambda: self._fill(name, steps))
+        """Take the next step to a place, first to make it, then to add it; show it after the last."""
+        if name in self._made:
+            self.place(name)
+        elif name not in self._places:
+            self._made[name] = self._makers[name]()
+        elif next(steps, self) is self:
+            self.prepared(name)
             return
-        self.prepared(name)
+        QTimer.singleShot(0, self, lambda: self._fill(name, steps))
 
     def _show(self, name: str, asked: Place) -> None:
         if self.stack.currentWidget() is asked and name == self._here and asked.isVisible():
