@@ -9,6 +9,7 @@ from typing import Any
 
 from study_app import __version__
 from study_app.analysis.export.level_tables import names_of_sealed
+from study_app.analysis.export.stated_credits import stated_credits
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.level_blocks import LevelBlock
 from study_app.analysis.tables.measures import AGREEMENT, LEVELS, QUARTILES
@@ -27,11 +28,12 @@ def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes
 
 
 def head(study: Study) -> dict[str, Any]:
-    """Return what study it is, and how many took part."""
+    """Return what study it is, its authors, licence and citation, and how many took part."""
     return {
         "name": study.name,
         "title": study.title,
         "version": study.version,
+        **stated_credits(study),
         "participants": study.n,
         **({"sites": list(study.sites)} if study.sites else {}),
         "sessions": len(study.participants),

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import PurePosixPath
 from typing import Any, Final
 
 from study_app import __version__
 from study_app.analysis.export.codebook import codebook_bytes
 from study_app.analysis.export.materials import materials
+from study_app.analysis.export.stated_credits import credit_lines, stated_credits
 from study_app.analysis.tables.compared_blocks import spoken
 from study_app.analysis.tables.study_tables import Study
 from study_app.protocol.texts import text_in
@@ -22,8 +24,6 @@ KEYWORDS: Final = ("haptics", "psychophysics", "liquids", "Likert scale")
 SCRIPT: Final = "report.R"
 CONTEXT: Final = "https://schema.org/"
 VARIABLES: Final = "variableMeasured"
-CREDITS: Final = {"authors": "author", "license": "license", "citation": "citation", "funder": "funder", "url": "url"}
-"""Keys of ``[study.credits]``, and the properties of schema.org that say the same."""
 
 
 def dataset_files(
@@ -46,7 +46,7 @@ def dataset_files(
         ".psychds-ignore": b".psychds-ignore\n",
         **{f"data/{name}": content for name, content in tables.items()},
         "documentation/codebook.json": codebook_bytes(study, columns),
-        "analysis/settings.json": _json(study.protocol.get("analysis", {})),
+        "analysis/settings.json": _settings(study),
         **({f"analysis/{SCRIPT}": report[SCRIPT]} if SCRIPT in report else {}),
         **{f"results/{name}": content for name, content in shown.items() if name != "codebook.json"},
         "materials/protocol.json": _json(study.protocol),
@@ -58,22 +58,46 @@ def dataset_files(
 def _sidecar(study: Study, name: str, columns: tuple[Column, ...]) -> bytes:
     """Return what describes the columns of one table alone, with authors and licence."""
     head = {"@context": CONTEXT, "@type": "Dataset", "name": PurePosixPath(name).stem}
-    return _json({**head, VARIABLES: [variable(column) for column in columns], **_stated(study)})
+    return _json({**head, VARIABLES: [variable(column) for column in columns], **stated_credits(study)})
 
 
-def _credits(study: Study) -> dict[str, Any]:
-    stated = study.protocol.get("study", {}).get("credits") or {}
-    return {name: stated[name] for name in CREDITS if stated.get(name)}
+def _settings(study: Study) -> bytes:
+    """Return the settings of the analysis, defaults where the study's file has none, and the study that they are of."""
+    head = {"name": study.name, "version": study.version, **stated_credits(study)}
+    return _json({**head, "analysis": asdict(study.decided) | (study.protocol.get("analysis") or {})})
 
 
-def _stated(study: Study) -> dict[str, Any]:
-    """Return authors, licence and citation as properties of schema.org."""
-    return {CREDITS[name]: value for name, value in _credits(study).items()}
+def variables(columns: Mapping[str, tuple[Column, ...]]) -> list[dict[str, Any]]:
+    """Return every column of some tables once; ``columns`` go by the names of the tables' files.
+
+    Where tables describe a column of one name differently, its description is that of each table, and its unit and
+    range are those that hold in all of them.
+    """
+    found: dict[str, dict[str, dict[str, Any]]] = {}
+    for file, of_table in columns.items():
+        table = file.partition("_description-")[2].partition("_")[0]
+        for column in of_table:
+            found.setdefault(column.name, {})[table] = variable(column)
+    return [_in_all(described) for described in found.values()]
+
+
+def _in_all(described: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    """Return one description of a column from those of its tables."""
+    first, *others = described.values()
+    tables: dict[str, list[str]] = {}
+    for table, one in described.items():
+        tables.setdefault(one["description"], []).append(table)
+    same = {name: value for name, value in first.items() if all(one.get(name) == value for one in others)}
+    if len(tables) > 1:
+        same["description"] = " ".join(f"In {', '.join(named)}: {words}" for words, named in tables.items())
+    for name, widest in (("minValue", min), ("maxValue", max)):
+        if all(name in one for one in described.values()):
+            same[name] = widest(one[name] for one in described.values())
+    return same
 
 
 def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dict[str, Any]:
-    """Return the dataset's description; a column that several tables share is described once."""
-    every = {column.name: column for of_table in columns.values() for column in of_table}
+    """Return the dataset's description."""
     head = study.protocol.get("study", {})
     description = head.get("description") or study.title
     return {
@@ -86,8 +110,8 @@ def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dic
         else str(description).strip(),
         "version": study.version,
         "keywords": [*KEYWORDS, *(["simulated"] if study.simulated else [])],
-        VARIABLES: [variable(column) for column in every.values()],
-        **_stated(study),
+        VARIABLES: variables(columns),
+        **stated_credits(study),
     }
 
 
@@ -98,7 +122,6 @@ def _json(content: Any) -> bytes:
 def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, bytes], missing: Sequence[str]) -> bytes:
     simulated = "**All participants are simulated.** " if study.simulated else ""
     blinded = "Settings are named." if study.revealed else "Settings are codes: the key is sealed."
-    stated = _credits(study)
     script = f"; `Rscript analysis/{SCRIPT} data` computes its main numbers again" if SCRIPT in report else ""
     lines = [
         f"# {study.title}",
@@ -110,8 +133,6 @@ def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, byte
         *([f"- `results/report.html`: the report{script}"] if "report.html" in report else []),
         *(["", f"Missing in `materials`: {', '.join(missing)}. Add them."] if missing else []),
         "",
-        f"Authors: {', '.join(stated.get('authors', [])) or 'not stated'}.",
-        f"Licence: {stated.get('license', 'not stated; ask the authors before you use the data')}.",
-        f"How to cite: {stated.get('citation', 'not stated; name the study, its version and its authors')}.",
+        *credit_lines(study),
     ]
     return ("\n".join(lines) + "\n").encode()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from study_app.analysis.export.stated_credits import credit_lines
 from study_app.analysis.findings import all_findings
 from study_app.analysis.report.answers.level_r_script import level_lines
 from study_app.analysis.report.number_files import tests
@@ -161,7 +162,14 @@ def r_script(study: Study, results: Results) -> str:
     )
     of_sites = list(_site_calls(results))
     compared += 2 * len(of_sites)
-    return start + "\n".join([*calls, *of_levels, *of_sites]) + "\n" + END.format(numbers=_numbers(results) + compared)
+    stated = "".join(f"# {line}\n" for line in credit_lines(study))
+    return (
+        stated
+        + start
+        + "\n".join([*calls, *of_levels, *of_sites])
+        + "\n"
+        + END.format(numbers=_numbers(results) + compared)
+    )
 
 
 def _numbers(results: Results) -> int:

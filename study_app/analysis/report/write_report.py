@@ -11,6 +11,7 @@ from typing import Any
 
 from study_app import __version__
 from study_app.analysis.evaluate import evaluate
+from study_app.analysis.export.stated_credits import credit_lines
 from study_app.analysis.export.table_files import table_files
 from study_app.analysis.export.typed_tables import deliver
 from study_app.analysis.figures.levels.level_pictures import level_pictures
@@ -161,6 +162,7 @@ def _page(
         ("Preregistration", lambda: preregistration_section(study)),
         ("Methods, to paste", lambda: (heading(2, "Methods, to paste"), box([paragraph(str(texts["methods"]))]))),
         ("Reproducing this report", lambda: _again(study, results)),
+        ("Licence and citation", lambda: (heading(2, "Licence and citation"), bullets(credit_lines(study)))),
         ("Answers, counted", lambda: block_section.answers(results)),
     ]
     first = failures.attempt("first page", lambda: first_page(results, texts["limits"], failures))

@@ -154,6 +154,15 @@ def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path
     assert described["author"] == ["A. Kox", "B. Lam"]
     assert described["license"] == "CC-BY-4.0"
     assert described["citation"] == "Kox and Lam (2026)"
-    readme = (folder / "README.md").read_text(encoding="utf-8")
-    assert "Authors: A. Kox, B. Lam." in readme
-    assert "Licence: CC-BY-4.0." in readme
+    stated = "Authors: A. Kox, B. Lam.", "Licence: CC-BY-4.0.", "How to cite: Kox and Lam (2026)."
+    for name in ("README.md", "results/report.html", "analysis/report.R"):
+        assert all(line in (folder / name).read_text(encoding="utf-8") for line in stated), name
+    settings = json.loads((folder / "analysis/settings.json").read_bytes())
+    for named in (
+        settings,
+        json.loads((folder / "documentation/codebook.json").read_bytes())["study"],
+        json.loads((folder / "results/report.json").read_bytes())["study"],
+    ):
+        assert (named["name"], named["license"], named["citation"]) == ("kitchen", "CC-BY-4.0", "Kox and Lam (2026)")
+        assert named["author"] == ["A. Kox", "B. Lam"]
+    assert settings["analysis"]["alpha"] == 0.05
