@@ -7,6 +7,7 @@ the servo: it gets no more markers, and `SinkThread.lost` says why.
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,7 +17,9 @@ from study_app.errors import OutletError
 from study_app.outlets.marker import Marker
 
 ROOM: Final = 1000
-"""Markers that may wait: more than a hanging sink is given before it counts as lost."""
+"""Markers that may wait."""
+HANGS_S: Final = 5.0
+"""A sink that takes longer over one marker counts as lost at the next. [choice]"""
 
 PATIENCE_S: Final = 1.0
 
@@ -83,6 +86,7 @@ class SinkThread:
         self._waiting: deque[Marker] = deque()
         self._changed = threading.Condition()
         self._closing = False
+        self._since_s: float | None = None  # of the marker that is being sent
         self._thread = threading.Thread(target=self._work, name=f"outlet {sink.title}", daemon=True)
         self._thread.start()
 
@@ -91,7 +95,8 @@ class SinkThread:
         with self._changed:
             if self.lost or self._closing:
                 return
-            if len(self._waiting) >= ROOM:
+            hangs = self._since_s is not None and time.monotonic() - self._since_s > HANGS_S
+            if hangs or len(self._waiting) >= ROOM:
                 self._give_up("it accepts no more markers")
                 return
             self._waiting.append(marker)
@@ -108,6 +113,7 @@ class SinkThread:
         try:
             while (marker := self._next()) is not None:
                 self.sink.send(marker)
+                self._since_s = None
         except OutletError as error:
             with self._changed:
                 self._give_up(str(error))
@@ -127,4 +133,7 @@ class SinkThread:
     def _next(self) -> Marker | None:
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._closing or self.lost)
-            return self._waiting.popleft() if self._waiting else None
+            if not self._waiting:
+                return None
+            self._since_s = time.monotonic()
+            return self._waiting.popleft()

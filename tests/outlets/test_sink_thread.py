@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import time
+
+import pytest
+
 from study_app.outlets import sink as module
 from study_app.outlets.sink import SinkThread
 from tests.outlets.sinks import Sink, marker
@@ -40,6 +44,34 @@ def test_another_exception_ends_the_sink_alone() -> None:
     thread.mark(marker())
     assert sink.closed.wait(5)
     assert thread.lost == "ZeroDivisionError: division by zero"
+
+
+def test_a_sink_that_hangs_is_lost_at_the_next_marker(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "HANGS_S", 0.05)
+    sink = Sink(hangs_at=1)
+    thread = SinkThread(sink)
+    thread.mark(marker(1))
+    assert sink.hanging.wait(5)
+    time.sleep(0.1)
+    assert thread.lost == ""
+    thread.mark(marker(2))
+    assert thread.lost == "it accepts no more markers"
+    sink.go_on.set()
+    assert sink.closed.wait(5)
+    assert sink.sent == [marker(1)]
+    thread.close(5)
+
+
+def test_a_sink_that_is_idle_for_long_hangs_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "HANGS_S", 0.05)
+    sink = Sink()
+    thread = SinkThread(sink)
+    for trial in (1, 2):
+        thread.mark(marker(trial))
+        time.sleep(0.1)
+    thread.mark(marker(3))
+    thread.close(5)
+    assert (len(sink.sent), thread.lost) == (3, "")
 
 
 def test_a_sink_that_hangs_delays_neither_markers_nor_the_end(monkeypatch) -> None:

@@ -46,6 +46,10 @@ class Recorder:
         assert self._process.stdout is not None
         assert self._process.stdout.readline() == "ready\n"
 
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.communicate(timeout=60)
+
     def found(self) -> dict[str, Any]:
         return json.loads(self._process.communicate(timeout=60)[0])
 
@@ -138,6 +142,28 @@ def test_a_recorder_gets_markers_with_the_times_of_their_events() -> None:
         assert stamp_s == pytest.approx(1e-9 * one.time_ns + offset_s, abs=1e-3)
     assert found["rate"] == 0.0
     assert "<trial_started>10</trial_started>" in found["xml"]
+
+
+@slow
+def test_a_recorder_that_is_killed_loses_nothing_of_the_next() -> None:
+    thread = SinkThread(open_sink("lsl", time.monotonic_ns))
+    servo = Servo()
+    stream = SampleStream(servo.telemetry, servo.rate_hz, servo.now_ns)
+    gone = [Recorder(f"liquid-study {name}", 10_000) for name in ("markers", "samples")]
+    for recorder in gone:
+        recorder.kill()
+    servo.telemetry.batches.append(samples_of(20))
+    thread.mark(marker(1))
+    later = [Recorder(f"liquid-study {name}", 1) for name in ("markers", "samples")]
+    thread.mark(marker(2))
+    servo.telemetry.batches.append(samples_of(1, first=20))
+    texts, values = [recorder.found()["samples"][-1][0] for recorder in later]
+    assert texts == [marker(2).text]
+    np.testing.assert_array_equal(np.array(values, np.float32), channels_of(samples_of(1, first=20))[0])
+    thread.close(5)
+    stream.close()
+    assert (thread.lost, stream.lost, stream.sent) == ("", "", 21)
+    assert not [one for one in threading.enumerate() if one.name.startswith("outlet")]
 
 
 @slow

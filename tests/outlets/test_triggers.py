@@ -6,6 +6,7 @@ import os
 import select
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -109,6 +110,21 @@ class TestSerial:
         os.close(theirs)
         assert thread.lost.startswith(f"serial:{name} failed: ")
         assert "\n" not in thread.lost
+
+    def test_a_reader_that_stops_reading_is_lost_in_a_line(self, pair: tuple[int, str]) -> None:
+        _, name = pair
+        thread = SinkThread(open_sink(f"serial:{name}", time.monotonic_ns))
+        full = os.open(name, os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
+        for _ in range(5):  # the kernel makes room for some more meanwhile
+            with suppress(BlockingIOError):
+                while os.write(full, bytes(4096)):
+                    pass
+            time.sleep(0.05)
+        os.close(full)
+        thread.mark(marker())
+        thread.mark(marker(2))
+        thread.close(5)
+        assert thread.lost == f"serial:{name} failed: Write timeout"
 
     def test_a_port_that_is_not_there_is_named(self, tmp_path: Path) -> None:
         pytest.importorskip("serial", reason="pyserial is not installed")
