@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -99,7 +100,7 @@ def withdraw(
         if not text.strip():
             raise StoreError(f"--{name} is empty: a withdrawal needs initials and a reason")
     study = StudyFolder(folder)
-    copies = _copies(study, also)
+    copies, shared = _found(study, also)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
     opening = open_alone(folder)
     try:
@@ -114,21 +115,30 @@ def withdraw(
         opening = open_alone(copy.path)
         try:
             if others := _others(copy, tombstone):
-                left += [f"{other} is not a session that was erased: {copy.path} was left" for other in others]
+                left += [
+                    f"{other} is not a copy of an erased session: {copy.path} was not changed; if it is of the same "
+                    "person, withdraw from that folder, too"
+                    for other in others
+                ]
             elif _erase(copy, replace(tombstone, at=at)):
                 erased.append(copy.path)
                 left += _names(copy, participant)
             reached += [copy.path] if _is_buried(copy, tombstone) else []
         finally:
             opening.release()
+    left += [
+        f"{export.path} is an export with data of {participant}: delete it, and make it again"
+        for export in shared
+        if any(_names(export, participant))
+    ]
     for merged in dict.fromkeys(filter(None, map(merged_above, reached))):
         of_merged, merged_elsewhere = _outputs(merged)
         outputs, elsewhere = (*outputs, *of_merged), (*elsewhere, *merged_elsewhere)
     return Withdrawn(tombstone, tuple(erased), outputs, elsewhere, tuple(left))
 
 
-def _copies(study: StudyFolder, also: Iterable[Path]) -> list[StudyFolder]:
-    """Return the study folders below ``also``, without the study's own."""
+def _found(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFolder], list[StudyFolder]]:
+    """Return the study folders below ``also``, without the study's own, and the Psych-DS exports of the study."""
     found: dict[Path, StudyFolder] = {}
     for folder in also:
         if not folder.is_dir():
@@ -137,7 +147,16 @@ def _copies(study: StudyFolder, also: Iterable[Path]) -> list[StudyFolder]:
             place = description.parent.resolve()
             if place != study.path.resolve() and StudyFolder(place).data.is_dir():
                 found[place] = StudyFolder(description.parent)
-    return list(found.values())
+    copies = [one for one in found.values() if is_there(one.key) or one.sessions()]
+    name = _name(study)
+    return copies, [one for one in found.values() if one not in copies and _name(one) == name]
+
+
+def _name(study: StudyFolder) -> str | None:
+    """Return the name of the study that a dataset is of, None where its description is not of this program."""
+    with suppress(StoreError):
+        return described_study(study)
+    return None
 
 
 def _tombstone(study: StudyFolder, participant: str, at: str, by: str, reason: str) -> Tombstone:
