@@ -83,7 +83,7 @@ def _missing(study: Study, fault: Fault) -> Iterator[Repair]:
 def _surplus(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield the removal of what does not belong there."""
     message = fault.message
-    if message == "unknown key" or message.endswith("is there twice") or "belong" in message:
+    if message == "unknown key" or message.endswith("is listed twice") or "belong" in message:
         yield Repair("Remove", (Unset(fault.path),))
     if message == "is not a language of the study":
         yield Repair("Remove this text", (Unset(fault.path),))

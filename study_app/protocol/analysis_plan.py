@@ -136,7 +136,7 @@ def _listed(found: list[tuple[Path, Any]], items: set[str]) -> Iterator[Fault]:
     yield from _unknown(iter(found), items)
     for place, (path, name) in enumerate(found):
         if name in [earlier for _, earlier in found[:place]]:
-            yield Fault(path, f'"{name}" is there twice')
+            yield Fault(path, f'"{name}" is listed twice', "remove one")
 
 
 def _unknown(found: Iterator[tuple[Path, Any]], items: set[str]) -> Iterator[Fault]:

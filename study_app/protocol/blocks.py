@@ -217,7 +217,9 @@ class Block(Table):
         if self.order != "constrained":
             if given:
                 raise PydanticCustomError(
-                    "constraint", 'belongs to order = "constrained", this is "{order}"', _at(given[0], order=self.order)
+                    "constraint",
+                    'belongs to order = "constrained", this is "{order}"',
+                    _at(given[0], order=self.order, hint='write order = "constrained", or omit the key'),
                 )
             return self
         if not given:

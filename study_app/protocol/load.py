@@ -295,7 +295,9 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
     except tomllib.TOMLDecodeError as error:
         raise ProtocolError(name, (_broken(str(error), text),)) from error
     except RecursionError as error:
-        raise ProtocolError(name, (Problem("file", "is nested too deeply"),)) from error
+        raise ProtocolError(
+            name, (Problem("file", "is nested too deeply", hint="use fewer brackets within brackets"),)
+        ) from error
     except ValueError as error:  # Python's own limit of digits names no place either
         raise ProtocolError(name, (Problem("file", "holds a whole number beyond 64 bits"),)) from error
     return document, Places(text)
@@ -316,7 +318,7 @@ def _shortened(words: str) -> str:
 def _faults(model: type[M], document: Mapping[str, Any]) -> list[Fault]:
     if formats.is_later(document):
         known = f"this program reads formats 1 to {formats.LATEST}"
-        return [Fault(("format",), f"is {document['format']}, {known}", "use a newer program")]
+        return [Fault(("format",), f"is {document['format']}, {known}", "use a newer version of liquid-study")]
     named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
     faults = [Fault(path, "unknown key", "the name of the table is its id") for path in named]
     try:

@@ -211,7 +211,7 @@ CASES = (
     case("block twice", '"feel", "look"]', '"feel", "look", "feel"]',
          ("sequence", "sequence.5", 'block "feel" comes twice')),
     case("condition twice", '["is_thin", "is_thick"]', '["is_thin", "is_thin"]',
-         ('"is_thin", "is_thin"', "blocks.feel.conditions.2", '"is_thin" is there twice')),
+         ('"is_thin", "is_thin"', "blocks.feel.conditions.2", '"is_thin" is listed twice')),
     case("liquid twice", '["thin", "thick"]', '["thin", "thin"]',
          ('liquids = ["thin", "thin"]', "conditions.both.liquids.2", "twice"),
          LOOK_DIFFERS),
@@ -230,7 +230,7 @@ CASES = (
     case("no languages", 'languages = ["en", "nl"]', "languages = []",
          ("languages", "study.languages", "has 0 entries, needs at least 1")),
     case("language twice", 'languages = ["en", "nl"]', 'languages = ["en", "nl", "nl"]',
-         ("languages", "study.languages.3", '"nl" is there twice')),
+         ("languages", "study.languages.3", '"nl" is listed twice')),
     case("text in one language", 'short = { en = "Cold", nl = "Koud" }', 'short = "Cold"',
          ('short = "Cold"', "questionnaires.short.items.2.short", 'write { en = "…", nl = "…" }')),
     case("text not translated", ', nl = "Beweeg." }', " }",
@@ -243,7 +243,7 @@ CASES = (
          ("Dutch", "pages.hello.body.Dutch", "not a language of the study")),
     # between tables
     case("too many liquids", "[conditions.is_thin]", MANY_LIQUIDS + "[conditions.is_thin]",
-         ('liquids = ["extra_0"', "conditions.crowd.liquids", "has more than 8 liquids")),
+         ('liquids = ["extra_0"', "conditions.crowd.liquids", "has 9 liquids")),
     case("target outside", "[30, 0, 0]", "[46, 0, 0]",
          ("[46, 0, 0]", "tasks.reach.targets_mm.2", "x = 46 mm with radius 6 mm leaves the tank")),
     case("codes of two blocks", 'code_prefix = "D"', 'code_prefix = "L"',
@@ -268,7 +268,7 @@ CASES = (
     case("item that rises and falls", "[pages.hello]", DECIDED.replace("noticed", 'falling = ["warm"]\nnoticed') +
          "[pages.hello]", ("rising", "analysis.rising.1", '"warm" is expected to fall too')),
     case("item decided twice", "[pages.hello]", DECIDED.replace('["warm"]', '["warm", "warm"]') + "[pages.hello]",
-         ("rising", "analysis.rising.2", '"warm" is there twice')),
+         ("rising", "analysis.rising.2", '"warm" is listed twice')),
     case("label of no name", "delay_ms = 120", 'delay_ms = 120\nlabel = "cold"',
          ('label = "cold"', "conditions.both.label", '"cold" is not among analysis.names')),
     case("bound of nothing", "[pages.hello]", DECIDED.replace("names", "equivalence_bound = 0\nnames") +

@@ -177,13 +177,13 @@ class OpenStudy:
         for name, text in unbundled(source)[1].items():
             path = folder / name
             if path.exists() and _content(path) != text.encode():
-                raise Refused(f"{path} is there with another liquid: rename one of the two files")
+                raise Refused(f"{path} exists and holds another liquid: rename one of the two files")
             write_whole(path, text.encode())
         for name, digest in hashes_in(source).items():
             if (there := file_hash(folder / name)) is None:
                 _copy(self.study.folder / name, folder / name)
             elif there != digest:
-                raise Refused(f"{folder / name} is there with another video: rename one of the two files")
+                raise Refused(f"{folder / name} exists and holds another video: rename one of the two files")
         self.history = replace(self.history, study=replace(self.study, folder=folder))
 
     def saved_as(self, name: str) -> OpenStudy:

@@ -21,7 +21,11 @@ def misfits(protocol: Protocol, block: Block) -> Iterator[Fault]:
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.stimulus is None:
         if design.adjusts:
-            yield Fault((*place, "design"), "adjusts a number, and the block varies none", "vary a stimulus")
+            yield Fault(
+                (*place, "design"),
+                "adjusts a number, and the block varies none",
+                'give stimulus = "…" instead of conditions',
+            )
     elif design.adjusts and not method_of(protocol, block).adjusts:
         yield Fault(
             (*place, "method"), f'levels of "{block.design}" are set by the participant', 'method = "adjustment"'
@@ -51,7 +55,7 @@ def settings(protocol: Protocol, block: Block) -> Iterator[Fault]:
             yield Fault(
                 ("methods", str(block.method), "step_size"),
                 f'"{stimulus.vary}" cannot change while it is presented',
-                "vary a number that needs no new scene",
+                "vary a number that can, such as drag.coefficient, or present levels by another method",
             )
             return
 

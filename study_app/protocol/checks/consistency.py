@@ -140,7 +140,7 @@ def crowded(parts: Draft) -> Iterator[Fault]:
     for name, condition in parts.conditions.items():
         if len(condition.liquids) > MAX_LIQUIDS:
             yield Fault(
-                ("conditions", name, "liquids"), f"has more than {MAX_LIQUIDS} liquids", "a scene holds no more"
+                ("conditions", name, "liquids"), f"has {len(condition.liquids)} liquids", f"at most {MAX_LIQUIDS}"
             )
 
 

@@ -100,9 +100,9 @@ def sequence(document: Document) -> Iterator[Fault]:
     forms = names(document, "questionnaires")
     for name in pages:
         if name in blocks:
-            yield Fault(("blocks", name), "a page has this name too", "sequence could not tell them apart")
+            yield Fault(("blocks", name), "a page has this name too", "rename one: sequence could not tell them apart")
     if not document.keys() & {"sequence", "sequences", "groups"}:
-        yield Fault(("sequence",), "is missing")
+        yield Fault(("sequence",), "is missing", "list the pages and blocks of a session in their order")
     breaks = [page for _, page in entries(document, "blocks.*.break_page")]
     used: set[str] = set()
     for place, steps in sequences_in(document):
@@ -115,7 +115,7 @@ def sequence(document: Document) -> Iterator[Fault]:
             elif name in forms and (name in pages or name in blocks) and name not in used:
                 other = "page" if name in pages else "block"
                 where = ("questionnaires", name)
-                yield Fault(where, f"a {other} has this name too", "sequence could not tell them apart")
+                yield Fault(where, f"a {other} has this name too", "rename one: sequence could not tell them apart")
             elif name in forms and name in seen:
                 yield Fault(path, f'form "{name}" comes twice', "give the second one a name of its own")
             seen.add(str(name))
@@ -135,7 +135,7 @@ def repeats(document: Document) -> Iterator[Fault]:
             if isinstance(listed, tuple):
                 for index, entry in enumerate(listed):
                     if entry in listed[:index]:
-                        yield Fault((*path, index), f'"{entry}" is there twice')
+                        yield Fault((*path, index), f'"{entry}" is listed twice', "remove one")
 
 
 def items(document: Document) -> Iterator[Fault]:

@@ -72,7 +72,11 @@ def designs(protocol: Protocol) -> Iterator[Fault]:
 def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.questionnaire is not None:
-        yield Fault((*place, "questionnaire"), "a block with a design asks the design's question", "ask more in a form")
+        yield Fault(
+            (*place, "questionnaire"),
+            "a block with a design asks the design's question",
+            "omit questionnaire; ask other questions in a form",
+        )
     correct = has_correct_answer(design, None if block.stimulus is None else protocol.stimuli[block.stimulus])
     for key in ("until", "catch"):
         if not correct and getattr(block, key) is not None:
@@ -92,7 +96,9 @@ def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
         return
     if block.stimulus is None:
         if not design.has_standard:
-            yield Fault((*place, "design"), "has one interval and compares nothing", "vary a stimulus")
+            yield Fault(
+                (*place, "design"), "has one interval and compares nothing", 'give stimulus = "…" instead of conditions'
+            )
         return
     if design.has_standard and standards_of(protocol, block) == (None,):
         yield Fault(
@@ -143,7 +149,7 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
     place = ("stimuli", name)
     if stimulus.condition is None and len(protocol.conditions) > 1:
         listed = f"known: {', '.join(protocol.conditions)}"
-        yield Fault((*place, "condition"), "is missing, and there are several", listed)
+        yield Fault((*place, "condition"), "is missing, and the study has several", listed)
         return
     condition = condition_of(protocol, stimulus)
     liquids = protocol.conditions[condition].liquid_ids

@@ -24,7 +24,7 @@ def groups(document: Mapping[str, Any]) -> Iterator[Fault]:
     own = [any(key in table for key in OWN) for table in tables]
     for key in OWN:
         if key in document and all(own):
-            yield Fault((key,), "is used by no group: each has its own", f"take {key} out, or that of a group")
+            yield Fault((key,), "is used by no group: each has its own", f"remove {key}, or the one of a group")
     used = {step for _, steps in sequences_in(document) for step in steps if isinstance(step, str)}
     for block in names(document, "blocks"):
         if used and block not in used:

@@ -69,8 +69,8 @@ def _seen(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield that a double-blind study shows its operator which answers were correct."""
     if design_of(protocol, block).feedback == "always" and protocol.study.blinding == "double":
         yield (
-            f'designs.{block.design}.feedback: "always" in a double-blind study: whoever sees the participant\'s '
-            'screen sees it: choose feedback = "practice"'
+            f'designs.{block.design}.feedback: "always" in a double-blind study: anyone who sees the participant\'s '
+            'screen sees which answers were correct: choose feedback = "practice"'
         )
 
 
@@ -90,5 +90,5 @@ def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
         fast_hz = fastest_hz(protocol.scene.velocity, protocol.device.rate_hz, 1 - error_percent / 100)
         yield (
             f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator takes more than "
-            f"{error_percent:g} % of a damper: such trials are repeated: {advice}"
+            f"{error_percent:g} % of a damper's force: such trials are repeated: {advice}"
         )

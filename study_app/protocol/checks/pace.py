@@ -76,8 +76,8 @@ def _lagging(protocol: Protocol) -> Iterator[Fault]:
             most_hz = _floored(fastest_hz(velocity, rate_hz, LEAST_SHARE), 1)
             yield Fault(
                 ("tasks", name, "frequency_hz"),
-                f"at {task.frequency_hz:g} Hz the velocity estimator passes {100 * share:.1f} % of a damper",
-                f"at most {most_hz:g} Hz: {100 * LEAST_SHARE:g} %",
+                f"at {task.frequency_hz:g} Hz the velocity estimator passes {100 * share:.1f} % of a damper's force",
+                f"at most {most_hz:g} Hz, where it passes {100 * LEAST_SHARE:g} %",
             )
 
 

@@ -76,5 +76,5 @@ def _returned(protocol: Protocol, block: Block, stroke: Stroke) -> Fault | None:
         ("stimuli", str(block.stimulus), "levels"),
         f"{damping:.3g} N·s/m delayed by {1000 * delay_s:.3g} ms returns {1000 * most_j:.1f} mJ per motion reversal; "
         "the passivity controller removes it",
-        f"at most {longest_ms(damping, stroke)} ms: {1000 * LIMIT_J:g} mJ",
+        f"at most {longest_ms(damping, stroke)} ms, which return {1000 * LIMIT_J:g} mJ",
     )

@@ -205,7 +205,7 @@ def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, 
     Raises
     ------
     StudyError
-        It does not tell the orders: it was changed, or is of a version that this one does not know; or the participant
+        It does not state the orders: it was changed, or is of a version that this one does not know; or the participant
         has fewer sessions.
     """
     try:
@@ -263,6 +263,6 @@ def _of_kept(protocol: _KeptProtocol, name: str, block: _KeptBlock) -> BlockOrde
 
 def _untold(place: str, what: str) -> StudyError:
     return StudyError(
-        f"the receipt's protocol does not tell the orders ({place}: {what}): it was changed, or written by another "
+        f"the receipt's protocol does not state the orders ({place}: {what}): it was changed, or written by another "
         "version of the program; restore it from a copy"
     )

@@ -96,7 +96,7 @@ def reproduce(
     Raises
     ------
     StudyError
-        The receipt's protocol does not tell the orders.
+        The receipt's protocol does not state the orders.
     """
     orders = orders_of_receipt(protocol, group=group, session=session)
     planned = {trial.number: trial for trial in build_schedule(orders, participant, seed, row_of).trials}

@@ -65,7 +65,7 @@ class Choice(Question):
         for number, name in enumerate(ids):
             if name in ids[:number]:
                 raise PydanticCustomError(
-                    "options", 'option "{name}" is there twice', {"name": name, "place": "options"}
+                    "options", 'option "{name}" is listed twice', {"name": name, "place": "options"}
                 )
         return self
 

@@ -19,7 +19,7 @@ REST = '[pages.rest]\nkind = "break"\ntitle = "Rest"\nbody = "Rest."\n'
     [
         ([("[stimuli.viscosity]\ncondition", "[stimuli.viscosity]\nkondition")], "", "kondition", "unknown key"),
         ([('condition = "oil"\nvary', 'condition = "oill"\nvary')], "", "condition", 'there is no condition "oill"'),
-        ([('condition = "oil"\nvary', "vary")], "", "condition", "is missing, and there are several"),
+        ([('condition = "oil"\nvary', "vary")], "", "condition", "is missing, and the study has several"),
         ([('"viscosity_pa_s"', '"viscosty_pa_s"')], "", "vary", 'did you mean "viscosity_pa_s"?'),
         *(
             ([('"viscosity_pa_s"', f'"{name}"')], "", "vary", f"{name} does not belong to a liquid")

@@ -312,8 +312,8 @@ def test_limits_of_intervals_have_defaults_where_a_block_has_a_design() -> None:
         ),
         (
             [('kind = "2ifc"', 'kind = "2ifc"\nfeedback = "always"'), ('blinding = "single"', 'blinding = "double"')],
-            'designs.pair.feedback: "always" in a double-blind study: whoever sees the participant\'s screen sees it: '
-            'choose feedback = "practice"',
+            'designs.pair.feedback: "always" in a double-blind study: anyone who sees the participant\'s screen sees '
+            'which answers were correct: choose feedback = "practice"',
         ),
     ],
 )  # fmt: skip

@@ -87,7 +87,7 @@ def test_the_returned_energy_is_that_of_a_late_damper() -> None:
             [("levels = [2, 100]", "levels = [2, 150]")],
             "stimuli.delay.levels",
             "4 N·s/m delayed by 150 ms returns 1.3 mJ per motion reversal; the passivity controller removes it",
-            "at most 108 ms: 0.5 mJ",
+            "at most 108 ms, which return 0.5 mJ",
         ),
         (
             [("levels = [2, 100]", "levels = [2, 201]")],

@@ -79,8 +79,8 @@ def study(edits: Iterable[tuple[str, str]]) -> Protocol:
         (
             [EWMA, ("amplitude_mm = 25", "amplitude_mm = 10\nfrequency_hz = 3")],
             "tasks.stir.frequency_hz",
-            "at 3 Hz the velocity estimator passes 96.9 % of a damper",
-            "at most 1.6 Hz: 99 %",
+            "at 3 Hz the velocity estimator passes 96.9 % of a damper's force",
+            "at most 1.6 Hz, where it passes 99 %",
         ),
         (
             [("amplitude_mm = 25", "amplitude_mm = 60")],

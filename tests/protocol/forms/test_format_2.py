@@ -91,7 +91,7 @@ def test_what_belongs_to_format_2_is_a_fault_in_format_1(old: str, new: str, sen
         ('intro = "Please', 'item_order = "shuffled"\nintro = "Please', "show_if: item_order is shuffled"),
         ('labels.en = ["Not at all", "Slightly", "Somewhat", "Rather", "Very"]', 'labels.en = ["Very"]', "at least 2"),
         ('options = [{ id = "mouse", text = "A mouse" }, ', "options = [", "has 1 entries, needs at least 2"),
-        ('id = "falcon"', 'id = "mouse"', 'option "mouse" is there twice'),
+        ('id = "falcon"', 'id = "mouse"', 'option "mouse" is listed twice'),
         ("to = 99", "to = 9", "9 is less than from = 16"),
         ("step = 5", "step = 7", "is 7: 14.2857 steps from end to end"),
         ("step = 5", "to = 0", "0 is not more than from = 0"),

@@ -74,6 +74,6 @@ def test_a_changed_receipt_is_refused_with_the_place(place: tuple[str, ...], val
     for step in place[:-1]:
         node = node[step]
     node[place[-1]] = value
-    with pytest.raises(StudyError, match="does not tell the orders") as caught:
+    with pytest.raises(StudyError, match="does not state the orders") as caught:
         orders_of_receipt(receipt)
     assert told in str(caught.value)

@@ -96,7 +96,7 @@ def test_a_step_is_a_fortieth_of_the_span_or_a_factor_on_log_spacing() -> None:
                 ('method = "set"\n', ""),
             ],
             "blocks.matching.design",
-            "adjusts a number, and the block varies none (vary a stimulus)",
+            "adjusts a number, and the block varies none (give stimulus = \"…\" instead of conditions)",
         ),
         ([("levels = [2, 18]", "levels = [6, 18]")], "stimuli.damping.levels", "on both sides of the standard 6"),
         ([('level = "value"\nlevels = [2, 18]', "levels = [0.1, 0.5]")], "stimuli.damping.levels", 'level = "value"'),
