@@ -20,7 +20,20 @@ COLUMNS: Final = (
     "error_p99_frames", "error_max_frames", "late", "refreshes_missed",
 )  # fmt: skip
 PERCENTILES: Final = (50.0, 95.0, 99.0)
-_HEADINGS: Final = ("asked", "achieved", "mean", "p95", "p99", "worst", "mean", "p95", "p99", "worst", "late", "missed")
+_HEADINGS: Final = (
+    "requested",
+    "achieved",
+    "mean",
+    "p95",
+    "p99",
+    "worst",
+    "mean",
+    "p95",
+    "p99",
+    "worst",
+    "late",
+    "missed",
+)
 
 
 def write(found: Delayed, to: Path) -> tuple[Path, ...]:
@@ -52,7 +65,7 @@ def markdown(found: Delayed) -> str:
     """Return the report as Markdown, between comments, ready for docs/timing.md: a row per screen and delay."""
     one = ("mean", "p95", "p99", "worst", "late")
     heads = [f"{BESIDE[load]}: mean" if name == "mean" else name for load in found.loads for name in one]
-    rows = [["screen", "asked", *heads], ["---", *["--:"] * (1 + len(heads))]]
+    rows = [["screen", "requested", *heads], ["---", *["--:"] * (1 + len(heads))]]
     for screen in found.screens:
         for abreast in zip(*(found.on(screen, load) for load in found.loads), strict=True):
             cells = [cell for trial in abreast for cell in (*_errors(trial), f"{trial.late} of {trial.frames}")]

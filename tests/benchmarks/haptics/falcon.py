@@ -165,7 +165,7 @@ def main() -> None:
             began = time.perf_counter_ns()
             part(batch)
             taken[name].append((time.perf_counter_ns() - began) / BATCH)
-    print(f"{'ns a tick':40} {'median':>8} {'99 %':>8} {'asked':>8}")
+    print(f"{'ns a tick':40} {'median':>8} {'99 %':>8} {'limit':>8}")
     for name, all_ns in taken.items():
         kept = sorted(all_ns[1:])  # the first compiled
         limit = f"<= {LIMITS_NS[name]}" if name in LIMITS_NS else ""
