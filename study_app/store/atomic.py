@@ -314,12 +314,12 @@ def read_own(path: Path, root: Path) -> bytes:
     try:
         real = path.resolve(strict=True)
         if not real.is_relative_to(root.resolve()):
-            raise StoreError(f"{path} leads out of {root}, to {real}: put the file itself there")
+            raise StoreError(f"{path} leads by a link out of {root}, to {real}: replace the link by the file itself")
         return read_regular(real)
     except OSError as error:
         raise cannot_read(path, error) from error
     except RuntimeError as error:  # a loop of links
-        raise StoreError(f"{path} cannot be read ({error}): put the file itself there") from error
+        raise StoreError(f"{path} cannot be read ({error}): replace the link by the file itself") from error
 
 
 def study_root(path: Path) -> Path:

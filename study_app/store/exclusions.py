@@ -202,7 +202,8 @@ def _exclusion(path: Path, number: int, row: list[str]) -> Exclusion:
         return Exclusion(participant, int(session), None if trial == MISSING else int(trial), by, reason, at)
     except ValueError as error:
         raise StoreError(
-            f"{path}, row {number}: {','.join(row)!r} is not an exclusion: correct or remove the row"
+            f"{path}, row {number}: {','.join(row)!r} is not an exclusion (participant, session, trial or {MISSING}, "
+            "name, reason, time): correct or remove the row"
         ) from error
 
 

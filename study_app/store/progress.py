@@ -276,7 +276,9 @@ def progress_of(lines: Sequence[Line]) -> Progress:
         They do not begin as a session's do.
     """
     if not lines or lines[0]["event"] != "session_started":
-        raise StoreError("the journal does not begin with session_started: there is no session to resume")
+        raise StoreError(
+            "the journal does not begin with session_started: restore it from a copy, or use a new session number"
+        )
     now = Progress()
     for line in lines:
         now.take(line)

@@ -229,7 +229,9 @@ def _facts(path: Path, metadata: Any) -> dict[str, Any]:
         facts = parse_json(metadata.metadata[FACTS_KEY])
         if facts["format"] not in range(1, FORMAT + 1):
             found, readable = facts["format"], f"1 to {FORMAT}"
-            raise StoreError(f"{path} has format {found!r}, this version reads {readable}: use a newer version")
+            raise StoreError(
+                f"{path} has format {found!r}, this version reads {readable}: use a newer version of liquid-study"
+            )
         if facts["kind"] == "samples":
             _check_facts_of_samples(facts, metadata.num_rows)
         return {**facts, "kind": facts["kind"], "rows": metadata.num_rows}

@@ -328,7 +328,8 @@ def read_key(folder: Path) -> Key:
         content = parse_json(base64.b64decode(sealed, validate=False))
         if content["format"] not in _FORMATS:
             raise StoreError(
-                f"{path} has format {content['format']!r}, this version reads 1 and 2: use a newer version"
+                f"{path} has format {content['format']!r}, this version reads 1 and 2: use a newer version of "
+                "liquid-study"
             )
         _check_content(content)
         return Key(

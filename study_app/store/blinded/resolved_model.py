@@ -40,7 +40,7 @@ def as_recorded(protocol: Protocol, receipt: Mapping[str, Any], key: Key) -> Pro
         opened = open_text(whose, str(text), key, frozenset({"liquids"}))
         if not opened:
             raise StoreError(
-                f"the receipt of {receipt['participant']} does not open with the study's key (resolved): it was "
+                f"the receipt of {receipt['participant']} cannot be decrypted with the study's key (resolved): it was "
                 "changed; restore it from a copy"
             )
         recorded = opened["liquids"]

@@ -97,7 +97,8 @@ def _opened(start: Line, line: Line, key: Key) -> Line:
     measured = open_text(_whose(start, line), line["sealed"], key, _SEALED_IN.get(line["event"], frozenset()))
     if measured is None:
         raise StoreError(
-            f"the journal's line {line['n']} does not open with the study's key: it was changed; restore it from a copy"
+            f"line {line['n']} of the journal cannot be decrypted with the study's key: it was changed; restore it "
+            "from a copy"
         )
     return {**{name: value for name, value in line.items() if name != "sealed"}, **measured}
 

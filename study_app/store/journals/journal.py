@@ -137,14 +137,14 @@ def _break(line: Line, before: str, *, chained: bool) -> str | None:
     """
     first, hash_before = line["n"] == 1, line.get("previous")
     if first and line.get("format", 1) > FORMAT:
-        return f"has format {line['format']}, this version reads {FORMAT}: use a newer version"
+        return f"has format {line['format']}, this version reads {FORMAT}: use a newer version of liquid-study"
     if hash_before is None:
         needed = chained or (first and line.get("format", 1) > 1)
         return "lacks previous: it was changed; restore it from a copy" if needed else None
     if hash_before != before:
-        return "was written after another line than the one before it, which was changed: restore a copy"
+        return "was written after another line than the one before it, which was changed: restore it from a copy"
     if not (chained or first or line["event"] == "session_resumed"):
-        return "has previous, and the lines before it lack it: they were changed; restore a copy"
+        return "has previous, and the lines before it lack it: they were changed; restore it from a copy"
     return None
 
 

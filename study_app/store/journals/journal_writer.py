@@ -82,7 +82,9 @@ class Journal:
             file = path.open("r+b", buffering=0)
             if file.seek(0, os.SEEK_END) != contents.whole_bytes:
                 file.close()
-                raise StoreError(f"{path} has changed while it was opened: is another program writing it?")
+                raise StoreError(
+                    f"{path} has changed while it was opened: close the other program that writes it, and try again"
+                )
         except OSError as error:
             raise cannot_write(path, error) from error
         journal = cls(path, file, clock)

@@ -98,7 +98,7 @@ class SessionStore:
         Raises
         ------
         StoreError
-            The receipt does not open with the study's key.
+            The receipt cannot be decrypted with the study's key.
         """
         return as_recorded(protocol, self._receipt, self.key)
 

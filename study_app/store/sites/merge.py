@@ -197,7 +197,9 @@ def _check_sessions(sources: tuple[_Source, ...]) -> None:
     for one in sources:
         for begun, path in one.begun.items():
             if (other := seen.get(begun)) is not None:
-                raise StoreError(f"{path} is a copy of {other}, and would count twice: merge each session once")
+                raise StoreError(
+                    f"{path} is a copy of {other}, and would count twice: name only one of the two folders"
+                )
             seen[begun] = path
 
 

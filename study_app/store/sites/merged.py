@@ -103,7 +103,9 @@ def read_merged(folder: Path) -> Merged | None:
         held = parse_json(read_regular(path))
         if held["format"] != FORMAT:
             shown = shortened(held["format"])
-            raise StoreError(f"{path} has format {shown}, this version reads {FORMAT}: use a newer version")
+            raise StoreError(
+                f"{path} has format {shown}, this version reads {FORMAT}: use a newer version of liquid-study"
+            )
         sites = tuple(Site(**site) for site in held["sites"])
         if sites and all(map(_is_site, sites)) and holds("protocol_hash", held["protocol_hash"]):
             merged = Merged(folder, check_study_name(held["study"]), held["protocol_hash"], sites)
@@ -128,7 +130,9 @@ def _refuse_links(merged: Merged) -> None:
     """Refuse a folder of a site that lies elsewhere: it would be read as if it were the copy."""
     for folder in map(merged.folder, merged.names):
         if not (real := _real(folder)).is_relative_to(_real(merged.path)):
-            raise StoreError(f"{folder} leads out of {merged.path}, to {real}: put the folder itself there")
+            raise StoreError(
+                f"{folder} leads by a link out of {merged.path}, to {real}: replace the link by the folder itself"
+            )
 
 
 def _real(path: Path) -> Path:

@@ -130,7 +130,10 @@ class SessionRows:
         earlier = None if before is None else self.intervals[before]
         trial = self._row_of(line)
         if trial.get("intervals") is None:
-            raise StoreError(f"the journal's line {line['n']} is an interval of trial {line['trial']}, which has none")
+            raise StoreError(
+                f"the journal's line {line['n']} is an interval of trial {line['trial']}, which has none: "
+                "restore it from a copy"
+            )
         trial["intervals"] += 1
         self.intervals.append(interval_row(trial, self._started[which], line, earlier))
 
@@ -221,7 +224,7 @@ def latest(rows: Iterable[Row]) -> list[Row]:
 
 def _session(lines: Sequence[Line]) -> Row:
     if not lines or lines[0]["event"] != "session_started":
-        raise StoreError("the journal does not begin with session_started: it is not the journal of a session")
+        raise StoreError("the journal does not begin with session_started: restore it from a copy")
     return {name: lines[0][name] for name in _SESSION_COLUMNS}
 
 
@@ -274,7 +277,9 @@ def _trial(session: Row, line: Line) -> Row:
 
 
 def _never_started(line: Line) -> StoreError:
-    return StoreError(f"the journal's line {line['n']} is about trial {line['trial']}, which never started")
+    return StoreError(
+        f"the journal's line {line['n']} is about trial {line['trial']}, which never started: restore it from a copy"
+    )
 
 
 def _note(row: Row, text: str, *, mark: bool = False) -> None:

@@ -102,7 +102,7 @@ def test_a_session_of_an_opened_study_and_other_events_are_written_as_they_are()
     ids=json.dumps,
 )
 def test_what_was_changed_or_moved_does_not_open(change: dict[str, Any]) -> None:
-    with pytest.raises(StoreError, match=r"line 2 does not open with the study's key"):
+    with pytest.raises(StoreError, match=r"line 2 of the journal cannot be decrypted with the study's key"):
         opened([START, ended(MEASURED) | change], key())
 
 
@@ -115,7 +115,7 @@ def test_what_is_sealed_of_an_interval_does_not_open_as_that_of_another_or_of_it
     first = of_interval("interval_ended", 1, force_mean_n=0.5)
     assert opened([START, first], key())[1]["force_mean_n"] == 0.5
     for moved in (first | {"interval": 2}, first | {"event": "trial_ended"}, first | {"event": "trial_started"}):
-        with pytest.raises(StoreError, match="does not open"):
+        with pytest.raises(StoreError, match="cannot be decrypted"):
             opened([START, moved], key())
 
 
@@ -127,7 +127,7 @@ def test_values_of_another_type_are_not_taken_from_a_text_that_the_key_sealed() 
 
 
 def test_it_opens_with_its_own_key_alone() -> None:
-    with pytest.raises(StoreError, match="does not open"):
+    with pytest.raises(StoreError, match="cannot be decrypted"):
         opened([START, ended(MEASURED)], key(bytes([1] * 32)))
-    with pytest.raises(StoreError, match="does not open"):
+    with pytest.raises(StoreError, match="cannot be decrypted"):
         opened([START | {"participant": "P008"}, ended(MEASURED)], key())

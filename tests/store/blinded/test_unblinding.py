@@ -207,11 +207,11 @@ def test_a_sealed_text_that_was_changed_is_found(tmp_path: Path, start: Start, a
         line["sealed"] = text[:100] + ("0" if text[100] != "0" else "1") + text[101:]
 
     forge(store.folder.journal, change)
-    assert "does not open with the study's key: it was changed" in "\n".join(
+    assert "cannot be decrypted with the study's key: it was changed" in "\n".join(
         map(str, verify(tmp_path / "study").errors)
     )
     (left,) = unblind(tmp_path / "study", "AB", "done").left
-    assert "does not open" in left
+    assert "cannot be decrypted" in left
 
 
 def in_clear(store: SessionStore, study: StudyHead) -> None:

@@ -201,7 +201,7 @@ def test_a_journal_that_changed_while_it_was_opened_is_refused(tmp_path: Path) -
     with path.open("ab") as file:
         file.write(b'{"n":5}\n')
     before = path.read_bytes()
-    with pytest.raises(StoreError, match="has changed while it was opened: is another program writing it"):
+    with pytest.raises(StoreError, match="has changed while it was opened: close the other program"):
         Journal.reopen(path, contents, SessionClock())
     assert path.read_bytes() == before
 

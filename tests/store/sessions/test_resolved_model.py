@@ -102,7 +102,7 @@ def test_a_changed_text_or_one_of_another_session_is_refused(
         held["resolved"] = sealed_model(protocol, "P008", 1, key)
     else:
         key = dataclasses.replace(key, nonce=bytes(32))
-    with pytest.raises(StoreError, match=r"receipt of P007 does not open with the study's key \(resolved\)"):
+    with pytest.raises(StoreError, match=r"receipt of P007 cannot be decrypted with the study's key \(resolved\)"):
         as_recorded(protocol, held, key)
 
 

@@ -59,7 +59,10 @@ def test_a_damaged_list_of_sites_is_refused(pooled: Path) -> None:
 def test_a_site_elsewhere_is_not_read(pooled: Path, tmp_path: Path) -> None:
     (pooled / "sites/B").rename(tmp_path / "elsewhere")
     (pooled / "sites/B").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(StoreError, match=r"sites/B leads out of .*pooled, to .*elsewhere: put the folder itself there"):
+    with pytest.raises(
+        StoreError,
+        match=r"sites/B leads by a link out of .*pooled, to .*elsewhere: replace the link by the folder itself",
+    ):
         read_merged(pooled)
 
 

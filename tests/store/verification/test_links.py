@@ -46,7 +46,7 @@ def test_a_link_out_of_the_studys_folder_is_not_followed(tmp_path: Path, finishe
     path = own(finished, name)
     path.rename(tmp_path / "elsewhere")
     path.symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(StoreError, match=r"leads out of .*study.*: put the file itself there"):
+    with pytest.raises(StoreError, match=r"leads by a link out of .*study.*: replace the link by the file itself"):
         read(path)
     assert not verify(tmp_path / "study").sound
 
@@ -70,7 +70,7 @@ def test_a_device_without_an_end_and_a_loop_of_links_are_refused(
     path = own(finished, name)
     path.unlink()
     path.symlink_to(path.name if target == "itself" else target)
-    with pytest.raises(StoreError, match=f"{name} (leads out of|cannot be read)"):
+    with pytest.raises(StoreError, match=f"{name} (leads by a link out of|cannot be read)"):
         read(path)
 
 
