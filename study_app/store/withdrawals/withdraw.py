@@ -126,14 +126,14 @@ def withdraw(
             reached += [copy.path] if _is_buried(copy, tombstone) else []
         finally:
             opening.release()
+    for merged in dict.fromkeys(filter(None, map(merged_above, reached))):
+        of_merged, merged_elsewhere = _outputs(merged)
+        outputs, elsewhere = (*outputs, *of_merged), (*elsewhere, *merged_elsewhere)
     left += [
         f"{export.path} is an export with data of {participant}: delete it, and make it again"
         for export in shared
         if any(_names(export, participant))
     ]
-    for merged in dict.fromkeys(filter(None, map(merged_above, reached))):
-        of_merged, merged_elsewhere = _outputs(merged)
-        outputs, elsewhere = (*outputs, *of_merged), (*elsewhere, *merged_elsewhere)
     return Withdrawn(tombstone, tuple(erased), outputs, elsewhere, tuple(left))
 
 

@@ -177,15 +177,16 @@ def test_another_persons_session_of_that_id_is_left(study: Path, tmp_path: Path)
     assert (other / "data" / f"sub-{PERSON}").is_dir()
 
 
-def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, tmp_path: Path) -> None:
+def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, results: Path, tmp_path: Path) -> None:
     shared = tmp_path / "disk" / "shared"
     export(study, tmp_path / "out", extras=["psych-ds"])
     shutil.move(tmp_path / "out" / "psych-ds", shared)
     foreign = tmp_path / "disk" / "bids"
     (foreign / "data").mkdir(parents=True)
     (foreign / "dataset_description.json").write_text('{"Name": "of another program"}')
+    export(study, results / "tables", extras=["psych-ds"])  # deleted, since this machine wrote it there
     before = contents(shared)
-    done = erase(study, also=[tmp_path / "disk"])
+    done = erase(study, also=[tmp_path])
     assert done.folders == (study,)
     assert done.left == (f"{shared} is an export with data of {PERSON}: delete it, and make it again",)
     assert contents(shared) == before
