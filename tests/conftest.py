@@ -6,7 +6,7 @@ import logging
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import hypothesis
@@ -85,6 +85,23 @@ def settings_of_nobody(tmp_path_factory: pytest.TempPathFactory, monkeypatch: py
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(settings))
     monkeypatch.setenv("LIQUID_STUDY_CACHE", str(settings.with_name(f"{settings.name}-cache")))
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(settings.with_name(f"{settings.name}-data")))
+
+
+@pytest.fixture(scope="session")
+def rehearsal_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Return a function that rehearses a shipped study with two participants and seed 1, once for all tests."""
+    from study_app.session.simulated.rehearsal import rehearse
+    from tests.studies import once
+
+    def rehearsal_of(name: str) -> Path:
+        def make(folder: Path) -> None:
+            said: list[str] = []
+            assert rehearse(name, participants=2, seed=1, results=folder / name, progress=said.append) == folder / name
+            assert [line[:4] for line in said] == ["P001", "P002"]
+
+        return once(tmp_path_factory, f"rehearsal-{name}", make) / name
+
+    return rehearsal_of
 
 
 @pytest.fixture(scope="session")

@@ -1,12 +1,29 @@
-"""Small rehearsed studies with journals, receipts and a sealed key, made without a servo."""
+"""Studies that several tests read: made once, or small, with journals, receipts and a sealed key but no servo."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+
+import pytest
 
 from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.trial_features import ConditionFeatures, TrialFeatures
+
+
+def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
+    """Return the folder that ``make`` filled, once for all workers of a run: who changes it takes a copy."""
+    own = factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / f"once-{name}"
+    if not folder.exists():
+        making = factory.mktemp(name)
+        make(making)
+        with suppress(OSError):  # another worker was first
+            making.rename(folder)
+    return folder
 
 
 def made_up(name: str) -> ConditionFeatures:

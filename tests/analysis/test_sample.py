@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,6 @@ from study_app.analysis.export.export import export
 from study_app.analysis.figures.plotting import plot
 from study_app.analysis.report.json_values import plain
 from study_app.analysis.tables.study_tables import load_study
-from study_app.session.simulated.rehearsal import rehearse
 from study_app.store import receipt
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.sealing import opened
@@ -82,8 +82,8 @@ def test_it_is_small_sealed_simulated_and_without_recordings() -> None:
 
 
 @needs_servo
-def test_its_answers_and_forces_are_those_of_a_rehearsal_today(tmp_path: Path) -> None:
-    folder = rehearse("rek2024", participants=2, seed=1, results=tmp_path / "again", recordings=False)
+def test_its_answers_and_forces_are_those_of_a_rehearsal_today(rehearsal_of: Callable[[str], Path]) -> None:
+    folder = rehearsal_of("rek2024")
     for sample, again in zip(SAMPLE.sessions()[:2], StudyFolder(folder).sessions(), strict=True):
         assert rows(sample, "responses") == rows(again, "responses"), MAKE_AGAIN
         for kept, made in zip(known(sample, SAMPLE.path), known(again, folder), strict=True):

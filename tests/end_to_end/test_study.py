@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -45,29 +44,19 @@ def without_clock(rows: list[dict[str, str]]) -> list[dict[str, str]]:
     return [{name: cell for name, cell in row.items() if name not in CLOCK_COLUMNS} for row in rows]
 
 
-@pytest.fixture(scope="module")
-def results_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], StudyFolder]:
-    """Return a function that rehearses a protocol with two participants, once."""
-
-    @cache
-    def rehearsed_once(name: str) -> StudyFolder:
-        folder = tmp_path_factory.mktemp("results") / name
-        said: list[str] = []
-        assert rehearse(name, participants=2, seed=1, results=folder, progress=said.append) == folder
-        assert [line[:4] for line in said] == ["P001", "P002"]
-        return StudyFolder(folder)
-
-    return rehearsed_once
-
-
 FIXED = [name for name in shipped() if not load(name).stimuli]
 """Where answers choose levels, `validate` rehearses the whole program."""
 
 
+def besides(*names: str) -> list[Any]:
+    """Return the shipped protocols of fixed conditions; those other than ``names`` are of the nightly circle."""
+    return [name if name in names else pytest.param(name, marks=pytest.mark.nightly) for name in FIXED]
+
+
 @pytest.fixture(params=FIXED)
-def rehearsed(request: pytest.FixtureRequest, results_of: Callable[[str], StudyFolder]) -> tuple[str, StudyFolder]:
+def rehearsed(request: pytest.FixtureRequest, rehearsal_of: Callable[[str], Path]) -> tuple[str, StudyFolder]:
     """Return each shipped protocol of fixed conditions with its rehearsed results."""
-    return request.param, results_of(request.param)
+    return request.param, StudyFolder(rehearsal_of(request.param))
 
 
 def test_every_response_is_there_once_on_the_scale_and_marked_as_simulated(rehearsed: tuple[str, StudyFolder]) -> None:
@@ -126,9 +115,9 @@ def test_the_receipt_says_how_it_ended_and_what_ran_it(rehearsed: tuple[str, Stu
         assert (receipt["device"]["name"], receipt["participant"]) == ("scripted", session.participant)
 
 
-def test_answers_follow_what_was_seen(results_of: Callable[[str], StudyFolder]) -> None:
+def test_answers_follow_what_was_seen(rehearsal_of: Callable[[str], Path]) -> None:
     """The longest delay seems more different from the baseline than none does, to every simulated participant."""
-    folder = results_of("rek2024")
+    folder = StudyFolder(rehearsal_of("rek2024"))
     codes = open_or_draw_key(folder.path, load("rek2024"), stream(1, "blinding").random).codes["delays"]
     of = {condition: code for code, condition in codes.items()}
     for session in folder.sessions():
@@ -140,10 +129,8 @@ def test_answers_follow_what_was_seen(results_of: Callable[[str], StudyFolder]) 
         assert different[of["delay_200"]] > different[of["delay_0"]]
 
 
-def test_a_rehearsed_study_can_be_exported_and_plotted(
-    results_of: Callable[[str], StudyFolder], tmp_path: Path
-) -> None:
-    folder = results_of("rek2024").path
+def test_a_rehearsed_study_can_be_exported_and_plotted(rehearsal_of: Callable[[str], Path], tmp_path: Path) -> None:
+    folder = rehearsal_of("rek2024")
     written = [*export(folder, tmp_path / "tables"), *plot(folder, tmp_path / "figures")]
     assert len(written) >= 3
     assert all(path.stat().st_size > 0 for path in written)
@@ -153,17 +140,19 @@ def test_the_thesis_study_leaves_62_responses() -> None:
     assert orders_of(load("rek2024")).answers == 62
 
 
+@pytest.mark.parametrize("rehearsed", besides("physical2", "slime"), indirect=True)
 def test_the_same_call_into_another_folder_gives_the_same_tables_but_for_wall_clock_times(
     rehearsed: tuple[str, StudyFolder], tmp_path: Path
 ) -> None:
+    """For protocols of format 1 `test_format_1` compares every table with those of the first release."""
     name, first = rehearsed
     study = load(name).study.name
-    again = StudyFolder(rehearse(name, participants=2, seed=1, results=tmp_path / "again"))
-    for one, other in zip(first.sessions(), again.sessions(), strict=True):
-        for kind in ("responses", "trials"):
-            assert without_clock(table(one, study, kind)) == without_clock(table(other, study, kind))
+    (other,) = StudyFolder(rehearse(name, participants=1, seed=1, results=tmp_path / "again")).sessions()
+    for kind in ("responses", "trials"):
+        assert without_clock(table(first.sessions()[0], study, kind)) == without_clock(table(other, study, kind))
 
 
+@pytest.mark.parametrize("rehearsed", besides("demo"), indirect=True)
 def test_another_seed_gives_another_study(rehearsed: tuple[str, StudyFolder], tmp_path: Path) -> None:
     name, first = rehearsed
     study = load(name).study.name

@@ -6,12 +6,11 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.columns import TABLES
 
@@ -55,13 +54,10 @@ def hashes(folder: StudyFolder) -> Iterator[tuple[str, str]]:
         yield f"{place}/protocol", sha256(json.loads(session.receipt.read_text(encoding="utf-8"))["protocol"])
 
 
-@pytest.mark.parametrize(
-    "name", ["demo", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rek2024", "physical_liquids"))]
-)
+@pytest.mark.parametrize("name", sorted(RECORDED))
 @pytest.mark.slow
-def test_rehearsal_writes_the_bytes_recorded_for_format_1(name: str, tmp_path: Path) -> None:
-    folder = rehearse(name, participants=2, seed=1, results=tmp_path / name)
-    assert dict(hashes(StudyFolder(folder))) == RECORDED[name]
+def test_rehearsal_writes_the_bytes_recorded_for_format_1(name: str, rehearsal_of: Callable[[str], Path]) -> None:
+    assert dict(hashes(StudyFolder(rehearsal_of(name)))) == RECORDED[name]
 
 
 def test_hashes_of_format_1_cover_two_participants_of_each_shipped_study() -> None:

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from study_app.analysis.report.write_report import report
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from tests.protocol.trials.level_studies import FIVE_POINTS, SHORT, text_of, text_of_damper
+from tests.studies import once
 
 MORE = """
 [stimuli.around]
@@ -103,11 +105,18 @@ source = "Jones et al. 1997"
 @pytest.fixture(scope="session")
 def opened_adaptive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a study of up–down tracks at two standards and of QUEST+ at one, its key open."""
-    folder = tmp_path_factory.mktemp("adaptive")
-    (folder / "adaptive.toml").write_text(text_of_damper("adaptive", ADAPTIVE, (4, 8)))
-    study = rehearse(folder / "adaptive.toml", participants=3, seed=1, results=folder / "study", recordings=False)
-    assert unblind(study, "AB", "to analyse").left == ()
-    return study
+
+    def make(folder: Path) -> None:
+        (folder / "adaptive.toml").write_text(text_of_damper("adaptive", ADAPTIVE, (4, 8)))
+        study = rehearse(folder / "adaptive.toml", participants=3, seed=1, results=folder / "study", recordings=False)
+        assert unblind(study, "AB", "to analyse").left == ()
+
+    return once(tmp_path_factory, "adaptive", make) / "study"
+
+
+@pytest.fixture(scope="session")
+def reported_adaptive(opened_adaptive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return once(tmp_path_factory, "reported-adaptive", lambda to: report(opened_adaptive, to, failed=pytest.fail))
 
 
 @pytest.fixture(scope="session")
@@ -123,9 +132,11 @@ def opened_catch(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def sealed_levels(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("levels")
-    (folder / "levels.toml").write_text(text_of(SEQUENCE, *SHORT, more=FIVE_POINTS + MORE))
-    return rehearse(folder / "levels.toml", participants=3, seed=2, results=folder / "study", recordings=False)
+    def make(folder: Path) -> None:
+        (folder / "levels.toml").write_text(text_of(SEQUENCE, *SHORT, more=FIVE_POINTS + MORE))
+        rehearse(folder / "levels.toml", participants=3, seed=2, results=folder / "study", recordings=False)
+
+    return once(tmp_path_factory, "levels", make) / "study"
 
 
 @pytest.fixture(scope="session")
@@ -134,3 +145,8 @@ def opened_levels(sealed_levels: Path, tmp_path_factory: pytest.TempPathFactory)
     shutil.copytree(sealed_levels, folder)
     assert unblind(folder, "AB", "to analyse").left == ()
     return folder
+
+
+@pytest.fixture(scope="session")
+def reported_levels(opened_levels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return once(tmp_path_factory, "reported-levels", lambda to: report(opened_levels, to, failed=pytest.fail))

@@ -14,10 +14,11 @@ from matplotlib.figure import Figure
 from study_app.analysis.designs.level_summaries import levels_found
 from study_app.analysis.designs.thresholds import counts_of, thresholds
 from study_app.analysis.designs.track_courses import courses
+from study_app.analysis.figures.levels.level_pictures import level_pictures
 from study_app.analysis.figures.levels.panels import over_trials
 from study_app.analysis.figures.levels.weber_figure import published_fractions, weber_fractions
-from study_app.analysis.figures.plotting import plot
 from study_app.analysis.results.level_results import LevelsFound, PublishedValue, ThresholdFound
+from study_app.analysis.results.section_failures import Failures
 from study_app.analysis.statistics.psychometrics.posterior import fitted, narrowing
 from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.tables.tracks import tracks
@@ -109,13 +110,6 @@ def test_published_thresholds_are_weber_fractions_over_their_standard_alone() ->
     ]
 
 
-@pytest.fixture(scope="module")
-def plotted(opened_adaptive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    to = tmp_path_factory.mktemp("plots")
-    plot(opened_adaptive, to)
-    return to
-
-
 def words_in(svg: Path) -> list[str]:
     return [
         re.sub(r"<[^>]+>", "", one).strip() for one in re.findall(r"<text[^>]*>.*?</text>", svg.read_text(), re.DOTALL)
@@ -124,23 +118,23 @@ def words_in(svg: Path) -> list[str]:
 
 @pytest.mark.slow
 @needs_servo
-def test_adaptive_blocks_have_a_panel_for_each_participant_and_standard(plotted: Path) -> None:
+def test_adaptive_blocks_have_a_panel_for_each_participant_and_standard(reported_adaptive: Path) -> None:
     for name, panels in (("tracks-staircase", 6), ("tracks-quest", 3)):
         for form in ("png", "svg", "pdf", "txt"):
-            assert (plotted / f"{name}.{form}").stat().st_size > 0
-        words = words_in(plotted / f"{name}.svg")
+            assert (reported_adaptive / f"{name}.{form}").stat().st_size > 0
+        words = words_in(reported_adaptive / f"{name}.svg")
         assert sum(word in {"P001", "P002", "P003"} for word in words) == panels
         assert words.count("standard 4") == (3 if name == "tracks-staircase" else 0)
-    assert "Rings: reversals" in (plotted / "tracks-staircase.txt").read_text()
-    assert "Rings" not in (plotted / "tracks-quest.txt").read_text()
+    assert "Rings: reversals" in (reported_adaptive / "tracks-staircase.txt").read_text()
+    assert "Rings" not in (reported_adaptive / "tracks-quest.txt").read_text()
 
 
 @pytest.mark.slow
 @needs_servo
-def test_every_answer_has_a_mark_and_every_reversal_a_ring(opened_adaptive: Path, plotted: Path) -> None:
+def test_every_answer_has_a_mark_and_every_reversal_a_ring(opened_adaptive: Path, reported_adaptive: Path) -> None:
     opened = tracks(load_study(opened_adaptive))
     own = opened[opened["block"] == "staircase"]
-    svg = (plotted / "tracks-staircase.svg").read_text()
+    svg = (reported_adaptive / "tracks-staircase.svg").read_text()
     _, *parts = re.split(r'<g id="(\w+)_\d+">', re.sub(r"<defs>.*?</defs>", "", svg, flags=re.DOTALL))
     marks = sum(
         part.count("<use ") + part.count("<path ")
@@ -152,12 +146,14 @@ def test_every_answer_has_a_mark_and_every_reversal_a_ring(opened_adaptive: Path
 
 @pytest.mark.slow
 @needs_servo
-def test_weber_fractions_are_drawn_where_there_are_two_standards(opened_adaptive: Path, plotted: Path) -> None:
-    assert (plotted / "weber-staircase.png").exists()
-    assert not (plotted / "weber-quest.png").exists()
-    assert {"4", "8", "Weber fraction at 71 % correct"} < set(words_in(plotted / "weber-staircase.svg"))
-    assert "dotted: published 0.1917" in words_in(plotted / "weber-staircase.svg")
-    caption = (plotted / "weber-staircase.txt").read_text(encoding="utf-8")
+def test_weber_fractions_are_drawn_where_there_are_two_standards(
+    opened_adaptive: Path, reported_adaptive: Path
+) -> None:
+    assert (reported_adaptive / "weber-staircase.png").exists()
+    assert not (reported_adaptive / "weber-quest.png").exists()
+    assert {"4", "8", "Weber fraction at 71 % correct"} < set(words_in(reported_adaptive / "weber-staircase.svg"))
+    assert "dotted: published 0.1917" in words_in(reported_adaptive / "weber-staircase.svg")
+    caption = (reported_adaptive / "weber-staircase.txt").read_text(encoding="utf-8")
     assert "published values, Jones et al. 1997: weber 0.1917 (at 71 % correct, n = 10)." in caption
     (block_found,) = (one for one in levels_found(load_study(opened_adaptive)) if one.block == "staircase")
     assert [point[0] for point in weber_fractions(block_found, "P002")] == [4.0, 8.0]
@@ -166,6 +162,9 @@ def test_weber_fractions_are_drawn_where_there_are_two_standards(opened_adaptive
 
 @pytest.mark.slow
 @needs_servo
-def test_constant_stimuli_have_no_figure_of_tracks(opened_levels: Path, tmp_path: Path) -> None:
-    assert not [path for path in plot(opened_levels, tmp_path) if path.name.startswith("tracks-")]
-    assert (tmp_path / "weber-viscosity.png").exists()
+def test_constant_stimuli_have_no_figure_of_tracks(opened_levels: Path) -> None:
+    study = load_study(opened_levels)
+    own = [one for one in levels_found(study) if one.block == "viscosity"]
+    drawn = {one.name: one for one in level_pictures(study, own, ("png",), Failures())}
+    assert not [name for name in drawn if name.startswith("tracks-")]
+    assert "png" in drawn["weber-viscosity"].files

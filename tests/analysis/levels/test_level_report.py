@@ -51,15 +51,6 @@ def found_in(folder: Path, block: str) -> LevelsFound:
     return next(one for one in levels_found(load_study(folder)) if one.block == block)
 
 
-@pytest.fixture(scope="module")
-def reported(opened_levels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    to = tmp_path_factory.mktemp("report")
-    failed: list[str] = []
-    report(opened_levels, to, failed=failed.append)
-    assert failed == []
-    return to
-
-
 def test_forced_choices_give_the_share_correct_per_level_participant_and_standard(opened_levels: Path) -> None:
     found = found_in(opened_levels, "viscosity")
     right: dict[tuple[Any, ...], list[bool]] = defaultdict(list)
@@ -150,13 +141,13 @@ def test_compared_conditions_are_named_in_the_order_of_the_protocol(opened_level
     assert found.vary is None
 
 
-def test_report_has_a_table_a_figure_and_numbers_of_every_block_of_levels(reported: Path) -> None:
-    page = (reported / "report.html").read_text()
-    held = json.loads((reported / "report.json").read_text())["results"]["levels"]
+def test_report_has_a_table_a_figure_and_numbers_of_every_block_of_levels(reported_levels: Path) -> None:
+    page = (reported_levels / "report.html").read_text()
+    held = json.loads((reported_levels / "report.json").read_text())["results"]["levels"]
     assert [one["block"] for one in held] == BLOCKS
     for block in held:
-        assert (reported / f"levels-{block['block']}.png").stat().st_size > 10_000
-        caption = (reported / f"levels-{block['block']}.txt").read_text()
+        assert (reported_levels / f"levels-{block['block']}.png").stat().st_size > 10_000
+        caption = (reported_levels / f"levels-{block['block']}.txt").read_text()
         assert "SIMULATED participants" in caption
         people = {one["participant"] for one in block["answers"]}
         assert people == {None, "P001", "P002", "P003"}
@@ -213,8 +204,8 @@ def test_plot_draws_the_questions_and_levels_of_a_study_without_statements(opene
     assert "question-viscosity-choice_2ifc.png" in written
 
 
-def test_figures_name_quantities_and_titles_not_keys(reported: Path) -> None:
-    drawn = {path.stem: path.read_text(encoding="utf-8") for path in reported.glob("*.svg")}
+def test_figures_name_quantities_and_titles_not_keys(reported_levels: Path) -> None:
+    drawn = {path.stem: path.read_text(encoding="utf-8") for path in reported_levels.glob("*.svg")}
     assert "Weber fraction of viscosity<" in drawn["levels-viscosity"]
     assert "standard 2 Pa·s<" in drawn["levels-viscosity"]
     assert "Viscosity [Pa·s]<" in drawn["levels-number"]
@@ -224,4 +215,4 @@ def test_figures_name_quantities_and_titles_not_keys(reported: Path) -> None:
         shown = re.findall(r">([^<>]+)</text>", svg)
         assert len(shown) > 3, name
         assert [words for words in shown if "_" in words] == [], name
-    assert "Comparison [Pa·s]</th>" in (reported / "report.html").read_text()
+    assert "Comparison [Pa·s]</th>" in (reported_levels / "report.html").read_text()

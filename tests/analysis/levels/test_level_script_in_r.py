@@ -16,7 +16,6 @@ import pytest
 from study_app.analysis.designs.sensitivities import sensitivities
 from study_app.analysis.report.answers.level_r_script import level_lines
 from study_app.analysis.report.r_script import START
-from study_app.analysis.report.write_report import report
 from study_app.analysis.results.level_results import LevelsFound
 from study_app.analysis.tables.study_tables import Study
 from study_app.protocol.trials.kinds import default_design
@@ -29,25 +28,18 @@ pytestmark = [pytest.mark.slow, needs_servo]
 LINE = re.compile(r"(.+?) +report +(\S+) +R +(\S+)")
 
 
-@pytest.fixture(scope="module")
-def reported(opened_adaptive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    to = tmp_path_factory.mktemp("report")
-    report(opened_adaptive, to)
-    return to
-
-
 def computed(stdout: str) -> dict[str, float]:
     return {found[1]: float(found[3]) for line in stdout.splitlines() if (found := LINE.match(line))}
 
 
-def test_r_computes_the_same_numbers(reported: Path) -> None:
-    done = run_in_r(reported)
+def test_r_computes_the_same_numbers(reported_adaptive: Path) -> None:
+    done = run_in_r(reported_adaptive)
     assert (done.returncode, done.stderr) == (0, "")
     *_, counts, verdict = done.stdout.splitlines()
     assert verdict == "every number that R computes is the report's"
     found, of = re.findall(r"\d+", counts)
     assert found == of
-    staircase, quest = numbers(reported)["results"]["levels"]
+    staircase, quest = numbers(reported_adaptive)["results"]["levels"]
     theirs = computed(done.stdout)
     for held in (staircase, quest):
         for one in held["thresholds"]:
@@ -63,17 +55,18 @@ def test_r_computes_the_same_numbers(reported: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_r_reads_a_study_of_every_reply(opened_levels: Path, tmp_path: Path) -> None:
-    report(opened_levels, tmp_path)
-    done = run_in_r(tmp_path)
+def test_r_reads_a_study_of_every_reply(reported_levels: Path) -> None:
+    done = run_in_r(reported_levels)
     assert (done.returncode, done.stderr) == (0, "")
     assert "pairs, P001 with late d'" in computed(done.stdout)
 
 
-def test_r_finds_a_criterion_that_was_changed(reported: Path, tmp_path: Path) -> None:
-    for name in ("report.R", *(path.name for path in reported.glob("study-*_data.csv"))):
-        shutil.copy(reported / name, tmp_path)
-    (one, *_) = (one for one in numbers(reported)["results"]["levels"][0]["sensitivities"] if one["participant"])
+def test_r_finds_a_criterion_that_was_changed(reported_adaptive: Path, tmp_path: Path) -> None:
+    for name in ("report.R", *(path.name for path in reported_adaptive.glob("study-*_data.csv"))):
+        shutil.copy(reported_adaptive / name, tmp_path)
+    (one, *_) = (
+        one for one in numbers(reported_adaptive)["results"]["levels"][0]["sensitivities"] if one["participant"]
+    )
     script = (tmp_path / "report.R").read_text(encoding="utf-8")
     assert repr(one["criterion"]) in script
     (tmp_path / "report.R").write_text(script.replace(f"{one['criterion']!r})", f"{one['criterion'] + 1!r})", 1))

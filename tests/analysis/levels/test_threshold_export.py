@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from study_app.analysis.export.export import export
-from study_app.analysis.report.write_report import report
 from study_app.protocol.trials.methods.updown import UpDown
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.store.blinded.blinding import read_key
@@ -37,15 +36,6 @@ ODD = {"SC": "second", "CS": "first"}
 def exported(opened_adaptive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     to = tmp_path_factory.mktemp("export")
     export(opened_adaptive, to, extras={"sav", "parquet", "psych-ds"})
-    return to
-
-
-@pytest.fixture(scope="module")
-def reported(opened_adaptive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    to = tmp_path_factory.mktemp("report")
-    failed: list[str] = []
-    report(opened_adaptive, to, failed=failed.append)
-    assert failed == []
     return to
 
 
@@ -72,7 +62,7 @@ def tracks_of(folder: Path) -> dict[tuple[str, str], list[tuple[int, float, bool
 
 
 def test_thresholds_have_a_row_per_participant_and_standard_with_the_numbers_of_the_report(
-    exported: Path, reported: Path
+    exported: Path, reported_adaptive: Path
 ) -> None:
     table = rows(exported, "thresholds")
     assert [(row["block"], row["standard"], row["participant"]) for row in table] == [
@@ -80,7 +70,7 @@ def test_thresholds_have_a_row_per_participant_and_standard_with_the_numbers_of_
         *(("quest", "8.0", person) for person in PEOPLE),
     ]
     assert list(table[0])[5:] == list(header(THRESHOLDS))
-    held = json.loads((reported / "report.json").read_text())["results"]["levels"]
+    held = json.loads((reported_adaptive / "report.json").read_text())["results"]["levels"]
     own = [one for block in held for one in block["thresholds"] if one["participant"]]
     sensitive = [one for block in held for one in block["sensitivities"] if one["participant"]]
     for row, one, other in zip(table, own, sensitive, strict=True):
@@ -146,8 +136,10 @@ def test_a_sealed_study_has_no_table_of_thresholds(sealed_levels: Path, tmp_path
     assert not list(tmp_path.glob("*thresholds*"))
 
 
-def test_times_to_answer_by_level_are_medians_of_correct_and_of_other_answers(exported: Path, reported: Path) -> None:
-    held = json.loads((reported / "report.json").read_text())["results"]["levels"]
+def test_times_to_answer_by_level_are_medians_of_correct_and_of_other_answers(
+    exported: Path, reported_adaptive: Path
+) -> None:
+    held = json.loads((reported_adaptive / "report.json").read_text())["results"]["levels"]
     table = [row for row in rows(exported, "tracks") if row["block"] == "staircase"]
     block = next(one for one in held if one["block"] == "staircase")
     assert sum(one["right_n"] + one["wrong_n"] for one in block["level_times"]) == len(table)
@@ -163,8 +155,8 @@ def test_times_to_answer_by_level_are_medians_of_correct_and_of_other_answers(ex
             assert one[f"{name}_s"] == (pytest.approx(np.median(seconds)) if seconds else None)
 
 
-def test_report_shows_fit_drift_reversals_d_prime_and_times(reported: Path) -> None:
-    page = (reported / "report.html").read_text()
+def test_report_shows_fit_drift_reversals_d_prime_and_times(reported_adaptive: Path) -> None:
+    page = (reported_adaptive / "report.html").read_text()
     for words in ("mean of reversals (80.4 %)", "fit (p)", "drift", "Sensitivity and bias</h3>", "d′", "“first”"):
         assert words in page, words
     assert page.count("Time to answer by level</h3>") == 2
