@@ -119,6 +119,7 @@ class MainController(QObject):
         self.lab: LabController | None = None
         self._for_lab: LabLiquids | None = None
         self._for_designer: tuple[Callable[[DesignerController], None], ...] = ()
+        self.window.went.connect(self._forget_wanted)
         self.window.closed.connect(self._leave)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
@@ -262,10 +263,7 @@ class MainController(QObject):
 
     def begin_study(self, source: str = "", name: str = "") -> None:
         """Go to the study designer with what a new study can begin from; with a name begin it at once."""
-        self._go_to_designer(
-            lambda designer: designer.ask_for_new(source),
-            lambda designer: designer.begin(source, name) if name else None,
-        )
+        self._go_to_designer(lambda it: it.ask_for_new(source), lambda it: it.begin(source, name) if name else None)
 
     def _go_to_designer(self, *actions: Callable[[DesignerController], None]) -> None:
         """Go to the study designer and act there once it is made: the window's thread does not wait for its modules."""
@@ -279,6 +277,11 @@ class MainController(QObject):
             actions, self._for_designer = self._for_designer, ()
             for act in actions:
                 act(self.designer)
+
+    def _forget_wanted(self, name: str) -> None:
+        """Forget what waits for a place that is not loaded yet where another place is asked for."""
+        self._for_designer = self._for_designer if name == "designer" else ()
+        self._for_lab = self._for_lab if name == "lab" else None
 
     def _feel(self, liquids: LabLiquids) -> None:
         """Go to the lab with liquids of the study that is edited."""
@@ -310,8 +313,7 @@ class MainController(QObject):
 
     def _prepare_designer(self) -> Iterator[None] | None:
         """Return the step to the designer; None while a thread loads what it needs: a click must not wait for that."""
-        if self._lab_first is None and not self._preparing.busy:
-            self._prepare_lab()
+        self._prepare_lab()
         return None if self._preparing.busy else self._fill_designer()
 
     def _fill_designer(self) -> Iterator[None]:

@@ -92,3 +92,24 @@ def test_nothing_waits_for_a_place_that_cannot_be_loaded_and_a_second_entry_trie
     assert tried == [name, name]
     visit.window.close()
     visit.end()
+
+
+@pytest.mark.slow
+def test_a_study_that_was_asked_for_is_forgotten_where_one_goes_elsewhere_before_the_designer_is_loaded(
+    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(main_controller.Background, "_begin", lambda _self, _job: None)
+    visit = MainController(tmp_path / "results")
+    qtbot.addWidget(visit.window)
+    visit.window.show()
+    visit.open_designer("demo")
+    visit.window.go("home")
+    visit._preparing._wanted = None
+    visit._lab_prepared(prepare_initial_settings())
+    visit.window.go("designer")
+    qtbot.waitUntil(lambda: visit.designer is not None and visit.designer.place.isVisible())
+    qtbot.wait(100)
+    assert visit.designer is not None
+    assert visit.designer.editing.opened is None
+    visit.window.close()
+    visit.end()

@@ -43,10 +43,12 @@ class MainWindow(QMainWindow):
         returns the steps by which it is filled before it is seen; until `prepared` is called, a line stands in its
         place.
 
-    ``closed`` comes when the operator is done, ``theme_changed`` with the `Theme` that was asked for here.
+    ``closed`` comes when the operator is done, ``theme_changed`` with the `Theme` that was asked for here, ``went``
+    with the name of a place that was asked for.
     """
 
     closed = Signal()
+    went = Signal(str)
     theme_changed = Signal(object)
 
     def __init__(
@@ -112,6 +114,7 @@ class MainWindow(QMainWindow):
         A place that was prepared is made and filled in steps, with other events between them: no step takes 50 ms.
         """
         self._asked = name
+        self.went.emit(name)
         if name in self._places or name not in self._prepares:
             self._show(name, self.place(name))
         elif (steps := self._prepares[name]()) is not None:
