@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label
@@ -159,10 +159,7 @@ class ProblemsCard(Card):
             self.lines.append(made)
         column.addStretch()
         apply_theme_within(inside, self.theme)
-        old = self.area.takeWidget()
-        self.area.setWidget(inside)
-        if old is not None:
-            remove_widget(old)  # later: a button of it may have been pressed just now
+        replace_inside(self.area, inside)
 
     @property
     def under_pointer(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtGui import QColor, QPalette
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QScrollArea, QWidget
 
 from study_app.gui.theme.theme import LIGHT, Theme, stylesheet
 
@@ -65,3 +65,11 @@ def remove_widget(part: QWidget) -> None:
     part.hide()
     part.setParent(None)
     part.deleteLater()
+
+
+def replace_inside(area: QScrollArea, inside: QWidget) -> None:
+    """Show other content in ``area``; that before is deleted later, since one of its buttons may just be pressed."""
+    old = area.takeWidget()
+    area.setWidget(inside)
+    if old is not None:
+        remove_widget(old)

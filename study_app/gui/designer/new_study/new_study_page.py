@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from study_app.gui.designer.new_study.cards import TemplateButton
 from study_app.gui.designer.new_study.new_study_questions import Questions
 from study_app.gui.designer.new_study.recovery_bar import RecoveryBar
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label
@@ -255,7 +255,7 @@ class NewStudyPage(Themed, QWidget):
             column.addLayout(grid)
         column.addStretch()
         apply_theme_within(inside, self.theme)
-        self.area.setWidget(inside)
+        replace_inside(self.area, inside)
         self.refuse("")
         first = next((button for button in self.buttons if button.choice.source == chosen), self.buttons[0])
         first.setChecked(True)

@@ -8,7 +8,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
 from study_app.gui.widgets.cards import Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import label
@@ -101,7 +101,7 @@ class ChangeList(Themed, QScrollArea):
                 self.lines.append(made)
         column.addStretch()
         apply_theme_within(inside, self.theme)
-        self.setWidget(inside)
+        replace_inside(self, inside)
         self.verticalScrollBar().setValue(scrolled)
 
 
