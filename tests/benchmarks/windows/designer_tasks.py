@@ -32,11 +32,11 @@ from tests.app.designer.support.users import User, name_of, wait_until
 from tests.end_to_end.real_windows import virtual_display
 
 FAULTS = (
-    ("force_limit_n = 8 ", "force_limit_n = 12 "),
+    ("force_limit_n = 6 ", "force_limit_n = 60 "),
     ('kind = "explore"', 'kind = "explor"'),
-    ('law = "quadratic"', 'law = "quadratc"'),
+    ('kind = "debrief"', 'kind = "debrif"'),
+    ('liquid = "thick"', 'liquid = "thik"'),
     ('task = "explore"', 'task = "explor"'),
-    ('kind = "consent"', 'kind = "consnt"'),
 )
 """What is broken in the demo: each has a repair."""
 LIMIT_S = 900.0
@@ -121,7 +121,7 @@ class Tasks:
         """A file with five faults made valid."""
         user = self.user
         user.choose("Study", "faulty")
-        wait_until(lambda: "problem" in self.header().problems.words, "the problems")
+        wait_until(lambda: self.header().problems.words == f"{len(FAULTS)} problems", "the problems")
         user.shortcut("ctrl+4", name_of(self.header().problems))
         (card,) = user.window.findChildren(ProblemsCard)
         if not card.isVisible():
@@ -229,9 +229,10 @@ def main() -> None:
             (folder / "results").mkdir()
             text = shipped_file("demo").read_text(encoding="utf-8").replace('name = "demo"', 'name = "faulty"')
             for right, wrong in FAULTS:
+                assert right in text, right
                 text = text.replace(right, wrong, 1)
             (folder / "protocols" / "faulty.toml").write_text(text, encoding="utf-8")
-            here = environment(folder) | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
+            here = environment(folder) | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "PYTHONFAULTHANDLER": "1"}
             for act in ACTS:
                 command = [sys.executable, __file__, act, kind, name]
                 with subprocess.Popen(command, env=here, stdout=subprocess.PIPE, text=True) as process:
@@ -242,6 +243,8 @@ def main() -> None:
                             break
                         count, _, task = line.strip().partition("\t")
                         counts.setdefault(task, {})[kind] = count
+                if act != "killed" and process.returncode:
+                    print(f"{act} by {kind}: the program ended with exit code {process.returncode}", file=sys.stderr)
     print("| task | keys | mouse |")
     print("| --- | --- | --- |")
     for task, found in counts.items():
