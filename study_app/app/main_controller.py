@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 from PySide6.QtWidgets import QWidget
 
 from study_app.app.devices_controller import DevicesController
+from study_app.app.preloading import preload_lab_and_designer
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.session.termination import BY_SIGNAL_S, Patience, ended_from_outside
@@ -65,19 +65,6 @@ def home(results: Path | None = None, *, then: Callable[[MainController], None] 
     controller.end()
     application.processEvents()
     return controller.code
-
-
-def _prepare_lab() -> InitialSettings:
-    """Load the modules of lab and designer, and the lab's initial settings."""
-    import study_app.app.lab.controller  # noqa: PLC0415 - loads pyqtgraph here, not in the window's thread
-    import study_app.lab.live  # noqa: PLC0415 - and the compiler
-    from study_app.app.lab.initial_settings import prepare_initial_settings  # noqa: PLC0415
-
-    first = prepare_initial_settings()
-    import study_app.app.designer.controller  # noqa: F401, PLC0415
-
-    gc.freeze()  # the windows' thread need not look through all that was loaded here
-    return first
 
 
 class MainController(QObject):
@@ -308,7 +295,7 @@ class MainController(QObject):
     def _prepare_lab(self) -> Iterator[None] | None:
         """Load the lab in the background, from when home stands; return the steps to it once that is done."""
         if self._lab_first is None and not self._preparing.busy:
-            self._preparing.run(_prepare_lab)
+            self._preparing.run(preload_lab_and_designer)
         return None if self._lab_first is None else self._fill_lab()
 
     def _prepare_designer(self) -> Iterator[None] | None:

@@ -27,7 +27,7 @@ def test_a_place_is_not_made_while_a_thread_loads_what_it_needs(
     visit._prepare_lab()  # as once the window stands
     visit.window.go(name)
     assert (visit.window.here, made) == (name, [])
-    assert wanted == [main_controller._prepare_lab]
+    assert wanted == [main_controller.preload_lab_and_designer]
     visit.window.go("home")
     visit.window.close()
     visit.end()
@@ -48,7 +48,7 @@ def test_a_study_that_was_asked_for_opens_once_the_designer_is_loaded(
     else:
         visit.begin_study()
     assert (visit.window.here, visit.designer) == ("designer", None)
-    assert wanted == [main_controller._prepare_lab], "loading begins at once"
+    assert wanted == [main_controller.preload_lab_and_designer], "loading begins at once"
     visit._preparing._wanted = None
     visit._lab_prepared(prepare_initial_settings())
     qtbot.waitUntil(lambda: visit.designer is not None and visit.designer.place.isVisible())
@@ -76,7 +76,7 @@ def test_nothing_waits_for_a_place_that_cannot_be_loaded_and_a_second_entry_trie
         tried.append(name)
         raise RuntimeError("a module is missing")
 
-    monkeypatch.setattr(main_controller, "_prepare_lab", fail)
+    monkeypatch.setattr(main_controller, "preload_lab_and_designer", fail)
     visit = MainController(tmp_path / "results")
     qtbot.addWidget(visit.window)
     visit.window.show()
