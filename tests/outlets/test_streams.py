@@ -145,6 +145,7 @@ def test_a_recorder_gets_markers_with_the_times_of_their_events() -> None:
 
 
 @slow
+@pytest.mark.nightly
 def test_a_recorder_that_is_killed_loses_nothing_of_the_next() -> None:
     thread = SinkThread(open_sink("lsl", time.monotonic_ns))
     servo = Servo()
