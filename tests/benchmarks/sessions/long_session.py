@@ -1,6 +1,6 @@
 """How fast trials follow each other in a long session: a rehearsal of 5,000 trials, the last 500 against the first 500.
 
-``python tests/benchmarks/sessions/long_session.py [TRIALS]``
+``python tests/benchmarks/sessions/long_session.py [TRIALS]``, at least 200
 """
 
 from __future__ import annotations
