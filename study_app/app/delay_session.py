@@ -181,7 +181,8 @@ class _Showing:
                 plan = self._protocol, schedule, FIRST
                 rate_hz = self._refresh_hz or screens[0].refreshRate()
                 bridge = connect_windows(self._chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz)
-                show_windows(bridge, *screens)
+                for _ in show_windows(bridge, *screens):
+                    pass
                 self._size(bridge)
                 self._run(bridge)
                 paced = bridge.paced

@@ -198,7 +198,7 @@ class LiveSession(QObject):
     def _step(self) -> None:
         """Take the next step, unless the session was closed meanwhile."""
         if not self._closed and self._steps is not None and next(self._steps, self) is None:
-            QTimer.singleShot(0, self, lambda: self._go_on(self._step))
+            QTimer.singleShot(1, self, lambda: self._go_on(self._step))  # 0 ms: perhaps in this round of events
 
     def _go_on(self, step: Callable[[], None]) -> None:
         """Take a step toward the first page; whatever it meets ends in order."""
@@ -267,7 +267,7 @@ class LiveSession(QObject):
         self.bridge.done.connect(self._finished)
         self.bridge.diagnose_asked.connect(self.diagnose)
         yield
-        session_windows.show_windows(self.bridge, shown_on, operated_on, played=chosen.played)
+        yield from session_windows.show_windows(self.bridge, shown_on, operated_on, played=chosen.played)
         self._close_note()
         self._close_preflight()
         yield

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from study_app.app.session.bridge import SessionBridge
@@ -142,11 +142,14 @@ def connect_windows(
     return SessionBridge(parts, participant, operator, refresh_hz=refresh_hz or 60.0, strip=strip)
 
 
-def show_windows(bridge: SessionBridge, shown_on: QScreen, operated_on: QScreen, *, played: bool = False) -> None:
-    """Show both windows on their screens; of a session that is played the participant's alone."""
+def show_windows(
+    bridge: SessionBridge, shown_on: QScreen, operated_on: QScreen, *, played: bool = False
+) -> Iterator[None]:
+    """Show both windows on their screens, one after the other; of a session that is played the participant's alone."""
     if not played:
         place(bridge.operator, operated_on, corner=shown_on is operated_on)
         bridge.operator.show()
+        yield
     bridge.participant.open_on(shown_on)
 
 

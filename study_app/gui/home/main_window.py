@@ -131,7 +131,7 @@ class MainWindow(QMainWindow):
         elif next(steps, self) is self:
             self.prepared(name)
             return
-        QTimer.singleShot(0, self, lambda: self._fill(name, steps))
+        QTimer.singleShot(1, self, lambda: self._fill(name, steps))  # 0 ms: perhaps in this round of events
 
     def _show(self, name: str, asked: Place) -> None:
         if self.stack.currentWidget() is asked and name == self._here and asked.isVisible():
