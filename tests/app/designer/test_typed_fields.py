@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QMimeData
+from PySide6.QtCore import QEvent, QMimeData, Qt
+from PySide6.QtGui import QFocusEvent
+from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.form.typed_fields import HAND_ON_MS, TypedSentence, TypedText
 
@@ -46,3 +48,12 @@ def test_a_pasted_text_keeps_its_spaces_but_no_line_break(qtbot: Any, pasted: st
     data.setText(pasted)
     field.insertFromMimeData(data)
     assert field.words() == whole
+
+
+@pytest.mark.parametrize(("reason", "marked"), [("TabFocusReason", "New question"), ("MouseFocusReason", "")])
+def test_tab_marks_a_sentence_so_that_what_is_typed_replaces_it(qtbot: Any, reason: str, marked: str) -> None:
+    field = TypedSentence("Text")
+    qtbot.addWidget(field)
+    field.show_text("New question")
+    QApplication.sendEvent(field, QFocusEvent(QEvent.Type.FocusIn, Qt.FocusReason[reason]))
+    assert field.textCursor().selectedText() == marked

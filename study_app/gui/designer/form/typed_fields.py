@@ -237,6 +237,12 @@ class TypedSentence(TypedText):
         """Return the room for the lines."""
         return QSize(120, self.height())
 
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Mark the sentence where Tab leads to it, as in a field of one line."""
+        super().focusInEvent(event)
+        if event.reason() in {Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason}:
+            self.selectAll()
+
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
         """Accept at Enter."""
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
