@@ -8,6 +8,8 @@ import pytest
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.viewmodels.designer.requests import AddEntry, ChangeLanguage, DuplicateElement, SetValue
+
 pytestmark = pytest.mark.slow
 
 BLOCK = ("blocks", "liquids")
@@ -62,3 +64,37 @@ def test_tab_goes_from_the_rows_seen_at_first_to_those_made_later(qtbot: Any, de
         assert form.inside.isAncestorOf(keyboard), keyboard
         met += [row for row in rows if row.isAncestorOf(keyboard) and row is not met[-1]]
     assert met == rows
+
+
+def test_the_help_is_of_the_row_that_has_the_keyboard_after_its_step_made_the_form_anew(
+    designer: Any,
+) -> None:
+    designer.controller.begin("template:empty", "helped")
+    designer.select(("blocks", "liquids"))
+    field = designer.row("blocks", "liquids", "order").field
+    rows = [row.key for row in designer.place.form.rows]
+    field.take_keyboard()
+    field._choose("williams")
+    assert [row.key for row in designer.place.form.rows] != rows, "the form was made anew"
+    assert designer.place.form._focused.row.row.label == "Order"
+    assert designer.place.form.foot.title.text() == "Order"
+
+
+def test_every_field_that_lacks_a_text_has_the_edge_of_a_fault(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(ChangeLanguage("add", "nl"))
+    designer.select(("pages", "welcome"))
+    for key in ("title", "body"):
+        texts = designer.row("pages", "welcome", key).field.lines
+        assert [bool(part.property("state")) for part in texts.values()] == [False, True]
+
+
+def test_the_delay_of_a_condition_is_shown_whole(designer: Any) -> None:
+    designer.controller.begin("template:empty", "late")
+    designer.editing.ask(DuplicateElement(("conditions", "water")))
+    designer.editing.ask(SetValue(("conditions", "water_2", "delay_ms"), 240))
+    designer.editing.ask(AddEntry((*BLOCK, "conditions"), "water_2"))
+    designer.select(BLOCK)
+    rows = designer.row(*BLOCK, "conditions").field.rows
+    assert [row.note.whole for row in rows] == ["0 ms late", "Water, 240 ms late"]
+    assert [row.note.text() for row in rows] == [row.note.whole for row in rows]

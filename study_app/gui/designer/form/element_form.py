@@ -366,7 +366,7 @@ class FormCard(Card):
             row.show_repairs(self._known)
 
     def _come(self, row: RowWidget) -> None:
-        self._focused = row
+        self._focused = row if row in self._made else self._focused  # its own step may just have replaced it
         row.say()
         self.show_help()
 

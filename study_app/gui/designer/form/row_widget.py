@@ -14,7 +14,7 @@ from study_app.gui.designer.form.languages_field import LanguagesField, stacked
 from study_app.gui.designer.form.list_fields import field, structure
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.designer.form.special_editor import SpecialEditor
-from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedSentence, TypedText
+from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
@@ -141,9 +141,10 @@ class RowWidget(Themed, QWidget):
         self.field.setAccessibleDescription(". ".join(filter(None, (row.help, self.row.bounds, *found))))
         some_missing = isinstance(self.field, LanguagesField) and self.field.some_missing
         for part in self.field.findChildren(QWidget):
-            if isinstance(part, TypedLine | TypedText):
-                part.setAccessibleDescription(self.field.accessibleDescription())
-            if isinstance(part, TypedLine | TypedSentence) and not self.field.refusal:
+            if not isinstance(part, TypedLine | TypedText):
+                continue
+            part.setAccessibleDescription(self.field.accessibleDescription())
+            if not self.field.refusal:
                 blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
                 part.show_refused(bool(self.row.faults) and blamed)
 

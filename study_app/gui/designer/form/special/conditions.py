@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
+from PySide6.QtCore import Qt
+
 from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.list_fields import EntriesField
 from study_app.gui.designer.form.special_editor import SpecialEditor
@@ -22,7 +24,9 @@ class ConditionRow(EntryRow):
         super().__init__(replace(entry, note=""), words, grip=grip)
         self.note, self.force = Elided("small", "text2"), figures()
         self.force.setMinimumWidth(FORCE_PX)
-        self.row.addWidget(self.note, 1)
+        self.force.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.note.setAlignment(self.force.alignment())
+        self.row.addWidget(self.note)  # whole: the title gives way
         self.row.addWidget(self.force)
         self.liquid = self.button("drop", f"Open the liquid of {entry.title}")
 
