@@ -71,7 +71,7 @@ class ChosenCard(Card):
         self.questions = Questions()
         self.title = label("", "card")
         self.refusal = label("", "label", "bad", wraps=True)
-        self.make = ActionButton("plus", "Make study", role="primary", height=44)
+        self.make = ActionButton("plus", "Make study", cap="Enter", role="primary", height=44)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)

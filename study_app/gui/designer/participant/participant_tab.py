@@ -101,6 +101,7 @@ class ParticipantTab(Card):
         self.setAccessibleName(view.name)
         self.languages.setVisible(len(view.languages) > 1)
         self.languages.show_values([(code, code.upper()) for code in view.languages], view.language)
+        noted = not self.note.isHidden()
         self.note.setText(view.note)
         self.note.setVisible(bool(view.note))
         self.step.setText(view.step)
@@ -113,6 +114,8 @@ class ParticipantTab(Card):
         else:
             self._row.insertWidget(3, self.moments)
         self.page.show_view(view)
+        if noted != bool(view.note):
+            self.resized.emit()
 
     def show_tank(self, view: TankView) -> None:
         """Draw the ball in the tank."""

@@ -59,8 +59,8 @@ def session_card(study: Study, facts: Facts, path: Path, parts: int | None = Non
     least, most = (round(one / 60) for one in facts.range_s)
     figures = (
         (f"{facts.expected_s / 60:.0f}", "min"),
-        (str(facts.answers), "answers"),
-        (str(facts.trials), "trials"),
+        (str(facts.answers), _word(facts.answers, "answer")),
+        (str(facts.trials), _word(facts.trials, "trial")),
     )
     whole = max(1e-9, sum(facts.steps_s.values()))
     chosen = str(path[1]) if len(path) > 1 else ""
@@ -82,11 +82,15 @@ def questions_card(protocol: Protocol, name: str, parts: int | None) -> SessionC
     count = len(questionnaire.items)
     blocks = [block for block in protocol.blocks_in_order if block.questionnaire == name]
     times = sum(order_of(protocol, block).trials for block in blocks) + (name in protocol.forms)
-    figures = ((minutes(answering_s(questionnaire)), "min"), (str(count), "answers"))
-    asked: Verdict = ("neutral", "info", f"{count * times} answers per session, asked {times} times")
+    figures = ((minutes(answering_s(questionnaire)), "min"), (str(count), _word(count, "answer")))
+    asked: Verdict = ("neutral", "info", f"{count * times} answers per session, asked {times} {_word(times, 'time')}")
     if not times:
         asked = ("warn", "warning", "It is never asked")
     return SessionCard("Each time it is asked", figures, verdicts=(*_fit(parts), asked))
+
+
+def _word(count: int | None, word: str) -> str:
+    return word if count == 1 else f"{word}s"
 
 
 def _fit(parts: int | None) -> tuple[Verdict, ...]:
@@ -105,8 +109,8 @@ def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> 
     duration_s = facts.steps_s.get(block.id)
     figures = (
         (UNKNOWN if duration_s is None else f"{duration_s / 60:.0f}", "min"),
-        (str(order.trials), "trials"),
-        (str(order.trials * answers), "answers"),
+        (str(order.trials), _word(order.trials, "trial")),
+        (str(order.trials * answers), _word(order.trials * answers, "answer")),
     )
     aside = f"{order.breaks} break{'s' * (order.breaks != 1)}" if order.breaks else ""
     return SessionCard(_title(study, block.id), figures, aside)

@@ -10,6 +10,8 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of
 from study_app.authoring.outline import title_of
 from study_app.authoring.versions.changes import Change, Effect
+from study_app.protocol.source.document import entries
+from study_app.protocol.wording.languages import language_name
 from study_app.viewmodels.designer.problem_rows import element_of
 from study_app.viewmodels.tones import Tone
 
@@ -64,7 +66,11 @@ def change_groups(found: Iterable[Change], study: Study) -> tuple[ChangeGroup, .
 def _row(change: Change, study: Study) -> ChangeRow:
     place = change.path or tuple(change.sentence.partition(":")[0].split("."))
     element = element_of(study, place)
-    fields = [label_of(step) if isinstance(step, str) else str(step + 1) for step in place[len(element) :]]
+    languages = {code for _, code in entries(study.document, "study.languages.*")}
+    fields = [
+        language_name(step) if step in languages and isinstance(step, str) else label_of(step)
+        for step in place[len(element) :]
+    ]
     gone = element == place[:1] and len(place) > 1 and place[:1] != ("study",) and isinstance(place[1], str)
     name = label_of(place[0]) if gone else title_of(study.document, element)
     there = bool(change.path) and place[0] in study.document
