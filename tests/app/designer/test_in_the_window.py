@@ -301,6 +301,7 @@ for letters in range(1, 100000):
 
 
 @pytest.mark.nightly
+@pytest.mark.timeout(180 + 30 * KILLS)
 @pytest.mark.skipif(os.name != "posix", reason="SIGKILL")
 def test_a_kill_while_typing_loses_at_most_the_last_second(designer: Any, tmp_path: Path) -> None:
     before = designer.file.read_bytes()

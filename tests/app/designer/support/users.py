@@ -62,7 +62,7 @@ class User:
     def part(self, name: str, *kinds: type[QWidget]) -> QWidget:
         """Return the part of a name; wait for it. One of the form comes before others."""
         what = f"a part called {name!r}"
-        wait_until(lambda: self.parts(name, *kinds), what, 5000)
+        wait_until(lambda: self.parts(name, *kinds), what)  # the designer may still be loading
         (form,) = self.window.findChildren(FormCard) or (None,)
         return min(self.parts(name, *kinds), key=lambda part: form is None or not form.isAncestorOf(part))
 
