@@ -42,6 +42,7 @@ class ParticipantTab(Card):
         super().__init__(padding=12, gap=10)
         self.view = ParticipantView()
         self._screens_shown: tuple[ScreenSize, ...] = ()
+        self._high = 0
         self.page = LivePage()
         self.setFocusProxy(self.page)
         self.note = label("", "small", "warn", wraps=True)
@@ -101,7 +102,6 @@ class ParticipantTab(Card):
         self.setAccessibleName(view.name)
         self.languages.setVisible(len(view.languages) > 1)
         self.languages.show_values([(code, code.upper()) for code in view.languages], view.language)
-        noted = not self.note.isHidden()
         self.note.setText(view.note)
         self.note.setVisible(bool(view.note))
         self.step.setText(view.step)
@@ -114,7 +114,8 @@ class ParticipantTab(Card):
         else:
             self._row.insertWidget(3, self.moments)
         self.page.show_view(view)
-        if noted != bool(view.note):
+        if (high := self.column.minimumSize().height()) != self._high:  # another note, or another row of pages
+            self._high = high
             self.resized.emit()
 
     def show_tank(self, view: TankView) -> None:

@@ -165,6 +165,20 @@ def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live:
     assert isinstance(live.page_window.page, TextPage)
 
 
+def test_the_tab_is_as_high_as_the_page_its_note_and_its_rows_of_buttons(designer: Any, live: Any) -> None:
+    pane, tab = designer.place.pane, designer.controller.preview.tab
+    designer.editing.ask(SetValue(("device", "force_limit_n"), -1.0))
+    assert tab.note.isVisible()
+    assert pane._stack.maximumHeight() == tab.most_px
+    designer.editing.undo()
+    assert not tab.note.isVisible()
+    assert pane._stack.maximumHeight() == tab.most_px
+    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.select(("blocks", "viscosity"))
+    assert len(tab.view.moments) > 2
+    assert pane._stack.maximumHeight() == tab.most_px
+
+
 @pytest.mark.parametrize("screen", [0, 1])
 @pytest.mark.parametrize("path", [ITEM, ("pages", "welcome"), ("questionnaires", "delay"), ("liquids", "thick")])
 def test_at_100_percent_the_page_is_that_of_a_session_pixel_by_pixel(
