@@ -146,3 +146,17 @@ def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
     assert another.editing.opened.study.text == text
     assert another.editing.selected == ("device",)
     another.place.deleteLater()
+
+
+def test_enter_begins_a_study_at_a_language_too(qtbot: Any, designer: Any) -> None:
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    begun: list[str] = []
+    page.begin_asked.connect(lambda _source, name, _answers: begun.append(name))
+    qtbot.keyClicks(page.card.questions.title, "Two drinks")
+    dutch = page.card.questions.languages["nl"]
+    dutch.setFocus()
+    qtbot.keyClick(dutch, Qt.Key.Key_Space)
+    qtbot.keyClick(dutch, Qt.Key.Key_Return)
+    assert begun == ["twodrinks"]
+    assert designer.editing.opened.study.document["study"]["languages"] == ("en", "nl")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QFileDialog,
@@ -21,7 +21,7 @@ from study_app.gui.designer.new_study.new_study_questions import Questions
 from study_app.gui.designer.new_study.recovery_bar import RecoveryBar
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
-from study_app.gui.widgets.controls import ActionButton, IconButton
+from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.viewmodels.designer.designer_view import StudyChoice
 from study_app.viewmodels.designer.new_study import TemplateChoice
@@ -284,6 +284,13 @@ class NewStudyPage(Themed, QWidget):
             self.refuse(f"{answers}.")
         elif chosen is not None:
             self.begin_asked.emit(chosen.source, self.card.questions.short_name(), answers)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Begin at Enter on a language, as in the fields."""
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and isinstance(self.focusWidget(), Check):
+            self._begin()
+        else:
+            super().keyPressEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Make room: fewer cards side by side in a narrow window."""
