@@ -26,7 +26,7 @@ from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = StudyFolder(ROOT / "results" / "sample-rek2024")

@@ -18,10 +18,10 @@ from study_app.analysis.tables.study_tables import load_study
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.source.files import shipped_file
-from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.blinding import reveal
 from study_app.store.output_files import FileCopy, write_files
 from study_app.store.verification.psychds import validate
+from tests.studies import rehearsed
 
 pytestmark = pytest.mark.slow
 
@@ -48,9 +48,15 @@ def kitchen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     text = text.replace(head, '[conditions.thick]\nliquid = "thin"\nview = "waves.mp4"', 1)
     file.write_text(text, encoding="utf-8")
     file.with_name("waves.mp4").write_bytes(FOOTAGE)
-    folder = rehearse_answers("kitchen", participants=4, seed=1, results=tmp_path / "results" / "kitchen")
+    folder = rehearsed(tmp_path / "results", "kitchen", people=4)
     reveal(folder, by="AK", reason="to share it")
     return folder
+
+
+@pytest.fixture
+def without_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Export without the report, which takes most of the time."""
+    monkeypatch.setattr("study_app.analysis.report.write_report.asks", lambda _study: False)
 
 
 def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path, tmp_path: Path) -> None:
@@ -82,6 +88,7 @@ def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path,
         assert b"every number that R computes is the report's" in ran.stdout
 
 
+@pytest.mark.usefixtures("without_report")
 def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -> None:
     digest = hashlib.sha256(FOOTAGE).hexdigest()
     footage = tmp_path / "protocols" / "waves.mp4"
@@ -134,6 +141,7 @@ def test_footage_that_changes_while_it_is_copied_leaves_nothing(tmp_path: Path) 
     assert (to / "materials" / "waves.mp4").read_bytes() == FOOTAGE
 
 
+@pytest.mark.usefixtures("without_report")
 def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path, tmp_path: Path) -> None:
     (tmp_path / "protocols" / "gone.toml").symlink_to(tmp_path / "nowhere.toml")  # another study, not there any more
     export(kitchen, tmp_path / "out", extras=["psych-ds"])

@@ -27,7 +27,7 @@ from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.protocol.forms.mixed import mixed_file
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 PEOPLE = 6
 
@@ -163,8 +163,11 @@ def test_results_window_is_told_of_every_figure(folder: Path) -> None:
     assert not any("comment" in name for name in drawn)  # texts are not drawn
 
 
-def test_export_holds_all_answers_wide_and_described(folder: Path, tmp_path: Path) -> None:
-    export(folder, tmp_path, extras={"wide", "sav", "psych-ds"})
+@pytest.mark.parametrize(
+    "extras", [("wide", "sav"), pytest.param(("psych-ds", "sav", "wide"), marks=pytest.mark.nightly)]
+)
+def test_export_holds_all_answers_wide_and_described(folder: Path, tmp_path: Path, extras: tuple[str, ...]) -> None:
+    export(folder, tmp_path, extras=extras)
     rows = table(next(tmp_path.glob("*wide_data.csv")))
     assert len(rows) == PEOPLE
     first = rows[0]

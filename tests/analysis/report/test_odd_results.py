@@ -8,13 +8,16 @@ from pathlib import Path
 
 import pytest
 
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.write_report import report
+from study_app.analysis.tables.study_tables import load_study
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse, source_bytes
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, make_results, twelve
 from tests.analysis.report.read_report import numbers, read, rows, run_in_r
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 
 def test_of_five_it_says_what_cannot_be_shown_and_what_a_delay_can_mean(rek: Results, tmp_path: Path) -> None:
@@ -63,8 +66,8 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     )
     results = twelve(make_results(tmp_path / "some", parse(text.encode(), "rek2024.toml")), people=5)
     results.open()
-    report(results.folder, tmp_path / "report")
-    told = (tmp_path / "report" / "methods.txt").read_text(encoding="utf-8")
+    study = load_study(results.folder)
+    told = methods(study, evaluate(study))
     both = "p adjusted over 1 statement by Holm (primary) and over {} statements by Benjamini-Hochberg (exploratory)"
     assert both.format("eight") in told
     assert both.format("four") in told

@@ -19,7 +19,7 @@ from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve
 from tests.analysis.report.read_report import answered_by_two, numbers, read, rows
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 
 def test_a_study_of_twelve_tells_what_was_found(of_twelve: Path) -> None:
