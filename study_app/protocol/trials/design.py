@@ -199,6 +199,29 @@ class Design(Table):
         return when == "always" or (when == "practice" and practice)
 
 
+class JudgementDesign(Design):
+    """One interval that is judged on a scale, by a number or by a setting; no answer is correct."""
+
+    has_standard: ClassVar[bool] = False
+    has_correct_answer: ClassVar[bool] = False
+    adaptive: ClassVar[bool] = False
+
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """None: the reply is no choice."""
+        return ()
+
+    @property
+    def arrangements(self) -> tuple[Arrangement, ...]:
+        """The comparison alone."""
+        return ((True,),)
+
+    @property
+    def guess_rate(self) -> None:
+        """No answer is correct."""
+        return
+
+
 def to_arrangements(answers: Counted, arrangements: Collection[int], given: str) -> tuple[int, int]:
     """Return how often ``given`` was answered to some arrangements, and how many answers they had."""
     held = {pair: count for pair, count in answers.items() if pair[0] in arrangements}

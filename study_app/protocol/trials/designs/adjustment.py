@@ -6,10 +6,10 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from study_app.protocol.trials.design import Arrangement, Design, Reply
+from study_app.protocol.trials.design import Arrangement, JudgementDesign, Reply
 
 
-class Adjusted(Design):
+class Adjusted(JudgementDesign):
     """The standard, then an interval that the participant adjusts to it (Gescheider 1997, Psychophysics, ch. 3)."""
 
     kind: Literal["adjustment"] = "adjustment"
@@ -17,9 +17,6 @@ class Adjusted(Design):
         default=True, description="Whether an interval presents the standard before the one that is adjusted."
     )
     reply: ClassVar[Reply] = "setting"
-    has_standard: ClassVar[bool] = False
-    has_correct_answer: ClassVar[bool] = False
-    adaptive: ClassVar[bool] = False
 
     @property
     def paper_name(self) -> str:
@@ -32,16 +29,6 @@ class Adjusted(Design):
         return self.kind if self.standard else "adjustment_alone"
 
     @property
-    def answers(self) -> tuple[str, ...]:
-        """None: the reply is a setting."""
-        return ()
-
-    @property
     def arrangements(self) -> tuple[Arrangement, ...]:
         """The standard and the interval that is adjusted, or the latter alone."""
         return ((False, True),) if self.standard else ((True,),)
-
-    @property
-    def guess_rate(self) -> None:
-        """No answer is correct."""
-        return

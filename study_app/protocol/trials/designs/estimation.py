@@ -6,18 +6,15 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from study_app.protocol.trials.design import Arrangement, Design, Modulus, Reply
+from study_app.protocol.trials.design import JudgementDesign, Modulus, Reply
 
 
-class Estimation(Design):
+class Estimation(JudgementDesign):
     """How strong was it, as a number? (Stevens 1957, Psychological Review 64, 153)."""
 
     kind: Literal["estimation"] = "estimation"
     modulus: Modulus | None = Field(default=None, description="The first trial's level and number; default: free.")
     reply: ClassVar[Reply] = "number"
-    has_standard: ClassVar[bool] = False
-    has_correct_answer: ClassVar[bool] = False
-    adaptive: ClassVar[bool] = False
 
     @property
     def first(self) -> Modulus | None:
@@ -28,18 +25,3 @@ class Estimation(Design):
     def paper_name(self) -> str:
         """What a paper calls it."""
         return "magnitude estimation"
-
-    @property
-    def answers(self) -> tuple[str, ...]:
-        """None: the reply is a number."""
-        return ()
-
-    @property
-    def arrangements(self) -> tuple[Arrangement, ...]:
-        """The comparison alone."""
-        return ((True,),)
-
-    @property
-    def guess_rate(self) -> None:
-        """No answer is correct."""
-        return
