@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+from typing import Any, ClassVar, Literal, TypeAlias
 
 from PySide6.QtCore import QEvent, QPoint, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QEnterEvent, QFontMetricsF, QInputDevice, QMouseEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractButton, QCheckBox, QRadioButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QCheckBox, QRadioButton, QSizePolicy, QWidget
 
 from study_app.gui.participant.forms.question_field import target_px
+from study_app.gui.participant.pages.key_caps import Button
 from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
@@ -19,11 +20,6 @@ ROOM = 14.0  # between edge and words
 NO_WORDS = "–"
 Look: TypeAlias = Literal["words", "point", "off scale"]
 """Words that can be chosen, a point of a scale, or an answer off it, with an edge of dashes."""
-
-if TYPE_CHECKING:
-    Button = QAbstractButton
-else:
-    Button = object  # Qt permits one class of its own in a class
 
 
 class OptionLook(Button):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QAbstractButton, QPushButton, QSizePolicy, QWidget
 
 from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
@@ -13,6 +15,11 @@ CENTRE = int(Qt.AlignmentFlag.AlignCenter)
 ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right)
 RING = 4.0  # room around a button for its focus ring [logical px]
 KEYBOARD = (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason, Qt.FocusReason.ShortcutFocusReason)
+
+if TYPE_CHECKING:
+    Button = QAbstractButton
+else:
+    Button = object  # Qt permits one class of its own in a class
 
 
 def key_size(text: str, scale: float = 1.0) -> tuple[float, float]:
@@ -73,14 +80,34 @@ class KeyCap(QWidget):
         painter.end()
 
 
-class GoButton(QPushButton):
+class LitButton(Button):
+    """A button that lights up under the pointer, and has a ring where the keyboard led to it."""
+
+    ringed = False
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
+        """Show the ring where the keyboard led here; a page that begins here has its key cap to say so."""
+        self.ringed = event.reason() in KEYBOARD
+        super().focusInEvent(event)
+
+    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
+        """Light up under the pointer."""
+        super().enterEvent(event)
+        self.update()
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Be as before."""
+        super().leaveEvent(event)
+        self.update()
+
+
+class GoButton(LitButton, QPushButton):
     """The filled button of a participant's page, with the key that presses it; never disabled."""
 
     def __init__(self, text: str, key: str, parent: QWidget | None = None) -> None:
         super().__init__(text, parent)
         self._key = key
         self._scale = 1.0
-        self.ringed = False
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setAutoDefault(False)
@@ -133,18 +160,3 @@ class GoButton(QPushButton):
             event.ignore()
         else:
             super().keyPressEvent(event)
-
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Show the ring where the keyboard led here; a page that begins here has its key cap to say so."""
-        self.ringed = event.reason() in KEYBOARD
-        super().focusInEvent(event)
-
-    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
-        """Light up under the pointer."""
-        super().enterEvent(event)
-        self.update()
-
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
-        """Be as before."""
-        super().leaveEvent(event)
-        self.update()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QFontMetricsF, QKeyEvent, QPaintEvent, QPen
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPaintEvent, QPen
 from PySide6.QtWidgets import QGroupBox, QRadioButton, QWidget
 
-from study_app.gui.participant.pages.key_caps import KEYBOARD
+from study_app.gui.participant.pages.key_caps import LitButton
 from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
@@ -17,14 +17,13 @@ LEAST_HEIGHT = 44
 RING = 4
 
 
-class LanguageButton(QRadioButton):
+class LanguageButton(LitButton, QRadioButton):
     """One language: an outline, and a check mark where it is the page's. Enter and Space choose it."""
 
     def __init__(self, language: str, parent: QWidget) -> None:
         super().__init__(words(language).name, parent)
         self.language = language
         self._scale = 1.0
-        self._ringed = False
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setLayoutDirection(
             Qt.LayoutDirection.RightToLeft if words(language).right_to_left else Qt.LayoutDirection.LeftToRight
@@ -53,21 +52,6 @@ class LanguageButton(QRadioButton):
         else:
             super().keyPressEvent(event)
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
-        """Show the ring where the keyboard led here."""
-        self._ringed = event.reason() in KEYBOARD
-        super().focusInEvent(event)
-
-    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
-        """Light up under the pointer."""
-        super().enterEvent(event)
-        self.update()
-
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
-        """Be as before."""
-        super().leaveEvent(event)
-        self.update()
-
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
         """Draw outline, check mark and name."""
         painter = page_painter(self)
@@ -76,7 +60,7 @@ class LanguageButton(QRadioButton):
         painter.setPen(QPen(QColor(theme.text if self.isChecked() else theme.ctl), 1))
         painter.setBrush(QColor(theme.hover if self.underMouse() else theme.surface))
         painter.drawRoundedRect(body, radius, radius)
-        if self.hasFocus() and self._ringed:
+        if self.hasFocus() and self.ringed:
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(theme.accent), 2))
             painter.drawRoundedRect(body.adjusted(-3, -3, 3, 3), radius + 3, radius + 3)
