@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import font
@@ -79,6 +79,19 @@ class NumberPart(Card):
         self.icon.show_icon(icon or "info", INKS[tone])
         self.note.show_text(words)
         self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {words}")
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Write the number smaller where it would be cut."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        margins = self.column.contentsMargins()
+        room = self.width() - margins.left() - margins.right() - self.unit.sizeHint().width() - 6
+        self.number.setFont(font("number", tabular=True))
+        if self.number.sizeHint().width() > room:
+            self.number.setFont(font("card", tabular=True))
 
 
 class Strip(Themed, QWidget):

@@ -24,10 +24,11 @@ from study_app.authoring.measures.observers import Asked, Measurable, Observed
 from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
+from study_app.gui.designer.measures.parts import NumberPart
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.measures.number_cards import ANEW, UNKNOWN
+from study_app.viewmodels.designer.measures.number_cards import ANEW, UNKNOWN, NumberCard
 
 pytestmark = pytest.mark.slow
 QUANTILES = (0.1, 0.15, 0.2, 0.25, 0.3)
@@ -283,3 +284,16 @@ def test_the_worker_process_simulates_observers_and_studies() -> None:
     assert observed.threshold == 0.2
     assert 0.0 <= group.share <= 1.0
     assert group.more_trials > group.trials == 20
+
+
+@pytest.mark.parametrize(("number", "size_px"), [("5.1 – 60", 26), ("4.8 – 240", 16)])
+def test_a_number_is_never_cut(qtbot: Any, number: str, size_px: int) -> None:
+    part = NumberPart()
+    qtbot.addWidget(part)
+    part.resize(154, 90)
+    part.show_card(NumberCard("JNDs it can measure", number, "%"))
+    part.show()
+    assert part.number.width() >= part.number.sizeHint().width()
+    assert part.number.font().pixelSize() == size_px
+    part.resize(300, 90)
+    assert part.number.font().pixelSize() == 26
