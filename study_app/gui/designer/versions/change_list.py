@@ -15,7 +15,7 @@ from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.versions.change_rows import ChangeGroup, ChangeRow
 
 INDENT = 28
-LEAST, HIGHEST = 72, 330
+LEAST, HIGHEST = 96, 330
 
 
 class ChangeLine(QWidget):
