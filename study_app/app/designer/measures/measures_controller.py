@@ -121,6 +121,7 @@ class MeasuresController(QObject):
     def _forget(self) -> None:
         self._participants, self._lapses = None, LAPSES
         self._thresholds, self._last, self._repairs = {}, {}, {}
+        self._idle.start()
 
     def _controls(self, focus: Focus) -> Controls:
         opened = self._editing.opened

@@ -28,7 +28,7 @@ from study_app.gui.designer.measures.parts import NumberPart
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.measures.number_cards import ANEW, UNKNOWN, NumberCard
+from study_app.viewmodels.designer.measures.number_cards import ANEW, UNKNOWN, NumberCard, TextsCard
 
 pytestmark = pytest.mark.slow
 QUANTILES = (0.1, 0.15, 0.2, 0.25, 0.3)
@@ -297,3 +297,15 @@ def test_a_number_is_never_cut(qtbot: Any, number: str, size_px: int) -> None:
     assert part.number.font().pixelSize() == size_px
     part.resize(300, 90)
     assert part.number.font().pixelSize() == 26
+
+
+def test_measures_are_those_of_the_study_that_is_opened(qtbot: Any, designer: Any) -> None:
+    def languages() -> list[str]:
+        cards = () if designer.place.measures.shown is None else designer.place.measures.shown.cards
+        return [line.title for card in cards if isinstance(card, TextsCard) for line in card.languages]
+
+    designer.controller.open("kitchen")
+    designer.place.show_tab("measures")
+    for study, shown in (("rek2024", ["English", "Dutch"]), ("demo", ["English"])):
+        designer.controller.open(study)
+        qtbot.waitUntil(lambda shown=shown: languages() == shown)
