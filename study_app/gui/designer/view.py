@@ -174,6 +174,7 @@ class DesignerPlace(Place):
         elsewhere = before.form is None or before.form.path != view.form.path
         if elsewhere:
             self.close_prompt()
+        self.parts.path.show_form(view.form)  # before the form: Tab goes on from what was made first
         self.form.show_form(view.form, read_only=view.header.read_only)
         self.file.show_file(view.file, scroll=elsewhere, read_only=view.header.read_only)
         self._repairs = {row: words for row, words in self._repairs.items() if row in view.problems}
@@ -184,7 +185,6 @@ class DesignerPlace(Place):
         if not view.problems and before.problems and not self.problems.under_pointer:
             self.problems.hide()
         self.outline.tree.rows.movable = not view.header.read_only
-        self.parts.path.show_form(view.form)
         if self.outline.rows:
             self.outline.mark(view.form.path)
 

@@ -66,6 +66,26 @@ def test_tab_goes_from_the_rows_seen_at_first_to_those_made_later(qtbot: Any, de
     assert met == rows
 
 
+@pytest.mark.parametrize("width", [1366, 1600])
+def test_tab_leaves_a_form_whose_last_rows_were_made_later(qtbot: Any, designer: Any, width: int) -> None:
+    designer.window.resize(width, 768)
+    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.select(("blocks", "training"))
+    designer.editing.select(("blocks", "viscosity"))
+    assert 0 < len(designer.place.form._made) < len(designer.place.form.form.rows)
+    QApplication.processEvents()
+    designer.place.form.focus_first()
+    met = [QApplication.focusWidget()]
+    while True:
+        qtbot.keyClick(met[-1], Qt.Key.Key_Tab)
+        keyboard = QApplication.focusWidget()
+        if keyboard in met:
+            break
+        met.append(keyboard)
+    assert designer.place.form.rows[-1].isAncestorOf(met[-1]) or not designer.place.form.isAncestorOf(met[-1])
+    assert keyboard in {met[0], met[-1]}, f"Tab goes round from {keyboard.accessibleName()}"  # not every platform wraps
+
+
 def test_the_help_is_of_the_row_that_has_the_keyboard_after_its_step_made_the_form_anew(
     designer: Any,
 ) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
@@ -215,21 +214,8 @@ class FormCard(Card):
                 for part in around.children():  # Qt shows them later: what is hidden takes no keyboard and no room
                     if isinstance(part, QWidget) and not part.testAttribute(SHOWN_OR_HIDDEN):
                         part.show()
-            self._order_focus()
             self.show_repairs(self._known)
             self.show_selected(self._together)
-
-    def _order_focus(self) -> None:
-        """Let Tab go through the editors as they are read: Qt puts those made later last in the window."""
-        parts = [
-            part
-            for part in self.inside.findChildren(QWidget)
-            if part.focusPolicy() & Qt.FocusPolicy.TabFocus
-            and part.focusProxy() is None
-            and part.window() is self.window()
-        ]
-        for before, after in pairwise(parts):
-            QWidget.setTabOrder(before, after)
 
     @property
     def rows(self) -> list[RowWidget]:
