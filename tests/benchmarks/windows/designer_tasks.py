@@ -79,7 +79,7 @@ class Tasks:
         wait_until(lambda: "drinken" in str(self.document("threedrinks")["questionnaires"]), "the text")
 
     def delays(self) -> None:
-        """Delays of 0, 60, 120 and 240 ms in a Williams design, and how many people make it even."""
+        """Delays of 0, 60, 120 and 240 ms in a Williams design, and how many participants balance it."""
         user = self.user
         user.choose("Study", "New study …")
         user.press("Template Empty study")
@@ -96,7 +96,7 @@ class Tasks:
         user.choose("Order", "Williams")
         QTest.qWait(1500)
         words = [label.text() for label in user.window.findChildren(QLabel) if label.isVisible()]
-        assert any("even" in one for one in words), words
+        assert any("balanced, 3 rounds of 4" in one for one in words), words
 
     def changes(self) -> None:
         """What differs from the version that was saved."""
