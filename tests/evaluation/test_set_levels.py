@@ -152,7 +152,9 @@ def test_a_step_that_took_effect_at_another_scene_is_found_by_replay(session: Pa
     assert any("trial 1, attempt 1, interval 2" in line for line in replay(session).differences)
 
 
-@pytest.mark.parametrize("share", [0.25, 0.5, 0.75, 0.95])
+@pytest.mark.parametrize(
+    "share", [0.25, *(pytest.param(share, marks=pytest.mark.nightly) for share in (0.5, 0.75)), 0.95]
+)
 def test_a_session_that_was_killed_and_resumed_is_set_as_one_that_was_not(
     session: Path, protocol: Path, share: float
 ) -> None:

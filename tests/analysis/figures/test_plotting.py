@@ -31,14 +31,14 @@ def test_plot_writes_both_figures_in_three_forms_with_captions(rek: Results, tmp
     assert {path.name for path in (tmp_path / "new" / "out").iterdir()} == {path.name for path in written}
 
 
-def test_captions_say_what_is_missing_left_out_and_beyond_limits(rek: Results, tmp_path: Path) -> None:
+def test_captions_say_what_is_missing_left_out_and_beyond_limits(rek: Results) -> None:
     rek.add("P001", lambda *_: 6, changes={"valid": False})
     rek.add("P002", lambda *_: 6, status="withdrawn", trials=3)
     path = rek.responses("P001")
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(line for line in lines if ",immersive," not in line))
-    plotting.plot(rek.folder, tmp_path / "out")
-    caption = (tmp_path / "out" / "liquids.txt").read_text()
+    study = load_study(rek.folder)
+    caption = captions.caption(study, study.blocks[0])
     assert "not answered: 3" in caption
     assert "1 session is left out" in caption
     assert "3 of 3 trials exceeded the protocol's limits" in caption

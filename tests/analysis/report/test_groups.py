@@ -14,7 +14,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("figures_of_the_page")]
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from study_app.protocol.load import parse, source_bytes
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, make_results, twelve
 from tests.analysis.report.read_report import numbers, read, rows, run_in_r
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("figures_of_the_page")]
 
 
 def test_of_five_it_says_what_cannot_be_shown_and_what_a_delay_can_mean(rek: Results, tmp_path: Path) -> None:

@@ -36,7 +36,9 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return rehearse(folder / "grouped.toml", participants=2, seed=3, results=folder / "study", recordings=False)
 
 
-@pytest.mark.parametrize("share", [0.15, 0.4, 0.6, 0.9])
+@pytest.mark.parametrize(
+    "share", [0.15, *(pytest.param(share, marks=pytest.mark.nightly) for share in (0.4, 0.6)), 0.9]
+)
 def test_a_resumed_participant_stays_in_the_group_and_answers_alike(study: Path, tmp_path: Path, share: float) -> None:
     folder = tmp_path / "study"
     shutil.copytree(study, folder)
