@@ -54,7 +54,7 @@ loop = QEventLoop()
 live.over.connect(loop.quit)
 timer = QTimer(interval=20)
 def look():
-    if live.bridge is not None:
+    if live.bridge is not None and live.bridge.participant.isVisible():
         timer.stop()
         lasted_s, core_s = time.perf_counter() - began, time.process_time() - worked
         print(f"    windows after {lasted_s:.1f} s, {core_s:.1f} s of a core; 2 s of measuring are in it", flush=True)

@@ -58,7 +58,7 @@ live.over.connect(loop.quit)
 timer = QTimer(interval=20)
 
 def look():
-    if live.bridge is not None:
+    if live.bridge is not None and live.bridge.participant.isVisible():
         print("windows opened")
         timer.stop()
         QTimer.singleShot(1500, live.bridge.leave_now)

@@ -57,8 +57,6 @@ class SessionBridge(QObject):
         The two windows, made and not yet connected.
     refresh_hz
         Frames a second of the participant's screen.
-    strip
-        What tells the state in the participant's window, where both windows share one screen.
     """
 
     done = Signal()
@@ -71,13 +69,12 @@ class SessionBridge(QObject):
         operator: OperatorWindow,
         *,
         refresh_hz: float = 60.0,
-        strip: Strip | None = None,
     ) -> None:
         super().__init__()
         self.parts = parts
         self.participant = participant
         self.operator = operator
-        self.strip = strip
+        self.strip = participant.strip if isinstance(participant.strip, Strip) else None
         self._called = False
         self.monitor = OperatorMonitor(parts, refresh_hz)
         self.trouble = ""
@@ -92,7 +89,7 @@ class SessionBridge(QObject):
             parts.session.protocol, parts.session.schedule, parts.key, ports, parts.language, parts.start, parts.secret
         )
         self.requests = OperatorRequests(
-            parts, self.runner, participant, operator, strip=strip, fail=self.fail, parent=self
+            parts, self.runner, participant, operator, strip=self.strip, fail=self.fail, parent=self
         )
         self.reconnection = None if parts.reconnect is None else Reconnection(parts.reconnect)
         self._hand: Hand | None = None

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices_controller import diagnosis
+from study_app.app.preloading import load_windows
 from study_app.app.session.garbage_collection import unfreeze_garbage
 from study_app.app.session.termination import BY_SIGNAL_S
 from study_app.app.workstation_controller import described, screen_number, settings_here, text_scale_on
@@ -51,16 +52,6 @@ NOT_EXAMINED = (
     "There is nothing to diagnose",
     "This device has no diagnosis.",
 )
-
-
-def load_windows() -> None:
-    """Load what a session's windows need while the note is shown: modules, and versions, read from the disk once."""
-    import study_app.app.session.preflight_controller  # noqa: PLC0415
-    import study_app.app.session.session_windows  # noqa: PLC0415
-    import study_app.store.receipt  # noqa: PLC0415
-    import study_app.store.recording_writer  # noqa: PLC0415 - and pyarrow, which the recorder is made with
-
-    study_app.store.receipt.versions()
 
 
 class LiveSession(QObject):
@@ -122,7 +113,7 @@ class LiveSession(QObject):
 
     @property
     def began(self) -> bool:
-        """Whether its windows were opened."""
+        """Whether it was begun on the disk."""
         return self.bridge is not None
 
     @property
@@ -198,7 +189,7 @@ class LiveSession(QObject):
     def _step(self) -> None:
         """Take the next step, unless the session was closed meanwhile."""
         if not self._closed and self._steps is not None and next(self._steps, self) is None:
-            QTimer.singleShot(1, self, lambda: self._go_on(self._step))  # 0 ms: perhaps in this round of events
+            QTimer.singleShot(1, self, lambda: self._go_on(self._step))  # 0 ms may be the same iteration of the loop
 
     def _go_on(self, step: Callable[[], None]) -> None:
         """Take a step toward the first page; whatever it meets ends in order."""
@@ -250,7 +241,7 @@ class LiveSession(QObject):
             photodiode=self.settings.photodiode,
         )
         self._windows.append(participant)
-        yield  # up to the next one all is done at once: no session is on the disk without a bridge, which leaves it
+        yield  # none until the bridge exists: it leaves the session in order
         parts = made.masking, made.outlets, made.videos
         store = self._store = open_store(chosen, protocol, source, rig, screens, *parts)
         if not chosen.played:
@@ -267,11 +258,11 @@ class LiveSession(QObject):
         self.bridge.done.connect(self._finished)
         self.bridge.diagnose_asked.connect(self.diagnose)
         yield
-        yield from session_windows.show_windows(self.bridge, shown_on, operated_on, played=chosen.played)
+        self.bridge.start()  # before its windows are shown: nothing can be asked of a session that has not begun
+        yield
+        yield from session_windows.show_windows(self.bridge, *self.screens(), played=chosen.played)
         self._close_note()
         self._close_preflight()
-        yield
-        self.bridge.start()
 
     def _seconds(self) -> float:
         """Return the time since the session's origin [s]; 0 while it is not on the disk."""
@@ -336,9 +327,10 @@ class LiveSession(QObject):
         self._close()
 
     def cancel(self) -> None:
-        """Go back before the session has begun."""
-        self.code = CANCELLED
-        self._close()
+        """Go back before the session is on the disk; from then on it is ended in its windows."""
+        if self._store is None:
+            self.code = CANCELLED
+            self._close()
 
     def _close(self) -> None:
         """Let go of everything, in the order of safety, and say that it is over, once."""
@@ -351,13 +343,13 @@ class LiveSession(QObject):
         try:
             with ExitStack() as closing:
                 closing.callback(self._let_go)  # even where a window cannot be closed
-                if self.bridge is not None:
-                    self.bridge.leave_now()  # where it failed before it could: no window stays without its session
+                closing.callback(self._close_preflight)
+                closing.callback(self._close_note)
                 for window in self._windows:
                     window.deleteLater()
-                self._close_note()
-                self._close_preflight()
                 self._steps = None
+                if self.bridge is not None:
+                    self.bridge.leave_now()  # where it failed before it could: no window stays without its session
         except StudyError as error:
             self.error = self.error or error  # what came first says why
         except Exception:  # noqa: BLE001 - printed; whoever waits for the end must be notified

@@ -138,8 +138,7 @@ def connect_windows(
         press=getattr(device, "press", None) if described.pointer else None,
         hand_for=_hands(hand, chosen, clock) if hand is not None and described.moves_by_itself else None,
     )
-    strip = participant.strip if isinstance(participant.strip, Strip) else None
-    return SessionBridge(parts, participant, operator, refresh_hz=refresh_hz or 60.0, strip=strip)
+    return SessionBridge(parts, participant, operator, refresh_hz=refresh_hz or 60.0)
 
 
 def show_windows(

@@ -25,7 +25,7 @@ FIRST_TIME = (
 
 
 class OpeningWindow(QWidget):
-    """The note; ``cancelled`` when the operator goes back. Nothing has been created until it closes by itself."""
+    """The note; ``cancelled`` when the operator goes back, which ends what has created no session yet."""
 
     cancelled = Signal()
 

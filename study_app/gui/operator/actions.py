@@ -44,8 +44,6 @@ class Actions(Card):
         row.addWidget(self.close_session)
         for button in (self.pause, self.repeat, self.exclude, self.end, self.close_session):
             button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # its padding gives way
-        for button in (self.pause, self.repeat, self.exclude, self.end):
-            button.setEnabled(False)  # until the session is shown: the window stands before it begins
         self.close_session.hide()
         self.column.addLayout(row)
         self.column.addWidget(self.hint)
@@ -72,8 +70,6 @@ class Actions(Card):
         self._show_pause()
         self.pause.setEnabled(view.may_pause or view.may_resume)
         self.repeat.setEnabled(view.may_repeat)
-        for button in (self.exclude, self.end):
-            button.setEnabled(True)
         for button in (self.pause, self.repeat, self.end):
             button.setVisible(not view.over)
         if view.over and self.close_session.isHidden():

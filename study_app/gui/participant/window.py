@@ -173,7 +173,6 @@ class ParticipantWindow(QWidget):
             self.setGeometry(self.screen().geometry())
             self.showFullScreen()
         self.activateWindow()
-        self._widget.setFocus()
 
     def come_forward(self) -> None:
         """Stand before every other window of the screen."""

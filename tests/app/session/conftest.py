@@ -65,7 +65,7 @@ def make(qapp, world):
         )
         for window in (participant, operator):
             window.show()
-        bridge = SessionBridge(made, participant, operator, strip=strip)
+        bridge = SessionBridge(made, participant, operator)
         made_bridges.append(bridge)
         bridge.start()
         bridge.frames.stop()  # a test moves time itself

@@ -56,11 +56,6 @@ def test_a_view_becomes_texts(running, told, health):
     assert running.stop.word.text() == "Force is on"
 
 
-def test_nothing_but_the_force_stop_can_be_asked_for_before_the_session_is_shown(window):
-    asked = window.buttons.pause, window.buttons.exclude, window.buttons.end, window.stop.stop
-    assert [one.isEnabled() for one in asked] == [False, False, False, True]
-
-
 def test_without_force_on_the_hand_the_cockpit_says_so(qtbot, told):
     window = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=True, felt=False)
     qtbot.addWidget(window)

@@ -1,0 +1,73 @@
+"""What the operator or the participant does while a session's windows are still being shown."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from study_app.app.session import live_session
+from study_app.app.session.bridge import SessionBridge
+from study_app.app.session.live_session import LiveSession
+from study_app.gui.theme.theme import LIGHT
+from study_app.session.transitions.state import Phase
+from tests.app.session.test_opening_fails import CHOSEN
+from tests.compiled import needs_servo
+
+pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("quick_preflight")]
+
+
+class Disturbed(LiveSession):
+    """A session in which something is done as soon as one of its windows is visible."""
+
+    def __init__(self, results: Path, window: str, act: Callable[[SessionBridge], object]) -> None:
+        super().__init__(replace(CHOSEN, results=results), LIGHT)
+        self.window, self.act, self.acted = window, act, False
+
+    def _step(self) -> None:
+        super()._step()
+        if self.bridge is not None and not self.acted and getattr(self.bridge, self.window).isVisible():
+            self.acted = True
+            self.act(self.bridge)
+
+
+def stop(bridge: SessionBridge) -> None:
+    QTest.mouseClick(bridge.operator.stop.stop, Qt.MouseButton.LeftButton)
+
+
+@pytest.mark.parametrize(
+    ("window", "act", "events"),
+    [
+        ("operator", stop, ["force_stopped", "paused"]),
+        ("operator", lambda bridge: bridge.operator.close(), ["force_stopped", "paused"]),
+        ("participant", lambda bridge: bridge.participant.close(), ["paused"]),
+    ],
+    ids=["stop force", "close the cockpit", "close the participant's window"],
+)
+def test_it_pauses_a_session_that_can_be_resumed(
+    qtbot: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, window: str, act: Any, events: list[str]
+) -> None:
+    monkeypatch.setattr(live_session, "checks", lambda *_: ())  # a busy computer would not pass them
+    session = Disturbed(tmp_path / "results", window, act)
+    session.open()
+    qtbot.waitUntil(lambda: session.bridge is not None and session.bridge.participant.isVisible(), timeout=60_000)
+    bridge = session.bridge
+    assert bridge is not None
+    servo = bridge.parts.servo
+    qtbot.waitUntil(lambda: bridge.runner.state.phase is Phase.PAUSED)
+    assert servo.force_is_on is ("force_stopped" not in events)
+    bridge.operator.buttons.pause.click()
+    assert (bridge.runner.state.phase, servo.force_is_on) == (Phase.READING, True)
+    assert bridge.participant.isVisible()
+    session.end_by_signal(15)
+    (journal,) = (tmp_path / "results").rglob("journal.jsonl")
+    recorded = [json.loads(line)["event"] for line in journal.read_text().splitlines()]
+    assert recorded[: 3 + len(events)] == ["session_started", "preflight", "page_shown", *events]
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
