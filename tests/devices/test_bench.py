@@ -106,15 +106,8 @@ def test_report_and_settings_hold_what_was_found(found_of, tmp_path, monkeypatch
     assert "bench" not in with_bench({"name": "mouse"})
 
 
-@pytest.mark.parametrize(
-    ("name", "at"),
-    [
-        ("scripted", "damping"),
-        ("falcon-emulated", "grams"),
-        pytest.param("scripted", "grams", marks=pytest.mark.nightly),
-        pytest.param("falcon-emulated", "damping", marks=pytest.mark.nightly),
-    ],
-)
+@pytest.mark.parametrize("at", ["damping", "grams"])
+@pytest.mark.parametrize("name", ["scripted", "falcon-emulated"])
 def test_interrupt_ends_in_zero_force(name, at):
     """Ctrl-C while a force acts: in the second that the damper grows, and at the second force on the scale."""
     forces = []
