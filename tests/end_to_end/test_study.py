@@ -144,12 +144,17 @@ def test_the_thesis_study_leaves_62_responses() -> None:
 def test_the_same_call_into_another_folder_gives_the_same_tables_but_for_wall_clock_times(
     rehearsed: tuple[str, StudyFolder], tmp_path: Path
 ) -> None:
-    """For protocols of format 1 `test_format_1` compares every table with those of the first release."""
+    """For protocols of format 1 `test_format_1` compares every table with those of the first release.
+
+    One study is enough for P002, whose order differs from that of P001.
+    """
     name, first = rehearsed
     study = load(name).study.name
-    (other,) = StudyFolder(rehearse(name, participants=1, seed=1, results=tmp_path / "again")).sessions()
-    for kind in ("responses", "trials"):
-        assert without_clock(table(first.sessions()[0], study, kind)) == without_clock(table(other, study, kind))
+    participants = 2 if name == "slime" else 1
+    again = StudyFolder(rehearse(name, participants=participants, seed=1, results=tmp_path / "again"))
+    for one, other in zip(first.sessions()[:participants], again.sessions(), strict=True):
+        for kind in ("responses", "trials"):
+            assert without_clock(table(one, study, kind)) == without_clock(table(other, study, kind))
 
 
 @pytest.mark.parametrize("rehearsed", besides("demo"), indirect=True)
