@@ -65,7 +65,8 @@ class MainWindow(QMainWindow):
         self.notice: Notice | None = None
         self._had_keyboard: QWidget | None = None
         self._makers = makers
-        self._prepares = prepares
+        self._prepares = dict(prepares)  # of places that are not filled yet
+        self._filling: set[str] = set()
         self._places: dict[str, Place] = {}
         self._made: dict[str, Place] = {}  # and not yet among the places
         self._waiting = _waiting_place()
@@ -115,23 +116,41 @@ class MainWindow(QMainWindow):
         """
         self._asked = name
         self.went.emit(name)
-        if name in self._places or name not in self._prepares:
+        if name not in self._prepares:
             self._show(name, self.place(name))
+        elif name in self._filling:
+            return  # it is shown after the last step
         elif (steps := self._prepares[name]()) is not None:
+            self._filling.add(name)
             self._fill(name, steps)
         else:
             self._show(name, self._waiting)
 
     def _fill(self, name: str, steps: Iterator[None]) -> None:
-        """Take the next step to a place, first to make it, then to add it; show it after the last."""
+        """Take the next step to a place; show the place after the last."""
+        try:
+            filled = self._take_step(name, steps)
+        except Exception as error:  # say what failed, and let the hook for exceptions log it
+            self._filling.remove(name)
+            if self._asked == name:
+                self.not_prepared(error)
+            raise
+        if filled:
+            del self._prepares[name]
+            self._filling.remove(name)
+            self.prepared(name)
+        else:
+            QTimer.singleShot(1, self, lambda: self._fill(name, steps))  # a 0 ms timer may fire in the same iteration
+
+    def _take_step(self, name: str, steps: Iterator[None]) -> bool:
+        """Make a place, then add it, then fill it step by step; return whether it is filled."""
         if name in self._made:
             self.place(name)
         elif name not in self._places:
             self._made[name] = self._makers[name]()
-        elif next(steps, self) is self:
-            self.prepared(name)
-            return
-        QTimer.singleShot(1, self, lambda: self._fill(name, steps))  # 0 ms: perhaps in this round of events
+        else:
+            return next(steps, self) is self
+        return False
 
     def _show(self, name: str, asked: Place) -> None:
         if self.stack.currentWidget() is asked and name == self._here and asked.isVisible():
@@ -151,14 +170,14 @@ class MainWindow(QMainWindow):
 
     def not_prepared(self, error: BaseException) -> None:
         """Say what failed, at the first place, if one waits for a place; asked for again, it is prepared again."""
-        if self.stack.currentWidget() is self._waiting:
+        if self._asked in self._prepares:
             self.go(next(iter(self._makers)))
             what = f"{type(error).__name__}: {error}"
             self.show_message("This page could not be opened", f"{what}. The terminal shows the details.")
 
     def _now(self) -> Place:
         """Return the place one is at, or the line that stands there until it is prepared."""
-        return self._places.get(self._here, self._waiting)
+        return self._waiting if self.stack.currentWidget() is self._waiting else self._places[self._here]
 
     def rest(self) -> None:
         """Leave the place one is at, and the screen: a session takes over."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QFontMetrics
-from PySide6.QtWidgets import QApplication, QPushButton, QVBoxLayout
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QVBoxLayout
 
 from study_app.gui.home.main_window import FULL, LEAST, MainWindow
 from study_app.gui.home.navigation import DESTINATIONS, FOCUS_RING, NARROW_RAIL, WIDE_RAIL
@@ -165,6 +165,60 @@ def test_a_place_that_is_not_prepared_never_freezes_the_window(qtbot):
     window.go("home")
     window.rest()
     window.come_back()
+    window.close()
+
+
+@pytest.mark.parametrize("fails", ["make", "fill"])
+@pytest.mark.parametrize("waits", [True, False])
+def test_a_place_whose_step_fails_says_so_and_a_second_entry_tries_again(qtbot, fails, waits):
+    ready, tried = not waits, []
+
+    def step(kind):
+        tried.append(kind)
+        if kind == fails and tried.count(kind) == 1:
+            raise RuntimeError("a file is missing")
+
+    def make():
+        step("make")
+        return Place()
+
+    def fill():
+        step("fill")
+        yield
+
+    window = MainWindow({"home": Place, "lab": make}, prepares={"lab": lambda: fill() if ready else None})
+    qtbot.addWidget(window)
+    window.show()
+    with qtbot.captureExceptions() as raised:
+        QTimer.singleShot(0, lambda: window.go("lab"))
+        qtbot.waitUntil(lambda: not waits or window.here == "lab")
+        ready = True
+        QTimer.singleShot(0, lambda: window.prepared("lab"))
+        qtbot.waitUntil(lambda: window.notice is not None)
+    assert [str(error) for _, error, _ in raised] == ["a file is missing"], "the terminal shows the details"
+    assert window.here == "home"
+    assert "a file is missing" in " ".join(one.text() for one in window.notice.findChildren(QLabel))
+    window.go("lab")
+    qtbot.waitUntil(lambda: window.stack.currentWidget() is window._places.get("lab"))
+    assert tried == (["make", "make", "fill"] if fails == "make" else ["make", "fill", "fill"])
+    window.close()
+
+
+def test_a_place_that_is_asked_for_twice_is_filled_once(qtbot):
+    tried = []
+
+    def fill():
+        tried.append("fill")
+        yield
+
+    window = MainWindow({"home": Place, "lab": Place}, prepares={"lab": fill})
+    qtbot.addWidget(window)
+    window.show()
+    window.go("lab")
+    window.go("lab")
+    qtbot.waitUntil(lambda: window.here == "lab")
+    qtbot.wait(20)
+    assert tried == ["fill"]
     window.close()
 
 
