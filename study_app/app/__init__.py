@@ -1,7 +1,8 @@
 """The composition root, where device, servo, store, session, analysis and windows meet.
 
-``main_controller`` owns the main window; ``session.live_session`` runs one session from its request to the closed
-journal; ``session.entry`` begins or resumes one by command.
+``main_controller`` owns the main window, ``lab_and_designer`` the two places that are loaded in the background;
+``session.live_session`` runs one session from its request to the closed journal; ``session.entry`` begins or resumes
+one by command.
 """
 
 from study_app.gui.display.display_check import missing_library

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEventLoop, QObject, QTimer
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
-from PySide6.QtWidgets import QWidget
 
 from study_app.app.devices_controller import DevicesController
-from study_app.app.preloading import preload_lab_and_designer
+from study_app.app.lab_and_designer import LabAndDesigner
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.session.termination import BY_SIGNAL_S, Patience, ended_from_outside
@@ -22,7 +21,6 @@ from study_app.gui.display.screens import place
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.view import HomePlace
 from study_app.gui.home.workspace import WorkspaceDialog
-from study_app.gui.widgets.background import Background
 from study_app.session.request import NewSession
 from study_app.store.workstation import MachineSettings, create_workspace
 from study_app.viewmodels.help import FIRST_PAGE, PAGES_OF_PLACES
@@ -32,18 +30,10 @@ LOOK_AFTER_MS = 300  # the window stands by then
 
 if TYPE_CHECKING:
     from study_app.app.computer_check import ComputerCheck
-    from study_app.app.designer.controller import DesignerController
-    from study_app.app.designer.feeling import LabLiquids
-    from study_app.app.lab.controller import LabController
-    from study_app.app.lab.initial_settings import InitialSettings
     from study_app.app.results_controller import ResultsController
-    from study_app.gui.designer.view import DesignerPlace
     from study_app.gui.help.view import HelpPlace
-    from study_app.gui.lab.view import LabPlace
     from study_app.gui.results.view import ResultsPlace
     from study_app.gui.settings.view import MachinePlace
-    from study_app.lab.ab_comparison import Setting, Side
-    from study_app.viewmodels.sessions import SessionFacts
 
 
 def home(results: Path | None = None, *, then: Callable[[MainController], None] = lambda _visit: None) -> int:
@@ -77,36 +67,36 @@ class MainController(QObject):
         self._home_place: HomePlace | None = None
         self._follows_machine = results is None
         self.results = results if results is not None else workspace().results
+        self.lab_and_designer = LabAndDesigner(self.machine, self.results)
         self.question: WorkspaceDialog | None = None
         self.check: ComputerCheck | None = None
         self.window = MainWindow(
             {
                 "home": self._home,
-                "designer": self._designer,
+                "designer": self.lab_and_designer.make_designer,
                 "results": self._results,
-                "lab": self._lab,
+                "lab": self.lab_and_designer.make_lab,
                 "devices": self.devices.make_place,
                 "machine": self._machine,
                 "help": self._help,
             },
             theme=theme_named(self.machine.settings.theme),
-            prepares={"lab": self._prepare_lab, "designer": self._prepare_designer},
+            prepares={
+                "lab": self.lab_and_designer.prepare_lab,
+                "designer": self.lab_and_designer.prepare_designer,
+            },
         )
-        self._lab_first: InitialSettings | None = None
-        self._preparing = Background(self)
-        self._preparing.done.connect(self._lab_prepared)
-        self._preparing.failed.connect(self.window.not_prepared)
         self.loop = QEventLoop()
         self.code = 0
         self.live: LiveSession | None = None
         self.help: HelpPlace | None = None
         self._called_off: list[LiveSession] = []
         self.results_controller: ResultsController | None = None
-        self.designer: DesignerController | None = None
-        self.lab: LabController | None = None
-        self._for_lab: LabLiquids | None = None
-        self._for_designer: tuple[Callable[[DesignerController], None], ...] = ()
-        self.window.went.connect(self._forget_wanted)
+        self.lab_and_designer.go_asked.connect(self.window.go)
+        self.lab_and_designer.prepared.connect(self.window.prepared)
+        self.lab_and_designer.not_prepared.connect(self.window.not_prepared)
+        self.lab_and_designer.saved.connect(self._show_saved)
+        self.window.went.connect(self.lab_and_designer.forget_wanted)
         self.window.closed.connect(self._leave)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
@@ -124,7 +114,7 @@ class MainController(QObject):
         elif self._follows_machine and chosen_workspace() is None:
             self._ask_for_workspace()
         QTimer.singleShot(LOOK_AFTER_MS, self.devices, self.devices.look)
-        QTimer.singleShot(LOOK_AFTER_MS, self, self._prepare_lab)
+        QTimer.singleShot(LOOK_AFTER_MS, self.lab_and_designer, self.lab_and_designer.prepare_lab)
 
     def _ask_for_workspace(self) -> None:
         """Ask once which folder holds protocols and results; until it is answered the offered one is used."""
@@ -162,8 +152,8 @@ class MainController(QObject):
         made.session_asked.connect(self._start)
         made.results_asked.connect(self._show_study)
         made.protocol_opened.connect(self.machine.remember_protocol)
-        made.edit_asked.connect(self.open_designer)
-        made.new_asked.connect(self.begin_study)
+        made.edit_asked.connect(self.lab_and_designer.open_designer)
+        made.new_asked.connect(self.lab_and_designer.begin_study)
         made.device.display_asked.connect(self._test_display)
         made.show_machine(self.machine.settings, self.devices.preferred)
         self._home_place = made
@@ -183,8 +173,7 @@ class MainController(QObject):
             self._home_place.show_results(self.results)
             if self.results_controller is not None:
                 self.results_controller.show_results(self.results)
-            if self.designer is not None:
-                self.designer.editing.results = self.results
+            self.lab_and_designer.show_results(self.results)
         self._show_machine()
 
     def _test_display(self) -> None:
@@ -203,7 +192,7 @@ class MainController(QObject):
         from study_app.app.results_controller import ResultsController  # noqa: PLC0415 - only once it is needed
 
         self.results_controller = ResultsController(self.results)
-        self.results_controller.place.version_asked.connect(self.show_version)
+        self.results_controller.place.version_asked.connect(self.lab_and_designer.show_version)
         return self.results_controller.place
 
     def _help(self) -> HelpPlace:
@@ -220,118 +209,11 @@ class MainController(QObject):
         self.help.open_page(page)
         self.window.go("help")
 
-    def _designer(self) -> DesignerPlace:
-        from study_app.app.designer.controller import DesignerController  # noqa: PLC0415 - only once it is needed
-
-        self.designer = DesignerController(self.results)
-        self.designer.saving.saved.connect(self._show_saved)
-        self.designer.playing.kept.connect(self._show_saved)
-        self.designer.feeling.asked.connect(self._feel)
-        self.designer.editing.opened_other.connect(self._forget_study)
-        self.designer.feeling.returned.connect(lambda: self.window.go("designer"))
-        return self.designer.place
-
-    def _show_saved(self, _file: Path) -> None:
+    def _show_saved(self) -> None:
         """Show the study, or the pilot, that was saved on home's cards."""
         if self._home_place is not None:
             self._home_place.show_studies()
             self._home_place.show_sessions()
-
-    def open_designer(self, source: str) -> None:
-        """Go to the study designer with a study."""
-        self._go_to_designer(lambda designer: designer.open(source))
-
-    def show_version(self, session: SessionFacts) -> None:
-        """Go to the study designer, to what changed in a session's study since it was run."""
-        self._go_to_designer(
-            lambda designer: designer.open(session.study),
-            lambda designer: designer.changes.compare_with_session(session.study, session.folder),
-        )
-
-    def begin_study(self, source: str = "", name: str = "") -> None:
-        """Go to the study designer with what a new study can begin from; with a name begin it at once."""
-        self._go_to_designer(lambda it: it.ask_for_new(source), lambda it: it.begin(source, name) if name else None)
-
-    def _go_to_designer(self, *actions: Callable[[DesignerController], None]) -> None:
-        """Go to the study designer and act there once it is made: the window's thread does not wait for its modules."""
-        self._for_designer = actions
-        self._act_in_designer()
-        self.window.go("designer")
-
-    def _act_in_designer(self) -> None:
-        """Do what waits for the designer, once that is made."""
-        if self.designer is not None:
-            actions, self._for_designer = self._for_designer, ()
-            for act in actions:
-                act(self.designer)
-
-    def _forget_wanted(self, name: str) -> None:
-        """Forget what waits for a place that is not loaded yet where another place is asked for."""
-        self._for_designer = self._for_designer if name == "designer" else ()
-        self._for_lab = self._for_lab if name == "lab" else None
-
-    def _feel(self, liquids: LabLiquids) -> None:
-        """Go to the lab with liquids of the study that is edited."""
-        self._for_lab = liquids
-        self.window.go("lab")
-        self._open_liquids()
-
-    def _open_liquids(self) -> None:
-        """Open what waits for the lab, once that is made."""
-        if self.lab is not None and self._for_lab is not None:
-            self.lab.feel_of_study(self._for_lab.a, self._for_lab.b, self._for_lab.study)
-            self._for_lab = None
-
-    def _forget_study(self) -> None:
-        """Let the lab offer no more to put its liquids back: another study is open in the designer."""
-        if self.lab is not None:
-            self.lab.study = ""
-
-    def _put_back(self, side: Side, setting: Setting) -> None:
-        """Put a liquid back into the study that is edited, and go there."""
-        if self.designer is not None:
-            self.designer.feeling.put_back(side, setting)
-
-    def _prepare_lab(self) -> Iterator[None] | None:
-        """Load the lab in the background, from when home stands; return the steps to it once that is done."""
-        if self._lab_first is None and not self._preparing.busy:
-            self._preparing.run(preload_lab_and_designer)
-        return None if self._lab_first is None else self._fill_lab()
-
-    def _prepare_designer(self) -> Iterator[None] | None:
-        """Return the step to the designer; None while a thread loads what it needs: a click must not wait for that."""
-        self._prepare_lab()
-        return None if self._preparing.busy else self._fill_designer()
-
-    def _fill_designer(self) -> Iterator[None]:
-        self._act_in_designer()  # the window already shows what the place says
-        yield
-
-    def _fill_lab(self) -> Iterator[None]:
-        """Make the lab's form, then its styles: where it is first shown, it is only laid out and painted."""
-        lab = self.lab
-        assert lab is not None  # noqa: S101 - made with its place
-        lab.place.show_view(lab.view())
-        yield
-        for part in lab.place.findChildren(QWidget):
-            part.ensurePolished()
-        yield
-
-    def _lab_prepared(self, first: InitialSettings) -> None:
-        self._lab_first = first
-        for name in ("lab", "designer"):
-            self.window.prepared(name)
-
-    def _lab(self) -> LabPlace:
-        from study_app.app.lab.controller import compose_lab  # noqa: PLC0415 - pyqtgraph: only once it is needed
-        from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
-
-        made = LabPlace()
-        settings = self.machine.settings
-        self.lab = compose_lab(made, device=settings.device, options=settings.device_options, first=self._lab_first)
-        made.put_back_asked.connect(self._put_back)
-        self._open_liquids()
-        return made
 
     def end(self) -> None:
         """Let go of what the places hold, and wait for what is under way in other threads: a device may be opening.
@@ -341,10 +223,7 @@ class MainController(QObject):
         patience = Patience(BY_SIGNAL_S if self.code else OPENING_PATIENCE_S)
         if self._home_place is not None:
             self._home_place.end()
-        if self.designer is not None:
-            self.designer.playing.end(patience)
-        if self.lab is not None:
-            self.lab.end(patience)
+        self.lab_and_designer.end(patience)
         self.devices.end(patience.left_s)
         for live in self._called_off:
             live.wait(patience.left_s)
@@ -354,8 +233,7 @@ class MainController(QObject):
         self.code = 128 + number
         if self.live is not None:
             self.live.end_by_signal(number)
-        if self.designer is not None:
-            self.designer.playing.end_by_signal(number)
+        self.lab_and_designer.end_by_signal(number)
         self.window.close()
         self.loop.quit()
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from PySide6.QtWidgets import QLabel
 
-from study_app.app import main_controller
+from study_app.app import lab_and_designer
 from study_app.app.lab.initial_settings import prepare_initial_settings
 from study_app.app.main_controller import MainController
 
@@ -18,16 +18,16 @@ def test_a_place_is_not_made_while_a_thread_loads_what_it_needs(
     qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     wanted: list[object] = []
-    monkeypatch.setattr(main_controller.Background, "_begin", lambda _self, job: wanted.append(job))
+    monkeypatch.setattr(lab_and_designer.Background, "_begin", lambda _self, job: wanted.append(job))
     made: list[str] = []
-    monkeypatch.setattr(MainController, f"_{name}", lambda _self: made.append(name))
+    monkeypatch.setattr(lab_and_designer.LabAndDesigner, f"make_{name}", lambda _self: made.append(name))
     visit = MainController(tmp_path / "results")
     qtbot.addWidget(visit.window)
     visit.window.show()
-    visit._prepare_lab()  # as once the window stands
+    visit.lab_and_designer.prepare_lab()  # as once the window stands
     visit.window.go(name)
     assert (visit.window.here, made) == (name, [])
-    assert wanted == [main_controller.preload_lab_and_designer]
+    assert wanted == [lab_and_designer.preload_lab_and_designer]
     visit.window.go("home")
     visit.window.close()
     visit.end()
@@ -39,26 +39,27 @@ def test_a_study_that_was_asked_for_opens_once_the_designer_is_loaded(
     qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: str
 ) -> None:
     wanted: list[object] = []
-    monkeypatch.setattr(main_controller.Background, "_begin", lambda _self, job: wanted.append(job))
+    monkeypatch.setattr(lab_and_designer.Background, "_begin", lambda _self, job: wanted.append(job))
     visit = MainController(tmp_path / "results")
+    both = visit.lab_and_designer
     qtbot.addWidget(visit.window)
     visit.window.show()
     if asked == "edit":
-        visit.open_designer("demo")
+        both.open_designer("demo")
     else:
-        visit.begin_study()
-    assert (visit.window.here, visit.designer) == ("designer", None)
-    assert wanted == [main_controller.preload_lab_and_designer], "loading begins at once"
-    visit._preparing._wanted = None
-    visit._lab_prepared(prepare_initial_settings())
-    qtbot.waitUntil(lambda: visit.designer is not None and visit.designer.place.isVisible())
-    assert visit.designer is not None
-    opened = visit.designer.editing.opened
+        both.begin_study()
+    assert (visit.window.here, both.designer) == ("designer", None)
+    assert wanted == [lab_and_designer.preload_lab_and_designer], "loading begins at once"
+    both._preparing._wanted = None
+    both._loaded(prepare_initial_settings())
+    qtbot.waitUntil(lambda: both.designer is not None and both.designer.place.isVisible())
+    assert both.designer is not None
+    opened = both.designer.editing.opened
     if asked == "edit":
         assert opened is not None
         assert opened.study.document["study"]["name"] == "demo"
     else:
-        new_page = visit.designer.place.new_page
+        new_page = both.designer.place.new_page
         assert (opened, new_page.isVisible()) == (None, True)
         assert visit.window.focusWidget() is new_page.card.questions.title
     visit.window.close()
@@ -76,7 +77,7 @@ def test_nothing_waits_for_a_place_that_cannot_be_loaded_and_a_second_entry_trie
         tried.append(name)
         raise RuntimeError("a module is missing")
 
-    monkeypatch.setattr(main_controller, "preload_lab_and_designer", fail)
+    monkeypatch.setattr(lab_and_designer, "preload_lab_and_designer", fail)
     visit = MainController(tmp_path / "results")
     qtbot.addWidget(visit.window)
     visit.window.show()
@@ -98,18 +99,19 @@ def test_nothing_waits_for_a_place_that_cannot_be_loaded_and_a_second_entry_trie
 def test_a_study_that_was_asked_for_is_forgotten_where_one_goes_elsewhere_before_the_designer_is_loaded(
     qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(main_controller.Background, "_begin", lambda _self, _job: None)
+    monkeypatch.setattr(lab_and_designer.Background, "_begin", lambda _self, _job: None)
     visit = MainController(tmp_path / "results")
+    both = visit.lab_and_designer
     qtbot.addWidget(visit.window)
     visit.window.show()
-    visit.open_designer("demo")
+    both.open_designer("demo")
     visit.window.go("home")
-    visit._preparing._wanted = None
-    visit._lab_prepared(prepare_initial_settings())
+    both._preparing._wanted = None
+    both._loaded(prepare_initial_settings())
     visit.window.go("designer")
-    qtbot.waitUntil(lambda: visit.designer is not None and visit.designer.place.isVisible())
+    qtbot.waitUntil(lambda: both.designer is not None and both.designer.place.isVisible())
     qtbot.wait(100)
-    assert visit.designer is not None
-    assert visit.designer.editing.opened is None
+    assert both.designer is not None
+    assert both.designer.editing.opened is None
     visit.window.close()
     visit.end()

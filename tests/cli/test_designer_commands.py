@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,7 +16,7 @@ from study_app.errors import ProtocolError, StudyError
 
 
 class Visit:
-    """What the main window is asked for."""
+    """What the study designer is asked for."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, ...]] = []
@@ -32,7 +33,7 @@ def visit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Visit:
     made = Visit()
 
     def home(*, then: Any) -> int:
-        then(made)
+        then(SimpleNamespace(lab_and_designer=made))
         return 0
 
     monkeypatch.setattr(app, "home", home)
