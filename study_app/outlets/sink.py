@@ -7,10 +7,10 @@ the servo: it gets no more markers, and `SinkThread.lost` says why.
 from __future__ import annotations
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from time import monotonic
 from typing import Any, Final, Protocol
 
 from study_app.errors import OutletError
@@ -95,7 +95,8 @@ class SinkThread:
         with self._changed:
             if self.lost or self._closing:
                 return
-            hangs = self._since_s is not None and time.monotonic() - self._since_s > HANGS_S
+            since_s = self._since_s  # read once: the thread clears it at any time
+            hangs = since_s is not None and monotonic() - since_s > HANGS_S
             if hangs or len(self._waiting) >= ROOM:
                 self._give_up("it accepts no more markers")
                 return
@@ -135,5 +136,5 @@ class SinkThread:
             self._changed.wait_for(lambda: self._waiting or self._closing or self.lost)
             if not self._waiting:
                 return None
-            self._since_s = time.monotonic()
+            self._since_s = monotonic()
             return self._waiting.popleft()

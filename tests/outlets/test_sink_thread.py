@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import time
+import threading
+from collections.abc import Callable
 
 import pytest
 
 from study_app.outlets import sink as module
-from study_app.outlets.sink import SinkThread
+from study_app.outlets.sink import HANGS_S, SinkThread
+from tests.haptics.running import wait_until
 from tests.outlets.sinks import Sink, marker
 
 
@@ -46,15 +48,39 @@ def test_another_exception_ends_the_sink_alone() -> None:
     assert thread.lost == "ZeroDivisionError: division by zero"
 
 
-def test_a_sink_that_hangs_is_lost_at_the_next_marker(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "HANGS_S", 0.05)
+class Clock:
+    """Stands in for ``monotonic``; `read` is called when a test's own thread reads it."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+        self.read: Callable[[], object] = lambda: None
+        self._reader = threading.current_thread()
+
+    def __call__(self) -> float:
+        if threading.current_thread() is self._reader:
+            self.read()
+        return self.now_s
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    """Replace the clock of sinks."""
+    made = Clock()
+    monkeypatch.setattr(module, "monotonic", made)
+    return made
+
+
+def test_a_sink_that_hangs_is_lost_at_the_first_marker_after_the_limit(clock: Clock) -> None:
     sink = Sink(hangs_at=1)
     thread = SinkThread(sink)
     thread.mark(marker(1))
     assert sink.hanging.wait(5)
-    time.sleep(0.1)
-    assert thread.lost == ""
+    clock.now_s += HANGS_S
     thread.mark(marker(2))
+    assert thread.lost == ""
+    clock.now_s += 0.25
+    assert thread.lost == ""
+    thread.mark(marker(3))
     assert thread.lost == "it accepts no more markers"
     sink.go_on.set()
     assert sink.closed.wait(5)
@@ -62,16 +88,31 @@ def test_a_sink_that_hangs_is_lost_at_the_next_marker(monkeypatch: pytest.Monkey
     thread.close(5)
 
 
-def test_a_sink_that_is_idle_for_long_hangs_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "HANGS_S", 0.05)
+def test_a_sink_that_is_idle_for_long_hangs_not(clock: Clock) -> None:
     sink = Sink()
     thread = SinkThread(sink)
-    for trial in (1, 2):
+    for trial in (1, 2, 3):
         thread.mark(marker(trial))
-        time.sleep(0.1)
-    thread.mark(marker(3))
+        wait_until(lambda: not thread._waiting and thread._since_s is None)
+        clock.now_s += 2 * HANGS_S
     thread.close(5)
     assert (len(sink.sent), thread.lost) == (3, "")
+
+
+def test_a_marker_may_be_sent_while_the_next_one_is_handed_over(clock: Clock) -> None:
+    sink = Sink(hangs_at=1)
+    thread = SinkThread(sink)
+    thread.mark(marker(1))
+    assert sink.hanging.wait(5)
+
+    def finish() -> None:
+        sink.go_on.set()
+        wait_until(lambda: thread._since_s is None)
+
+    clock.read = finish
+    thread.mark(marker(2))
+    thread.close(5)
+    assert (sink.sent, thread.lost) == ([marker(1), marker(2)], "")
 
 
 def test_a_sink_that_hangs_delays_neither_markers_nor_the_end(monkeypatch) -> None:
