@@ -20,6 +20,7 @@ ROOM: Final = 1000
 """Markers that may wait."""
 HANGS_S: Final = 5.0
 """A sink that takes longer over one marker counts as lost at the next. [choice]"""
+ADVICE: Final = "no more are sent; check the connection, then end and resume the session"
 
 PATIENCE_S: Final = 1.0
 
@@ -96,12 +97,14 @@ class SinkThread:
             if self.lost or self._closing:
                 return
             since_s = self._since_s  # read once: the thread clears it at any time
-            hangs = since_s is not None and monotonic() - since_s > HANGS_S
-            if hangs or len(self._waiting) >= ROOM:
-                self._give_up("it accepts no more markers")
-                return
-            self._waiting.append(marker)
-            self._changed.notify_all()
+            taken_s = 0.0 if since_s is None else monotonic() - since_s
+            if taken_s > HANGS_S:
+                self._give_up(f"a marker was not sent in {taken_s:.1f} s (limit {HANGS_S:g} s): {ADVICE}")
+            elif len(self._waiting) >= ROOM:
+                self._give_up(f"{ROOM:,} markers wait to be sent (limit): {ADVICE}")
+            else:
+                self._waiting.append(marker)
+                self._changed.notify_all()
 
     def close(self, patience_s: float = PATIENCE_S) -> None:
         """Send what waits, for so long, and let go of the sink; one that hangs is left to its thread."""
