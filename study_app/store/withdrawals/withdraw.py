@@ -39,6 +39,7 @@ from study_app.store.withdrawals.tombstones import Tombstone, bury, describe_ses
 from study_app.workspace import workspace
 
 DATASET: Final = "dataset_description.json"
+RESULTS: Final = "results"
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +133,7 @@ def withdraw(
     left += [
         f"{export.path} is an export with data of {participant}: delete it, and make it again"
         for export in shared
-        if any(_names(export, participant))
+        if any(_names(export, participant, export.data, export.path / RESULTS))
     ]
     return Withdrawn(tombstone, tuple(erased), outputs, elsewhere, tuple(left))
 
@@ -264,10 +265,13 @@ def _outputs(study: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
     return erase_outputs(study, results if own.is_relative_to(results) else own)
 
 
-def _names(study: StudyFolder, participant: str) -> Iterator[str]:
-    """Yield what still names the participant, except the tombstone, the entry in the allocation and recordings."""
+def _names(study: StudyFolder, participant: str, *folders: Path) -> Iterator[str]:
+    """Yield what still names the participant, except the tombstone, the entry in the allocation and recordings.
+
+    Where ``folders`` are given, they alone are searched: in the footage of an export an ID may occur by chance.
+    """
     word = re.compile(rb"(?<![A-Za-z0-9])" + re.escape(participant.encode()) + rb"(?![A-Za-z0-9])")
-    for path in paths_in(study.path):
+    for path in (path for folder in folders or (study.path,) for path in paths_in(folder)):
         kept = path == study.withdrawals or path.is_relative_to(study.allocated)
         if kept or path.parent.name == "recordings" or not path.is_file():
             continue

@@ -181,6 +181,12 @@ def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, resul
     shared = tmp_path / "disk" / "shared"
     export(study, tmp_path / "out", extras=["psych-ds"])
     shutil.move(tmp_path / "out" / "psych-ds", shared)
+    by_chance, named = (tmp_path / "disk" / name for name in ("by chance", "named"))
+    for folder, where in ((by_chance, "materials/honey.mp4"), (named, "results/report.txt")):
+        (folder / "data").mkdir(parents=True)
+        shutil.copy(shared / "dataset_description.json", folder)
+        (folder / where).parent.mkdir()
+        (folder / where).write_bytes(b"\0" + PERSON.encode() + b"\xff")
     foreign = tmp_path / "disk" / "bids"
     (foreign / "data").mkdir(parents=True)
     (foreign / "dataset_description.json").write_text('{"Name": "of another program"}')
@@ -188,7 +194,9 @@ def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, resul
     before = contents(shared)
     done = erase(study, also=[tmp_path])
     assert done.folders == (study,)
-    assert done.left == (f"{shared} is an export with data of {PERSON}: delete it, and make it again",)
+    assert done.left == tuple(
+        f"{one} is an export with data of {PERSON}: delete it, and make it again" for one in (named, shared)
+    )
     assert contents(shared) == before
 
 
