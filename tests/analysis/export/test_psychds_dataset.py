@@ -141,7 +141,6 @@ def test_footage_that_changes_while_it_is_copied_leaves_nothing(tmp_path: Path) 
     assert (to / "materials" / "waves.mp4").read_bytes() == FOOTAGE
 
 
-@pytest.mark.usefixtures("without_report")
 def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path, tmp_path: Path) -> None:
     (tmp_path / "protocols" / "gone.toml").symlink_to(tmp_path / "nowhere.toml")  # another study, not there any more
     export(kitchen, tmp_path / "out", extras=["psych-ds"])
