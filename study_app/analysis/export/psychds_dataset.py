@@ -64,7 +64,8 @@ def _sidecar(study: Study, name: str, columns: tuple[Column, ...]) -> bytes:
 def _settings(study: Study) -> bytes:
     """Return the settings of the analysis, defaults where the study's file has none, and the study that they are of."""
     head = {"name": study.name, "version": study.version, **stated_credits(study)}
-    return _json({**head, "analysis": asdict(study.decided) | (study.protocol.get("analysis") or {})})
+    decided = {name: value for name, value in asdict(study.decided).items() if name not in ("made", "changed")}
+    return _json({**head, "analysis": decided | (study.protocol.get("analysis") or {})})
 
 
 def variables(columns: Mapping[str, tuple[Column, ...]]) -> list[dict[str, Any]]:

@@ -173,3 +173,4 @@ def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path
         assert (named["name"], named["license"], named["citation"]) == ("kitchen", "CC-BY-4.0", "Kox and Lam (2026)")
         assert named["author"] == ["A. Kox", "B. Lam"]
     assert settings["analysis"]["alpha"] == 0.05
+    assert not settings["analysis"].keys() & {"made", "changed"}
