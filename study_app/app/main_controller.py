@@ -21,12 +21,14 @@ from study_app.gui.display.screens import place
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.view import HomePlace
 from study_app.gui.home.workspace import WorkspaceDialog
+from study_app.gui.widgets.background import wait_for_jobs
 from study_app.session.request import NewSession
 from study_app.store.workstation import MachineSettings, create_workspace
 from study_app.viewmodels.help import FIRST_PAGE, PAGES_OF_PLACES
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
 
 LOOK_AFTER_MS = 300  # the window stands by then
+JOBS_PATIENCE_S = 5.0
 
 if TYPE_CHECKING:
     from study_app.app.computer_check import ComputerCheck
@@ -227,6 +229,7 @@ class MainController(QObject):
         self.devices.end(patience.left_s)
         for live in self._called_off:
             live.wait(patience.left_s)
+        wait_for_jobs(min(patience.left_s, JOBS_PATIENCE_S))
 
     def end_by_signal(self, number: int) -> None:
         """End because the program is being ended from outside."""

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
+import weakref
 from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
 LOOK_MS = 10
+_threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
+
+
+def wait_for_jobs(seconds: float) -> None:
+    """Wait for the jobs of every `Background`, so long at most: Python aborts if it ends while one loads a module."""
+    until_s = time.monotonic() + seconds
+    for thread in tuple(_threads):
+        thread.join(max(until_s - time.monotonic(), 0.0))
 
 
 class Background(QObject):
@@ -56,6 +66,7 @@ class Background(QObject):
                 made.put((job, whole, found))
 
         self._thread = threading.Thread(target=work, name="background", daemon=True)
+        _threads.add(self._thread)
         self._thread.start()
         self._look.start()
 

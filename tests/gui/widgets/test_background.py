@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.gui.lab import lab_tank
 from study_app.gui.lab.lab_tank import LabTank
-from study_app.gui.widgets.background import Background
+from study_app.gui.widgets.background import Background, wait_for_jobs
 
 
 def test_only_the_newest_of_what_was_asked_for_comes(qtbot):
@@ -24,6 +24,17 @@ def test_only_the_newest_of_what_was_asked_for_comes(qtbot):
     go_on.set()
     qtbot.waitUntil(lambda: not background.busy)
     assert came == ["third"]
+
+
+def test_the_end_of_the_program_waits_for_jobs_but_not_for_ever():
+    parent = QObject()
+    background, go_on, ended = Background(parent), threading.Event(), []
+    background.run(lambda: ended.append(go_on.wait(10)))
+    wait_for_jobs(0.01)
+    assert ended == []
+    go_on.set()
+    wait_for_jobs(10)
+    assert ended == [True]
 
 
 def test_the_labs_tank_is_painted_beside_the_window(qtbot, monkeypatch):
