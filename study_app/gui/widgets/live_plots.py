@@ -54,7 +54,7 @@ def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = N
 
 
 class Axis(pg.AxisItem):
-    """An axis without a name: to lay out the empty one at each change takes a quarter of the time to make a plot."""
+    """An axis without a label; laying out the empty label took a quarter of the time to make a plot."""
 
     def _updateLabel(self) -> None:  # noqa: N802 - pyqtgraph's name
         self.picture = None

@@ -6,6 +6,7 @@ import itertools
 from typing import Any
 
 import numpy as np
+import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QFontMetricsF
@@ -14,6 +15,17 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot
 
 LIMIT_US = 2000.0
+
+
+def test_axes_lay_out_no_label(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    laid_out = []
+    text_of = pg.AxisItem.labelString
+    monkeypatch.setattr(pg.AxisItem, "labelString", lambda axis: laid_out.append(axis) or text_of(axis))
+    plot = TracePlot(2.5, 1.0)
+    qtbot.addWidget(plot)
+    assert laid_out == []
+    pg.AxisItem("left").setLabel("is counted")
+    assert laid_out
 
 
 def place(name: Any) -> QRectF:
