@@ -205,7 +205,7 @@ def _check_value(value: Any) -> None:
         for part in value:
             _check_value(part)
     elif value is None:
-        raise Refused("a key cannot be empty: remove the key")
+        raise Refused("a value cannot be empty: remove the key")
     elif isinstance(value, str):
         check_encodable(value)
 

@@ -109,7 +109,7 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
     [
         (Unset(("b",)), "there is no b in the study any more"),
         (Set(("a", "b"), 1), "a is not a table"),
-        (Set(("c",), None), "a key cannot be empty"),
+        (Set(("c",), None), "a value cannot be empty: remove the key"),
         (Set(("c",), {"d": "\ud800"}), "half a character"),
         (Duplicate(("a",), "l"), 'the name "l" is taken'),
         (Rename(("a",), "l"), 'the name "l" is taken'),
