@@ -200,7 +200,7 @@ class Design(Table):
 
 
 class JudgementDesign(Design):
-    """One interval that is judged on a scale, by a number or by a setting; no answer is correct."""
+    """Designs whose reply is a scale point, a number or a setting."""
 
     has_standard: ClassVar[bool] = False
     has_correct_answer: ClassVar[bool] = False
