@@ -1,4 +1,4 @@
-"""Errors of the delay over the delay asked for: a panel a screen, loads side by side, half a frame and one marked."""
+"""Errors of the delay over the requested delay: one panel per screen, loads abreast, ½ frame and 1 frame marked."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def text(found: Delayed) -> str:
             rows = [_HEADINGS, *map(_row, trials)]
             widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
             lines += ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-    return "\n".join((*lines, "", *found.promises())) + "\n"
+    return "\n".join((*lines, "", *found.limits())) + "\n"
 
 
 def markdown(found: Delayed) -> str:
@@ -71,8 +71,8 @@ def markdown(found: Delayed) -> str:
             cells = [cell for trial in abreast for cell in (*_errors(trial), f"{trial.late} of {trial.frames}")]
             rows.append([screen, f"{1e3 * abreast[0].delay_s:g}", *cells])
     table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
-    promises = "\n".join(f"- {promise}" for promise in found.promises())
-    return f"{BEGIN}\n\n{_head(found)} Errors in ms.\n\n{table}\n\n{promises}\n\n{END}\n"
+    limits = "\n".join(f"- {limit}" for limit in found.limits())
+    return f"{BEGIN}\n\n{_head(found)} Errors in ms.\n\n{table}\n\n{limits}\n\n{END}\n"
 
 
 def csv_text(found: Delayed) -> str:

@@ -1,8 +1,8 @@
-"""What a participant's picture comes to: how much later than asked for it was shown, delay by delay.
+"""What a participant's picture comes to: how much later than requested it was shown, delay by delay.
 
-The error of a frame is all that lies between the moment that was asked for and what is seen: from the sample that is
-drawn to the end of its painting, or to the surface's swap, less the delay. It holds ``session.runner.SETTLED_S``, which
-is the same at every delay.
+The error of a frame is all that lies between the requested moment and what is seen: from the sample that is drawn to
+the end of its painting, or to the surface's swap, less the delay. It holds ``session.runner.SETTLED_S``, which is the
+same at every delay.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class Shown:
 
     @property
     def late(self) -> int:
-        """How many frames were shown more than a refresh later than asked for."""
+        """How many frames were shown more than a refresh later than requested."""
         return int((self.errors_ms > self.frame_ms).sum())
 
     @property
@@ -124,8 +124,8 @@ class Delayed:
         here = (one for one in self.shown if (one.screen, one.load) == (screen, load))
         return tuple(sorted(here, key=lambda one: one.delay_s))
 
-    def promises(self) -> tuple[str, ...]:
-        """Return what was promised of each screen under each load, and whether it held."""
+    def limits(self) -> tuple[str, ...]:
+        """Return the limits on each screen under each load, and whether they were met."""
         return tuple(self._of(screen, load) for screen in self.screens for load in self.loads)
 
     def _of(self, screen: str, load: LoadName) -> str:
@@ -134,8 +134,8 @@ class Delayed:
         tail = max(one.percentile_ms(TAIL_PERCENT) / one.frame_ms for one in trials)
         means_ms = [one.mean_ms for one in trials]
         return (
-            f"{screen}, {BESIDE[load]}: mean error at most {mean:.2f} of a frame (goal: {MEAN_FRAMES:g}), "
-            f"99th percentile at most {tail:.2f} (goal: {TAIL_FRAMES:g}), "
+            f"{screen}, {BESIDE[load]}: mean error at most {mean:.2f} of a frame (limit: {MEAN_FRAMES:g}), "
+            f"99th percentile at most {tail:.2f} (limit: {TAIL_FRAMES:g}), "
             f"means within {max(means_ms) - min(means_ms):.2f} ms of each other: "
             f"{'met' if all(one.held for one in trials) else 'missed'}"
         )

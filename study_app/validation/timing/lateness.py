@@ -1,4 +1,4 @@
-"""What the loops' lateness comes to: percentiles, ratios to the bare loop, and what was promised of them."""
+"""What the loops' lateness comes to: percentiles, ratios to the bare loop, and whether they are within limits."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ class Lane:
 
 
 @dataclass(frozen=True, slots=True)
-class Promise:
-    """A number that was promised of the servo in a priority class, and what was found; ``said`` has both in words."""
+class Limit:
+    """A limit of the servo in a priority class, and what was found; ``said`` has both in words."""
 
     level: Level
     said: str
@@ -99,11 +99,11 @@ class Timed:
         bare = self.lane("bare", lane.grant.level)
         return lane.late_us(percent) / max(bare.late_us(percent), 1e-3) if bare is not None else float("nan")
 
-    def promises(self) -> tuple[Promise, ...]:
-        """Return what was promised, class by class."""
-        return tuple(promise for level in self.levels for promise in self._of(level))
+    def limits(self) -> tuple[Limit, ...]:
+        """Return the limits and what was found, class by class."""
+        return tuple(limit for level in self.levels for limit in self._of(level))
 
-    def _of(self, level: Level) -> Sequence[Promise]:
+    def _of(self, level: Level) -> Sequence[Limit]:
         servo, bare, thread = (self.lane(kind, level) for kind in ("servo", "bare", "thread"))
         if servo is None or bare is None or thread is None:
             return ()
@@ -115,7 +115,7 @@ class Timed:
             f"(at least {FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
         )
         return tuple(
-            Promise(level, said, held)
+            Limit(level, said, held)
             for said, held in (
                 (
                     f"median {above_us:+.1f} µs against the bare loop (at most +{MEDIAN_US:g} µs)",

@@ -44,7 +44,7 @@ def text(found: Timed) -> str:
     for row in rows:
         cells = (f"{cell:{'<' if column < 2 else '>'}{widths[column]}}" for column, cell in enumerate(row))
         lines.append("  ".join(cells).rstrip())
-    return "\n".join((*lines, "", *map(str, found.promises()), "", *_notes(found))) + "\n"
+    return "\n".join((*lines, "", *map(str, found.limits()), "", *_notes(found))) + "\n"
 
 
 def markdown(found: Timed) -> str:
@@ -52,9 +52,9 @@ def markdown(found: Timed) -> str:
     marks = ("---", "---", *["--:"] * (len(_HEADINGS) - 2))
     rows = [_HEADINGS, marks, *(_row(found, lane) for lane in found.lanes)]
     table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
-    promises = "\n".join(f"- {promise}" for promise in found.promises())
+    limits = "\n".join(f"- {limit}" for limit in found.limits())
     notes = " ".join(f"{note[0].upper()}{note[1:]}." for note in _notes(found))
-    return f"{BEGIN}\n\n{_head(found)} Lateness in µs.\n\n{table}\n\n{promises}\n\n{notes}\n\n{END}\n"
+    return f"{BEGIN}\n\n{_head(found)} Lateness in µs.\n\n{table}\n\n{limits}\n\n{notes}\n\n{END}\n"
 
 
 def csv_text(found: Timed) -> str:

@@ -72,16 +72,16 @@ def test_missed_are_refreshes_that_brought_no_frame_and_jitter_is_none():
         (np.full(1000, -8.4), False),
     ],
 )
-def test_each_promise_can_be_missed(errors_ms, held):
+def test_each_limit_can_be_missed(errors_ms, held):
     assert shown(errors_ms).held == held
-    (said,) = found(shown(errors_ms)).promises()
+    (said,) = found(shown(errors_ms)).limits()
     assert said.endswith("met" if held else "missed")
 
 
 def test_one_trial_that_missed_it_is_enough():
-    promises = found(*WELL.shown, shown(np.full(200, 9.0), hz=60.0, delay_s=0.1, load="gui+cpu")).promises()
-    assert [said.rsplit(": ", 1)[1] for said in promises] == ["met", "missed", "met", "met"]
-    assert "means within 6.00 ms of each other" in promises[1]
+    limits = found(*WELL.shown, shown(np.full(200, 9.0), hz=60.0, delay_s=0.1, load="gui+cpu")).limits()
+    assert [said.rsplit(": ", 1)[1] for said in limits] == ["met", "missed", "met", "met"]
+    assert "means within 6.00 ms of each other" in limits[1]
 
 
 def test_trials_come_from_the_shortest_delay_to_the_longest():
@@ -98,11 +98,11 @@ def test_the_csv_holds_every_trial_once_in_ms_and_in_frames():
     assert float(fast["error_p99_frames"]) == pytest.approx(0.432)
 
 
-def test_text_and_markdown_have_every_trial_and_every_promise():
+def test_text_and_markdown_have_every_trial_and_every_limit():
     said, table = text(WELL), markdown(WELL)
-    for promise in WELL.promises():
-        assert promise in said
-        assert promise in table
+    for limit in WELL.limits():
+        assert limit in said
+        assert limit in table
     assert said.count(" 0 of 200") == 8
     assert table.startswith(BEGIN)
     assert table.rstrip().endswith(END)

@@ -201,7 +201,7 @@ def test_a_race_times_every_loop_in_every_class_it_is_granted():
     assert [one.kind for one in raced.lanes][:4] == ["servo", "bare", "thread", "qt"]
     assert {one.ticks for one in raced.lanes} == {500}
     assert all((one.lateness_ns >= 0).all() for one in raced.lanes)
-    assert len(raced.promises()) == 4 * len(levels)
+    assert len(raced.limits()) == 4 * len(levels)
     assert lines[-1] == "100 %"
     assert raced.frames_hz is None
     assert not any(thread.name in {"servo", "timed"} for thread in threading.enumerate())
@@ -279,9 +279,9 @@ def test_a_deadline_that_was_passed_over_is_one_over_1_ms_late():
     assert one.late_share == pytest.approx(3 / 5)
 
 
-def test_promises_are_held():
-    assert [promise.held for promise in WELL.promises()] == [True] * 4
-    assert "normal: 0 ticks over 1 ms late, 100 fewer than with a Python thread" in str(WELL.promises()[2])
+def test_limits_are_met():
+    assert [limit.held for limit in WELL.limits()] == [True] * 4
+    assert "normal: 0 ticks over 1 ms late, 100 fewer than with a Python thread" in str(WELL.limits()[2])
 
 
 @pytest.mark.parametrize(
@@ -293,13 +293,13 @@ def test_promises_are_held():
         (lane("servo", NORMAL, STEADY, busy_us=np.where(np.arange(1000) < 20, 6.0, 1.0)), 3),
     ],
 )
-def test_each_promise_can_be_missed(servo, missed):
-    promises = found(servo, *WELL.lanes[1:]).promises()
-    assert [promise.held for promise in promises] == [number != missed for number in range(4)]
-    assert str(promises[missed]).endswith("missed")
+def test_each_limit_can_be_missed(servo, missed):
+    limits = found(servo, *WELL.lanes[1:]).limits()
+    assert [limit.held for limit in limits] == [number != missed for number in range(4)]
+    assert str(limits[missed]).endswith("missed")
 
 
-def test_the_text_has_every_loop_and_every_promise():
+def test_the_text_has_every_loop_and_every_limit():
     said = text(WELL)
     for words in ("this servo", "bare compiled loop", "Python thread", "Qt timer", "a machine, 2 cores", "met"):
         assert words in said
