@@ -1,4 +1,4 @@
-"""Modules that are loaded in a thread while a window is shown, so that no click waits for them."""
+"""Modules that are loaded in a thread while the home window is shown, so that no click waits for them."""
 
 from __future__ import annotations
 
@@ -20,13 +20,3 @@ def preload_lab_and_designer() -> InitialSettings:
 
     gc.freeze()  # the windows' thread need not look through all that was loaded here
     return first
-
-
-def load_windows() -> None:
-    """Load what a session's windows need while the note is shown: modules, and versions, read from the disk once."""
-    import study_app.app.session.preflight_controller  # noqa: PLC0415
-    import study_app.app.session.session_windows  # noqa: PLC0415
-    import study_app.store.receipt  # noqa: PLC0415
-    import study_app.store.recording_writer  # noqa: PLC0415 - and pyarrow, which the recorder is made with
-
-    study_app.store.receipt.versions()

@@ -21,8 +21,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices_controller import diagnosis
-from study_app.app.preloading import load_windows
 from study_app.app.session.garbage_collection import unfreeze_garbage
+from study_app.app.session.preloading import load_windows
 from study_app.app.session.termination import BY_SIGNAL_S
 from study_app.app.workstation_controller import described, screen_number, settings_here, text_scale_on
 from study_app.authoring.versions.contents import keep_content
