@@ -16,6 +16,7 @@ from study_app.protocol.groups.group import sequences_in
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.line_numbers import Places, places_of
 from study_app.protocol.wording.languages import LANGUAGES, language_name
+from study_app.viewmodels.designer.element_facts import brief
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
 from study_app.viewmodels.designer.special import FACTS
 from study_app.viewmodels.designer.special.questions import QuestionLines, question_lines
@@ -59,6 +60,8 @@ class FormRow:
         What a list holds, or what references name.
     target : tuple of str or int or None
         What a reference names.
+    notes : tuple of (str, str)
+        Elements that a reference can name, each with its `brief` fact.
     number : int or None
         Of alternatives ("either"), which one the value is.
     instead : tuple of (str, str)
@@ -73,6 +76,7 @@ class FormRow:
     languages: tuple[tuple[str, str], ...] = ()
     entries: tuple[Entry, ...] = ()
     target: Path | None = None
+    notes: tuple[tuple[str, str], ...] = ()
     number: int | None = None
     instead: tuple[tuple[str, str], ...] = ()
     facts: Any = None
@@ -308,9 +312,17 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         tuple((code, language_name(code)) for code in codes) if row.kind in {"localised", "paragraphs"} else (),
         tuple(_entries(study, row)),
         named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
+        tuple(_notes(document, row)),
         number,
         facts=facts.of(study, row) if (facts := FACTS.get((row.model, str(path[-1])))) is not None else None,
     )
+
+
+def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:
+    if row.kind == "reference":
+        for choice in row.choices:
+            facts = (brief(document, (section, str(choice.value))) for section in row.sections)
+            yield str(choice.value), next(filter(None, facts), "")
 
 
 def _entries(study: Study, row: Row) -> Iterator[Entry]:

@@ -10,6 +10,7 @@ from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.edited_study import Study
 from study_app.authoring.outline import Element, found, outline
 from study_app.protocol.source.document import Path, entries, names, value_at
+from study_app.viewmodels.designer.element_facts import brief
 from study_app.viewmodels.number_words import minutes
 
 ICONS: Final = {
@@ -40,7 +41,7 @@ class OutlineRow:
     path : tuple of str or int
         The element; () for the heading of a section.
     title, icon, note : str
-        What it is called, the name of its icon, and a word at its right: a time, or a count.
+        What it is called, the name of its icon, and a word at its right: a time, a count, or its `brief` fact.
     depth : int
         How far it is below the heading of its section.
     faults : int
@@ -96,8 +97,10 @@ def icon_of(path: Path, document: Mapping[str, Any]) -> str:
 
 def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_session: bool) -> OutlineRow:
     path, note, kind = element.path, "", str(element.path[0])
-    if in_session:
-        note = minutes(times_s[element.id]) if element.depth == 0 and element.id in times_s else ""
+    if in_session and element.depth == 0:
+        note = minutes(times_s[element.id]) if element.id in times_s else ""
+    elif in_session:
+        note = brief(study.document, path)
     elif element.depth == 0 and kind in SECTIONS_OF_TABLES:
         count = len(names(study.document, kind))
         note = str(count) if count else "none"
@@ -107,7 +110,7 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
         note = f"{limit:g} N"
     faults = f"{element.faults} problem{'s' * (element.faults > 1)}" if element.faults else ""
     sort = singular(kind) if len(path) == 2 else "question" if "items" in path else ""
-    spoken, at = _spoken(note) if in_session else note, ""
+    spoken, at = _spoken(note) if in_session and element.depth == 0 else note, ""
     if element.step and isinstance(element.step[-1], int):
         count = len(_at(study.document, element.step[:-1]))
         at = f"{'question' if 'items' in path else 'step'} {element.step[-1] + 1} of {count}"

@@ -193,7 +193,7 @@ class ChoiceField(Field):
         shown = row.default if row.value is None else row.value
         values = [(choice.value, self.words(choice)) for choice in row.choices]
         if row.kind == "reference":
-            values = [(choice.value, str(choice.value)) for choice in row.choices]
+            values = [(name, f"{name} ({note})" if note else name) for name, note in self.row.notes]
         if self.segments is not None:
             plain = [(choice.value, choice_words(choice, None)) for choice in row.choices]
             self.segments.show_values(plain, shown)
