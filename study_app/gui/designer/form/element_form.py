@@ -8,6 +8,7 @@ from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
+from study_app.gui.designer.form.caret import Caret
 from study_app.gui.designer.form.entry_list import EntryList
 from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.form_foot import FormFoot
@@ -117,6 +118,7 @@ class FormCard(Card):
         focused = None
         if held is not None and before is not None:
             focused = (*form.path, *held.row.row.path[len(before.path) :])
+        caret = None if held is None else Caret.of(held.focusWidget())
         down_px = 0 if before is None else self.area.verticalScrollBar().value()
         self._focused = None
         self.flush()
@@ -139,7 +141,7 @@ class FormCard(Card):
         self.area.verticalScrollBar().setValue(down_px)
         QTimer.singleShot(0, self.area, lambda: self._settle(down_px, other=before is None))
         if focused is not None:
-            self.focus(focused)
+            self.focus(focused, caret)
 
     def _settle(self, down_px: int, *, other: bool) -> None:
         """Scroll once the editors have their places: in another element to the row that got the keyboard meanwhile."""
@@ -302,13 +304,15 @@ class FormCard(Card):
             if isinstance(part, TypedLine | TypedText):
                 part.flush()
 
-    def focus(self, path: tuple[str | int, ...]) -> bool:
-        """Give the keyboard to the row of a place, and scroll to it; return whether there is one."""
+    def focus(self, path: tuple[str | int, ...], caret: Caret | None = None) -> bool:
+        """Give the keyboard to the row of a place, or to an editor in it, and scroll; return whether there is one."""
         inner = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
         found = max(inner, key=lambda row: len(row.row.row.path), default=None)
         if found is None:
             return False
         found.field.take_keyboard()
+        if caret is not None:
+            caret.put_into(found)
         self._come(found)
         self._reveal(found)
         return True
