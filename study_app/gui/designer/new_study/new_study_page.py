@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
@@ -61,6 +63,8 @@ class NoStudyCard(Card):
             apply_theme_within(made, self.theme)
             self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignHCenter)
             self.drafts.append(made)
+        for before, after in pairwise((*self.drafts, self.new)):
+            QWidget.setTabOrder(before, after)
 
 
 class ChosenCard(Card):
@@ -256,6 +260,8 @@ class NewStudyPage(Themed, QWidget):
         column.addStretch()
         apply_theme_within(inside, self.theme)
         replace_inside(self.area, inside)
+        for before, after in pairwise((self.file, *self.buttons)):  # as they are read: made later, they come last
+            QWidget.setTabOrder(before, after)
         self.refuse("")
         first = next((button for button in self.buttons if button.choice.source == chosen), self.buttons[0])
         first.setChecked(True)
@@ -286,9 +292,11 @@ class NewStudyPage(Themed, QWidget):
             self.begin_asked.emit(chosen.source, self.card.questions.short_name(), answers)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Begin at Enter on a language, as in the fields."""
+        """Begin at Enter on a language, as in the fields; go back at Esc."""
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and isinstance(self.focusWidget(), Check):
             self._begin()
+        elif event.key() == Qt.Key.Key_Escape:
+            self.given_up.emit()
         else:
             super().keyPressEvent(event)
 
