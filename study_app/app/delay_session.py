@@ -9,6 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -181,7 +182,7 @@ class _Showing:
                 plan = self._protocol, schedule, FIRST
                 rate_hz = self._refresh_hz or screens[0].refreshRate()
                 bridge = connect_windows(self._chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz)
-                for _ in show_windows(bridge, *screens):
+                for _ in show_windows(bridge, partial(choose_screens, self._chosen.screen)):
                     pass
                 self._size(bridge)
                 self._run(bridge)

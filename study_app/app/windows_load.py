@@ -185,7 +185,6 @@ class Painting(QObject):
         )
         participant = ParticipantWindow(words("en"), clock=time.monotonic, windowed=shown_on is operated_on)
         place(operator, operated_on, corner=shown_on is operated_on)
-        self._shown_on = shown_on
         task = Explore(kind="explore", min_s=0.0, max_s=3600.0, instruction="The servo is being timed.")
         self._page = TaskPage(1, "The servo is being timed.", task, protocol.device.workspace_m, 0.0034, None)
         return participant, operator
@@ -193,7 +192,7 @@ class Painting(QObject):
     def begin(self) -> None:
         """Open the windows and paint from now on."""
         self.operator.show()
-        self.participant.open_on(self._shown_on)
+        self.participant.open_on(choose_screens(None)[0])
         self.participant.show_page(self._page)
         self._began_ns = time.monotonic_ns()
         for timer in self._timers:

@@ -29,7 +29,7 @@ from study_app.authoring.versions.contents import keep_content
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.errors import SessionError, StoreError, StudyError
-from study_app.gui.display.screens import choose_screens, place
+from study_app.gui.display.screens import choose_screens, place, screen_shown
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.theme.theme import Theme
 from study_app.gui.widgets.dialogs import Notice
@@ -207,8 +207,8 @@ class LiveSession(QObject):
         """Show the operator what was found; the session begins when that is accepted."""
         from study_app.app.session.preflight_controller import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
-        shown_on, _ = self.screens()
-        asked = Preflight(self.chosen, self.chosen.read_protocol(), made, shown_on, self.chosen.who, self.theme)
+        screen = screen_shown(self.screens()[0])
+        asked = Preflight(self.chosen, self.chosen.read_protocol(), made, screen, self.chosen.who, self.theme)
         asked.started.connect(self._open_windows)
         asked.failed.connect(self._open_windows)
         asked.cancelled.connect(self.cancel)
@@ -225,10 +225,13 @@ class LiveSession(QObject):
         chosen, rig = self.chosen, made.rig
         source = chosen.read_source()
         protocol = parse(source, chosen.source)
-        shown_on, operated_on = self.screens()
-        found = checks(made.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()), protocol)
+        shown_on, operated_on = (
+            self.screens()
+        )  # for this step alone: PySide deletes the objects of screens with windows
+        rate_hz, shares_screen = shown_on.refreshRate(), shown_on is operated_on
+        found = checks(made.facts_with(rate_hz, shown_on.devicePixelRatio()), protocol)
         self._pass_checks(found)
-        screens = described(self.settings, shown_on, operated_on)
+        screens, text_scale = described(self.settings, shown_on, operated_on), text_scale_on(self.settings, shown_on)
         yield
         operator = session_windows.make_cockpit(chosen, protocol, rig, self.theme)
         self._windows.append(operator)
@@ -236,8 +239,8 @@ class LiveSession(QObject):
         participant = session_windows.make_participant_window(
             chosen,
             self._seconds,
-            shares_screen=shown_on is operated_on,
-            text_scale=text_scale_on(self.settings, shown_on),
+            shares_screen=shares_screen,
+            text_scale=text_scale,
             photodiode=self.settings.photodiode,
         )
         self._windows.append(participant)
@@ -250,7 +253,6 @@ class LiveSession(QObject):
         self._crash_trace = CrashTrace(store.folder.crash)
         store.append("preflight", checks=[one.entry for one in found])
         plan = session_windows.planned(chosen, protocol, store)
-        rate_hz = shown_on.refreshRate()
         self.bridge = session_windows.connect_windows(
             chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz, videos=made.videos
         )
@@ -260,7 +262,7 @@ class LiveSession(QObject):
         yield
         self.bridge.start()  # before its windows are shown: nothing can be asked of a session that has not begun
         yield
-        yield from session_windows.show_windows(self.bridge, *self.screens(), played=chosen.played)
+        yield from session_windows.show_windows(self.bridge, self.screens, played=chosen.played)
         self._close_note()
         self._close_preflight()
 

@@ -9,13 +9,12 @@ from datetime import datetime
 from typing import NamedTuple
 
 from PySide6.QtCore import QObject, QTimer, Signal
-from PySide6.QtGui import QScreen
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
 from study_app.evaluation.appraisal import Costs, Errors
 from study_app.evaluation.appraisal_worker import Question, start_appraisal_worker
-from study_app.gui.display.screens import place
+from study_app.gui.display.screens import ScreenShown, place
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.theme.theme import Theme
 from study_app.haptics.model.device_dynamics import Dynamics
@@ -107,7 +106,7 @@ class Preflight(QObject):
     _measured = Signal(object)
 
     def __init__(
-        self, chosen: NewSession, protocol: Protocol, ready: Ready, screen: QScreen, who: str, theme: Theme
+        self, chosen: NewSession, protocol: Protocol, ready: Ready, screen: ScreenShown, who: str, theme: Theme
     ) -> None:
         super().__init__()
         self._chosen, self._protocol, self._ready, self._screen = chosen, protocol, ready, screen
@@ -150,7 +149,7 @@ class Preflight(QObject):
     def _facts(self) -> Facts:
         found = self.appraisal
         return replace(
-            self._ready.facts_with(self._screen.refreshRate(), self._screen.devicePixelRatio()),
+            self._ready.facts_with(self._screen.refresh_hz, self._screen.scaling),
             tick_s=found.tick_s,
             withheld=found.withheld,
         )

@@ -142,14 +142,18 @@ def connect_windows(
 
 
 def show_windows(
-    bridge: SessionBridge, shown_on: QScreen, operated_on: QScreen, *, played: bool = False
+    bridge: SessionBridge, screens: Callable[[], tuple[QScreen, QScreen]], *, played: bool = False
 ) -> Iterator[None]:
-    """Show both windows on their screens, one after the other; of a session that is played the participant's alone."""
+    """Show both windows on their screens, one after the other; of a session that is played the participant's alone.
+
+    ``screens`` returns the participant's and the operator's screen; it is called in each step.
+    """
     if not played:
+        shown_on, operated_on = screens()
         place(bridge.operator, operated_on, corner=shown_on is operated_on)
         bridge.operator.show()
         yield
-    bridge.participant.open_on(shown_on)
+    bridge.participant.open_on(screens()[0])
 
 
 def _reconnecting(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any]]:

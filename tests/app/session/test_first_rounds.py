@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import shiboken6
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.session import live_session
 from study_app.app.session.bridge import SessionBridge
@@ -70,4 +71,29 @@ def test_it_pauses_a_session_that_can_be_resumed(
     (journal,) = (tmp_path / "results").rglob("journal.jsonl")
     recorded = [json.loads(line)["event"] for line in journal.read_text().splitlines()]
     assert recorded[: 3 + len(events)] == ["session_started", "preflight", "page_shown", *events]
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+class ScreensDeleted(LiveSession):
+    """A session in which PySide deletes its objects of the screens with a window, between any two steps."""
+
+    def _step(self) -> None:
+        super()._step()
+        asked = QWidget()
+        asked.screen()
+        shiboken6.delete(asked)
+
+
+def test_windows_deleted_while_a_session_opens_take_no_screen_from_it(
+    qtbot: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(live_session, "checks", lambda *_: ())
+    session = ScreensDeleted(replace(CHOSEN, results=tmp_path / "results"), LIGHT)
+    session.open()
+    qtbot.waitUntil(
+        lambda: (session.bridge is not None and session.bridge.participant.isVisible()) or session.code != 0,
+        timeout=60_000,
+    )
+    assert (session.code, session.error) == (0, None)
+    session.end_by_signal(15)
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

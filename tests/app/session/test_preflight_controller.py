@@ -17,6 +17,7 @@ from study_app.app.session.preflight_controller import Appraisal, Preflight
 from study_app.errors import DeviceLost
 from study_app.evaluation.appraisal import Costs, Errors
 from study_app.evaluation.appraisal_worker import Question
+from study_app.gui.display.screens import screen_shown
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.clocks.grants import NO_THREAD
@@ -85,7 +86,7 @@ def machine(monkeypatch: Any) -> Machine:
 
 @pytest.fixture
 def asked(qapp: Any, machine: Any) -> Any:
-    screen = QGuiApplication.primaryScreen()
+    screen = screen_shown(QGuiApplication.primaryScreen())
     made = Preflight(CHOSEN, load("demo"), Ready(machine, FACTS), screen, "Participant P001", LIGHT)
     made.open()
     yield made
@@ -132,7 +133,7 @@ class ConnectedLater:
 
 def test_a_recording_program_that_is_connected_meanwhile_is_shown(qapp: Any, machine: Any, qtbot: Any) -> None:
     outlets: Any = ConnectedLater()
-    screen = QGuiApplication.primaryScreen()
+    screen = screen_shown(QGuiApplication.primaryScreen())
     made = Preflight(CHOSEN, load("demo"), Ready(machine, FACTS, outlets=outlets), screen, "P001", LIGHT)
     made.open()
 
@@ -151,7 +152,7 @@ def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_c
     qapp: Any, machine: Any, monkeypatch: Any, qtbot: Any
 ) -> None:
     found = replace(FACTS, dynamics=Dynamics(0.0004, 20e-6, 0.3), delay_ticks=1)
-    screen = QGuiApplication.primaryScreen()
+    screen = screen_shown(QGuiApplication.primaryScreen())
     made = Preflight(CHOSEN, load("demo"), Ready(machine, found), screen, "Participant P001", LIGHT)
     first: Any = made.appraisal.appraiser
     assert first.devices == [Dynamics(0.001, 20e-6, 0.3)]
