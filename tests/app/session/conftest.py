@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QEvent
+from PySide6.QtCore import QCoreApplication, QEvent, QTimer
 from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
@@ -24,6 +24,8 @@ from study_app.store.progress import Progress
 from study_app.viewmodels.operator import Session
 from study_app.viewmodels.session.stages import stages
 from tests.app.world import World
+
+PATIENCE_MS = 150_000  # less than pytest's timeout
 
 
 @pytest.fixture
@@ -88,8 +90,15 @@ def bridge(make):
 
 @pytest.fixture
 def nobody_stays():
-    """Let no simulated person of one test look at the windows of the next."""
+    """Let no simulated person of one test look at the windows of the next, and no window wait for ever.
+
+    The timeout of pytest raises in a slot, where it ends no event loop.
+    """
+    late = QTimer(singleShot=True, interval=PATIENCE_MS)
+    late.timeout.connect(lambda: QCoreApplication.exit(1))
+    late.start()
     yield
+    late.stop()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
