@@ -38,6 +38,7 @@ from study_app.viewmodels.home import StudyFacts
 from study_app.workspace import workspace
 
 FRAME = 60  # of a window, at most
+ROW_HINT = "the session takes that participant's row of the square; empty: its own row"
 
 
 class NewSessionDialog(QDialog):
@@ -186,14 +187,7 @@ class NewSessionDialog(QDialog):
         folder = field_with_button(self.results, change)
         add_field(grid, 10, 0, "Results folder of this study", folder, hint=self.where, across=2)
         if self.facts.protocol.assigns_rows:
-            add_field(
-                grid,
-                12,
-                0,
-                "Replaces participant",
-                self.row_of,
-                hint="whose row of the square is used; empty: the own row",
-            )
+            add_field(grid, 12, 0, "Replaces participant", self.row_of, hint=ROW_HINT, across=2)
         grid.addWidget(self.device_options, 14, 0, 1, 2)
         self._area = scrolled(self._inside)
         column.addWidget(self._area, 1)

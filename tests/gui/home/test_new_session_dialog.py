@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.home import new_session_dialog
@@ -322,7 +322,10 @@ def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, results, 
     dialog = NewSessionDialog(study_facts(str(study)), results)
     qtbot.addWidget(dialog)
     dialog.open()
+    settle(qtbot, dialog)
     assert dialog.row_of.isVisible()
+    for part in dialog.findChildren(QWidget):  # no part is wider than there is room for
+        assert not part.isVisible() or part.visibleRegion().boundingRect().width() == part.width(), part
     assert dialog.chosen().row_of is None
     qtbot.keyClicks(dialog.row_of, "P002")
     assert dialog.begin.isEnabled()
