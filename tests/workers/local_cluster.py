@@ -50,8 +50,11 @@ def local_cluster() -> Iterator[tuple[str, psutil.Process]]:
 
 def main() -> None:
     """Serve until standard input ends."""
+    import dask
     from distributed import LocalCluster
 
+    # Idle, its processes would look at themselves 50 and 100 times a second until the last test has ended.
+    dask.config.set({"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "500ms"})
     with LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None, worker_dashboard_address=None
     ) as cluster:

@@ -92,19 +92,20 @@ def test_two_models_do_not_share_memory():
     assert not second.model.state[0].position_m.any()
 
 
+@njit
+def run(model, safety, sample, positions_m, ticks):
+    for k in range(ticks):
+        sample.time_ns += 1_000_000
+        sample.fresh = k % 7 != 0
+        for axis in range(3):
+            sample.position_m[axis] = positions_m[k % len(positions_m), axis]
+        tick(model, safety, sample)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="the interpreter allocates all the time")
 @pytest.mark.parametrize("felt", [Scene(), *SCENES.values()], ids=["rest", *SCENES])
 def test_hazard_18_no_tick_allocates_so_no_collection_can_pause_it(felt):
-    @njit
-    def run(model, safety, sample, positions_m, ticks):
-        for k in range(ticks):
-            sample.time_ns += 1_000_000
-            sample.fresh = k % 7 != 0
-            for axis in range(3):
-                sample.position_m[axis] = positions_m[k % len(positions_m), axis]
-            tick(model, safety, sample)
-
     def allocations(ticks):
         before = rtsys.get_allocation_stats()
         run(model, safety[0], sample[0], positions_m, ticks)
