@@ -108,7 +108,7 @@ def opened_adaptive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     def make(folder: Path) -> None:
         (folder / "adaptive.toml").write_text(text_of_damper("adaptive", ADAPTIVE, (4, 8)))
-        study = rehearse(folder / "adaptive.toml", participants=3, seed=1, results=folder / "study", recordings=False)
+        study = rehearse_answers(folder / "adaptive.toml", participants=3, seed=1, results=folder / "study", felt={})
         assert unblind(study, "AB", "to analyse").left == ()
 
     return once(tmp_path_factory, "adaptive", make) / "study"
