@@ -103,11 +103,11 @@ def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
     return tuple(one for one in found if removes(study, fault, one))
 
 
-def duplicated(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:
+def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that copy an element right after itself, as one step, and the path of the copy.
 
-    The copy has the next free name and code letter, and a place in the session where it needs one. Its texts are those
-    of the original.
+    The copy has the name ``wanted``, or the next free one, the next free code letter, and a place in the session where
+    it needs one. Its texts are those of the original.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def duplicated(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:
         if isinstance(name, str):
             edits.append(Set((*copy, "id"), free_name(filter(None, taken), name)))
     else:
-        copy = (*path[:-1], free_name(names(study.document, str(path[0])), str(name)))
+        copy = (*path[:-1], wanted or free_name(names(study.document, str(path[0])), str(name)))
         edits = [Duplicate(path, str(copy[-1]))]
     return (*edits, *fitted(study, study.edited(*edits)[0], copy)), copy
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -35,6 +36,9 @@ _OF_NUMBERS: Final = {
     "maximum": "at most {}",
     "exclusiveMaximum": "less than {}",
 }
+_HOLDS: Final = {
+    "minimum": operator.ge, "exclusiveMinimum": operator.gt, "maximum": operator.le, "exclusiveMaximum": operator.lt,
+}  # fmt: skip
 _OF_LENGTHS: Final = {
     "minItems": "at least {} entries",
     "maxItems": "at most {} entries",
@@ -231,6 +235,15 @@ def _bounds(node: Node, numbers: Node) -> tuple[str, ...]:
     if "prefixItems" not in node:
         words += [phrase.format(node[key]) for key, phrase in _OF_LENGTHS.items() if key in node]
     return (*words, rule_of(node["pattern"])) if "pattern" in node else tuple(words)
+
+
+def why_not(document: Mapping[str, Any], row: Row, number: float) -> str:
+    """Return what the number of a row must be and this one is not, such as "at most 8"; "" where it is permitted."""
+    node = node_at(document, row.path)[0]
+    if row.kind == "whole number" and not isinstance(number, int):
+        return "a whole number"
+    broken = (key for key, holds in _HOLDS.items() if key in node and not holds(number, node[key]))
+    return next((_OF_NUMBERS[key].format(shown(node[key])) for key in broken), "")
 
 
 def label_of(step: str | int) -> str:

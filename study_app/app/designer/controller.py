@@ -21,6 +21,7 @@ from study_app.app.designer.participant.preview import ParticipantPreview
 from study_app.app.designer.play.playing import Playing
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.app.designer.saving import Saving
+from study_app.app.designer.series import SeriesPrompts
 from study_app.app.designer.versions.changes_controller import ChangesController
 from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.app.designer.versions.renaming import Renaming
@@ -64,6 +65,7 @@ class DesignerController(QObject):
         self.playing = Playing(editing, place)
         self.feeling = Feeling(editing, place)
         Clipboard(editing, place)
+        SeriesPrompts(editing, place)
         Renaming(editing, place, self.runs)
         self._others: dict[Path, OpenStudy] = {}
         self._warnings: tuple[str, ...] = ()

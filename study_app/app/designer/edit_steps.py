@@ -17,6 +17,7 @@ from study_app.app.designer.element_steps import (
     move,
     move_to,
     paste,
+    series,
 )
 from study_app.authoring.additions import added
 from study_app.authoring.changes.initial_values import initial, singular
@@ -37,6 +38,7 @@ from study_app.viewmodels.designer.requests import (
     DeleteElement,
     DuplicateElement,
     DuplicateEntries,
+    MakeSeries,
     MoveElement,
     MoveEntries,
     MoveTo,
@@ -127,7 +129,7 @@ class Steps:
 
 _OF_ELEMENTS: Final[Mapping[type, Callable[[Study, Any], Step]]] = {
     AddNamed: add_named, AddInstrument: add_instrument, ChangeLanguage: change_language, DuplicateElement: duplicate,
-    MoveElement: move, MoveTo: move_to, Paste: paste, DeleteElement: delete,
+    MoveElement: move, MoveTo: move_to, Paste: paste, DeleteElement: delete, MakeSeries: series,
 }  # fmt: skip
 
 

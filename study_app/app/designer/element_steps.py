@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from study_app.authoring.additions import added, duplicated, fitted
@@ -11,6 +11,7 @@ from study_app.authoring.changes.fragments import pasted
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import filled_in, languages_of, with_language, without_language
 from study_app.authoring.changes.moves import moved
+from study_app.authoring.changes.series import first_edits, members, next_edits, number_row
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.names import deletions, free_name, named_at, references_to, replaced, with_references
@@ -30,10 +31,12 @@ from study_app.viewmodels.designer.requests import (
     ChangeLanguage,
     DeleteElement,
     DuplicateElement,
+    MakeSeries,
     MoveElement,
     MoveTo,
     Paste,
 )
+from study_app.viewmodels.sessions import counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +127,23 @@ def duplicate(study: Study, asked: DuplicateElement) -> Step:
         now, _ = now.edited(*made)
     words = f"Duplicate {_titles(study, (asked.path, *asked.also))}"
     return Step(words, edits, copies[0] if len(copies) > 1 else copies[-1], several=tuple(copies))
+
+
+def series(study: Study, asked: MakeSeries) -> Step:
+    """Return the step that makes an element the first of a series, and its copies right after it."""
+    row = number_row(study.document, asked.path, asked.field)
+    first, *others = members(study, asked.path, row, asked.values)
+    edits, path = first_edits(study, asked.path, row, first)
+    now, _ = study.edited(*edits)
+    made = [path]
+    for one in others:
+        more, copy = next_edits(now, made[-1], replace(row, path=(*made[-1], *asked.field[2:])), one)
+        more = _beside(now, more, made[-1], copy)
+        now, _ = now.edited(*more)
+        edits, made = (*edits, *more), [*made, copy]
+    words = f"Make {counted(len(made), singular(path[0]))} of {title_of(study.document, asked.path)}"
+    said = ", ".join(title_of(now.document, one) for one in made)
+    return Step(words, edits, path, several=tuple(made), said=said)
 
 
 def _copied(study: Study, path: Path) -> tuple[tuple[Edit, ...], Path]:

@@ -1,19 +1,21 @@
-"""Questions as cards in the place: what to do with what names a deleted element."""
+"""Questions as cards in the place: what to do with what names a deleted element, and the values of a series."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.prompts import DeletePrompt
-from study_app.viewmodels.designer.requests import DeleteElement
+from study_app.viewmodels.designer.outline_rows import ElementPath
+from study_app.viewmodels.designer.prompts import DeletePrompt, SeriesPlan, SeriesPrompt
+from study_app.viewmodels.designer.requests import DeleteElement, MakeSeries
 
 HIGHEST = 560
+PLAN_PX, LINE_PX = 190, 18
 
 
 class Prompt(Card):
@@ -82,3 +84,75 @@ class DeleteCard(Prompt):
         self.column.addLayout(self.buttons)
         self.other.setVisible(bool(asked.others))
         self.first: QWidget = self.all
+
+
+class SeriesCard(Prompt):
+    """Which number of an element differs in a series, its values, and what will be made.
+
+    ``typed`` carries the number and the values so far.
+    """
+
+    typed = Signal(object, str)
+
+    def __init__(self, asked: SeriesPrompt) -> None:
+        super().__init__(
+            f"Series of {asked.title}",
+            f"{asked.title} gets the first value; each other value makes a copy, listed in the same blocks.",
+        )
+        self.asked, self.plan = asked, SeriesPlan()
+        self.number = Choice()
+        self.number.setFont(font("label"))
+        self.number.setAccessibleName("Number that differs")
+        self.number.addItems([words for _, words in asked.fields])
+        self.values = QLineEdit()
+        self.values.setFont(font("body"))
+        self.values.setAccessibleName("Values of the series")
+        self.values.setPlaceholderText("Values, such as 0 60 120 240")
+        line = QHBoxLayout()
+        line.setSpacing(10)
+        line.addWidget(self.number)
+        line.addWidget(self.values, 1)
+        self.column.addLayout(line)
+        self.refusal = label("", "label", "bad", wraps=True)
+        self.column.addWidget(self.refusal)
+        self.lines = label("", "label")
+        self.lines.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setWidget(self.lines)
+        self.column.addWidget(self.area, 1)
+        self.make = ActionButton("bars", "", role="primary", height=40)
+        self.make.clicked.connect(self._make)
+        self.buttons.addWidget(self.make)
+        self.column.addLayout(self.buttons)
+        self.values.textEdited.connect(lambda _text: self._type())
+        self.values.returnPressed.connect(self._make)
+        self.number.activated.connect(lambda _at: self._type())
+        self.show_plan(self.plan)
+        self.first: QWidget = self.values
+
+    def show_plan(self, plan: SeriesPlan) -> None:
+        """Show what will be made, or why it cannot be."""
+        self.plan = plan
+        self.refusal.setText(plan.refusal)
+        self.refusal.setVisible(bool(plan.refusal))
+        self.values.setAccessibleDescription(plan.refusal)
+        self.lines.setText("\n".join(plan.lines))
+        self.area.setVisible(bool(plan.lines))
+        self.area.setFixedHeight(min(PLAN_PX, LINE_PX * len(plan.lines) + 8))
+        self.make.show_action("bars", plan.make)
+        self.make.setEnabled(bool(plan.lines))
+
+    def _type(self) -> None:
+        self.typed.emit(self._field, self.values.text())
+
+    @property
+    def _field(self) -> ElementPath:
+        return self.asked.fields[self.number.currentIndex()][0]
+
+    def _make(self) -> None:
+        if self.plan.lines:
+            self.answered.emit(MakeSeries(self.asked.path, self._field, self.values.text()))
+        elif not self.plan.refusal:
+            self.show_plan(SeriesPlan(refusal="Type the values, such as 0 60 120 240."))

@@ -29,7 +29,7 @@ from study_app.viewmodels.designer.new_study import TemplateChoice
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.prompts import DeletePrompt
-from study_app.viewmodels.designer.requests import DuplicateElement, MoveElement, MoveTo, RetypeFile
+from study_app.viewmodels.designer.requests import AskSeries, DuplicateElement, GoTo, MoveElement, MoveTo, RetypeFile
 
 
 class DesignerPlace(Place):
@@ -37,8 +37,8 @@ class DesignerPlace(Place):
 
     Signals: ``entered``, ``left``; ``asked`` (a request); ``selected`` (path) and ``back_asked``; ``study_asked``
     (source), ``new_asked``, ``begin_asked`` (source, name, answers); ``undo_asked``, ``redo_asked``, ``save_asked``;
-    ``add_asked``, ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``; ``repair_asked`` (row,
-    words); ``find_changed``; ``banner_asked`` (action); ``id_typed`` (path, id).
+    ``add_asked``, ``series_asked`` (path), ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``;
+    ``repair_asked`` (row, words); ``find_changed``; ``banner_asked`` (action); ``id_typed`` (path, id).
     """
 
     entered = Signal()
@@ -54,6 +54,7 @@ class DesignerPlace(Place):
     save_asked = Signal()
     delete_asked = Signal(object, object)
     add_asked = Signal()
+    series_asked = Signal(object)
     copy_asked = Signal(object)
     paste_asked = Signal()
     repair_asked = Signal(object, str)
@@ -112,7 +113,7 @@ class DesignerPlace(Place):
         header.save_asked.connect(save)
         self.nothing.new.clicked.connect(self.new_asked)
         self.nothing.study_asked.connect(self.study_asked)
-        self.nothing.study_asked.connect(self._focus_form)
+        self.nothing.study_asked.connect(self.parts.focus_form)
         self.banner.asked.connect(self.banner_asked)
         outline.chosen.connect(self._select)
         outline.find_changed.connect(self.find_changed)
@@ -124,7 +125,7 @@ class DesignerPlace(Place):
         outline.rename_asked.connect(self._rename)
         outline.move_asked.connect(self._move_by)
         outline.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
-        self.adding.chosen.connect(lambda one: self.asked.emit(one.asks))
+        self.adding.chosen.connect(self._take_chosen)
         self.parts.path.open_asked.connect(self._select)
         form.asked.connect(self.asked)
         form.open_asked.connect(self._select)
@@ -133,6 +134,7 @@ class DesignerPlace(Place):
         form.head.down.clicked.connect(lambda: self._move_by(1))
         form.head.copy.clicked.connect(self._duplicate)
         form.head.delete.clicked.connect(self._delete)
+        form.head.series.clicked.connect(self._series)
         outline.several_changed.connect(lambda: form.show_selected(outline.selected))
         form.head.id_typed.connect(self.id_typed)
         form.copy_asked.connect(self.copy_asked)
@@ -148,12 +150,13 @@ class DesignerPlace(Place):
         undo, redo, save = self._steps
         for keys, act in (
             ("Ctrl+Z", undo), ("Ctrl+Shift+Z", redo), ("Ctrl+Y", redo), ("Ctrl+S", save),
-            ("F8", self._next_problem), ("Ctrl+D", self._duplicate), ("Ctrl+F", self.parts.focus_find),
+            ("F8", self._next_problem), ("Ctrl+F", self.parts.focus_find),
+            ("Ctrl+D", self._duplicate), ("Ctrl+Shift+D", self._series),
             ("Alt+Up", lambda: self._move_by(-1)), ("Alt+Down", lambda: self._move_by(1)),
             ("Alt+Left", self.back_asked.emit), ("F2", self._rename), ("Ctrl+E", self._switch_to_file),
-            ("F6", lambda: self._cycle(1)), ("Shift+F6", lambda: self._cycle(-1)),
-            ("Ctrl+1", self.parts.focus_outline), ("Ctrl+2", self._focus_form), ("Ctrl+3", self._focus_pane),
-            ("Ctrl+4", self._focus_problems), ("Ctrl+5", self.header.study.setFocus),
+            ("F6", lambda: self.parts.cycle(1, self.header)), ("Shift+F6", lambda: self.parts.cycle(-1, self.header)),
+            ("Ctrl+1", self.parts.focus_outline), ("Ctrl+2", self.parts.focus_form), ("Ctrl+3", self.parts.focus_pane),
+            ("Ctrl+4", self.parts.focus_problems), ("Ctrl+5", self.header.study.setFocus),
         ):  # fmt: skip
             made = QShortcut(QKeySequence(keys), self)
             made.setContext(Qt.ShortcutContext.WindowShortcut)
@@ -275,6 +278,21 @@ class DesignerPlace(Place):
         button = self.outline.add if self.outline.add.isVisible() else self.header
         self.adding.open(every, button.mapToGlobal(button.rect().topLeft()))
 
+    def _take_chosen(self, one: Addable) -> None:
+        """Do what was chosen in the list of what can be added."""
+        if isinstance(one.asks, AskSeries):
+            self.series_asked.emit(one.asks.path)
+        elif isinstance(one.asks, GoTo):
+            self._go_to(one.asks.element, one.asks.field)
+        else:
+            self.asked.emit(one.asks)
+
+    def _go_to(self, element: ElementPath, field: ElementPath) -> None:
+        """Select an element and give the keyboard to one of its fields."""
+        self._select(element)
+        self.parts.show_side("form")
+        self.form.focus(field)
+
     def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
         """Return the element of the form, and those that are selected with it."""
         form = self.view.form
@@ -297,6 +315,11 @@ class DesignerPlace(Place):
         if self.form.head.copy.isEnabled():
             self.flush()
             self.asked.emit(DuplicateElement(path, also))
+
+    def _series(self) -> None:
+        if self.view.form is not None:
+            self.flush()
+            self.series_asked.emit(self.view.form.path)
 
     def _delete(self) -> None:
         path, also = self._several()
@@ -344,42 +367,16 @@ class DesignerPlace(Place):
         if self.form.head.id.isVisible() and not self.view.header.read_only:
             self.form.head.edit_id()
 
-    def _focus_form(self) -> None:
-        self.parts.show_side("form")
-        self.form.focus_first()
-
-    def _focus_pane(self) -> None:
-        self.parts.show_side("pane")
-        page = next(one for one in self.pane.pages if one.name == self.pane.tab)
-        (page.body.focusProxy() or self.pane.tabs).setFocus(Qt.FocusReason.ShortcutFocusReason)
-
     def show_tab(self, name: str) -> None:
         """Show a page of the right pane, and give it the keyboard."""
         self.pane.show_tab(name)
-        self._focus_pane()
-
-    def _focus_problems(self) -> None:
-        self.problems.show()
-        self.problems.next.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.parts.focus_pane()
 
     def _switch_to_file(self) -> None:
         if self.file.editor.hasFocus():
-            self._focus_form()
+            self.parts.focus_form()
         else:
             self.show_tab("file")
-
-    def _cycle(self, by: int) -> None:
-        stops = [
-            (self.header, self.header.study.setFocus),
-            (self.outline, self.parts.focus_outline),
-            (self.form, self._focus_form),
-            (self.pane, self._focus_pane),
-        ]
-        if self.problems.isVisible():
-            stops.append((self.problems, self._focus_problems))
-        focused = self.focusWidget()
-        here = next((at for at, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -by)
-        stops[(here + by) % len(stops)][1]()
 
     def enter(self) -> None:
         """Look again at what there is."""

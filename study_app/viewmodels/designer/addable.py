@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from typing import Final
 
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import languages_of
+from study_app.authoring.changes.series import number_rows
 from study_app.authoring.edited_study import Study
-from study_app.authoring.fields import label_of, row_at, rows
+from study_app.authoring.fields import Row, label_of, row_at, rows
+from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import node_at, tags
 from study_app.protocol.formats import TABLES, is_second
@@ -17,7 +20,9 @@ from study_app.protocol.instruments.instrument import instrument, instruments
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.outline_rows import icon_of
-from study_app.viewmodels.designer.requests import AddElement, AddInstrument, ChangeLanguage
+from study_app.viewmodels.designer.requests import AddElement, AddInstrument, AskSeries, ChangeLanguage, GoTo
+
+SERIES: Final = "Copies of it that differ in one number: delays, levels, forces and others"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +31,7 @@ class Addable:
 
     words: str
     icon: str
-    asks: AddElement | AddInstrument | ChangeLanguage
+    asks: AddElement | AddInstrument | ChangeLanguage | AskSeries | GoTo
     help: str = ""
 
 
@@ -50,6 +55,7 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
         )
         for path in sections
     ]
+    found += _series(study, selected)
     found += _instruments() if second else ()
     there = languages_of(study)
     found += [
@@ -58,6 +64,16 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
         if code not in there
     ]
     return tuple(found)
+
+
+def _series(study: Study, selected: Path) -> Iterator[Addable]:
+    """Yield a series of the selected element, and of those that its lists name, where there can be one."""
+    lists = (row for row in rows(study.document, selected) if row.kind == "references" and len(selected) == 2)
+    listed = (named_at(study.document, place) for row in lists for place in _entries(row))
+    for path in dict.fromkeys((selected, *(one for one in listed if one is not None))):
+        if number_rows(study.document, path):
+            words = f"Series of {title_of(study.document, path)} …"
+            yield Addable(words, "bars", AskSeries(path), SERIES)
 
 
 @cache
@@ -71,6 +87,11 @@ def _instruments() -> tuple[Addable, ...]:
         words = f"Instrument: {name.upper()}, {len(source['items'])} questions"
         found.append(Addable(words, "list", AddInstrument(name), help_))
     return tuple(found)
+
+
+def _entries(row: Row) -> Iterator[Path]:
+    """Yield the place of each entry of a list."""
+    yield from ((*row.path, at) for at in range(len(row.value if isinstance(row.value, tuple) else ())))
 
 
 def _of_list(study: Study, path: Path) -> Iterator[Addable]:

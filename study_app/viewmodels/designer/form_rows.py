@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.changes.series import NUMBERS
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
 from study_app.authoring.measures.participant_texts import missing_texts
@@ -138,6 +139,8 @@ class Form:
         The section and the elements that it is in, with their titles, and itself.
     feel : str
         What the button says that opens the lab with its liquids, "" where it has none.
+    series : bool
+        Whether there can be a series of it: elements that differ in one of its numbers.
     """
 
     path: Path
@@ -152,6 +155,7 @@ class Form:
     questions: QuestionLines = NO_QUESTIONS
     around: tuple[tuple[Path, str], ...] = ()
     feel: str = ""
+    series: bool = False
 
     @property
     def rows(self) -> tuple[FormRow, ...]:
@@ -187,7 +191,12 @@ def form(study: Study, path: Path) -> Form:
         question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
         tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
         f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
+        len(path) == 2 and any(_has_numbers(section) for section in sections),
     )  # fmt: skip
+
+
+def _has_numbers(section: Section) -> bool:
+    return any(row.kind in NUMBERS for row in (*(one.row for one in section.rows), *section.absent))
 
 
 def step_of(document: Mapping[str, Any], path: Path) -> Path | None:

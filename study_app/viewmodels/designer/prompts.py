@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.changes.series import members, number_row, number_rows
+from study_app.authoring.edited_study import Study
+from study_app.authoring.fields import Row, label_of
+from study_app.authoring.outline import title_of
+from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path
+from study_app.viewmodels.sessions import counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,3 +37,69 @@ class DeletePrompt:
     references: tuple[str, ...]
     others: tuple[tuple[str, str], ...] = ()
     also: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesPrompt:
+    """What a series is asked for with.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        The element.
+    title : str
+        What it is called.
+    fields : tuple of (path, str)
+        Its numbers, each with its words and unit.
+    """
+
+    path: Path
+    title: str
+    fields: tuple[tuple[Path, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesPlan:
+    """What a series will be.
+
+    Attributes
+    ----------
+    lines : tuple of str
+        Each element: what it is called, its number and its id.
+    refusal : str
+        Why it cannot be made with these values, "" where it can.
+    make : str
+        What the button says that makes it.
+    """
+
+    lines: tuple[str, ...] = ()
+    refusal: str = ""
+    make: str = "Make the series"
+
+
+def series_prompt(study: Study, path: Path) -> SeriesPrompt | None:
+    """Return what a series of an element is asked for with; None of what has no numbers."""
+    fields = tuple((row.path, _in_words(row)) for row in number_rows(study.document, path))
+    return SeriesPrompt(path, title_of(study.document, path), fields) if fields else None
+
+
+def series_plan(study: Study, path: Path, field: Path, values: str) -> SeriesPlan:
+    """Return what a series with these values will be."""
+    if not values.strip():
+        return SeriesPlan()
+    try:
+        row = number_row(study.document, path, field)
+        made = members(study, path, row, values)
+    except Refused as refusal:
+        return SeriesPlan(refusal=f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.")
+    first = made[0].title if made[0].titles or made[0].name != path[1] else title_of(study.document, path)
+    lines = (
+        f"{first if at == 0 else one.title}: {one.value:g} {row.unit}".rstrip() + f"  ·  {one.name}"
+        for at, one in enumerate(made)
+    )
+    return SeriesPlan(tuple(lines), make=f"Make {counted(len(made), singular(path[0]))}")
+
+
+def _in_words(row: Row) -> str:
+    words = ", ".join(label_of(step) for step in row.path[2:])
+    return f"{words} [{row.unit}]" if row.unit else words

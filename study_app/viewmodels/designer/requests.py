@@ -107,6 +107,15 @@ class DuplicateElement:
 
 
 @dataclass(frozen=True, slots=True)
+class MakeSeries:
+    """Make an element the first of a series: ``field`` is the number that differs, ``values`` as they were typed."""
+
+    path: Path
+    field: Path
+    values: str
+
+
+@dataclass(frozen=True, slots=True)
 class MoveElement:
     """Move an element among its neighbours, by so many places; ``also`` are others that move with it."""
 
@@ -182,9 +191,24 @@ class Several:
     requests: tuple[Request, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class AskSeries:
+    """Ask for the values of a series of an element; a step of the place, not of the study."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class GoTo:
+    """Select an element and give the keyboard to one of its fields; a step of the place, not of the study."""
+
+    element: Path
+    field: Path
+
+
 Request: TypeAlias = (
     SetValue | SetText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | AddNamed | AddInstrument
-    | ChangeLanguage | DuplicateElement | MoveElement | MoveTo | MoveEntries | DuplicateEntries
+    | ChangeLanguage | DuplicateElement | MakeSeries | MoveElement | MoveTo | MoveEntries | DuplicateEntries
     | Paste | DeleteElement | RenameElement
     | RetypeFile | Several
 )  # fmt: skip

@@ -76,6 +76,10 @@ class FormHead(QWidget):
         self.refusal = label("", "label", "bad", wraps=True)
         self.refusal.hide()
         self.feel = IconButton("drop", "Feel", size=34)
+        self.series = ActionButton("bars", "Series …", height=34)
+        self.series.setProperty("dense", "true")
+        self.series.setFont(font("label"))
+        self.series.setToolTip("Copies that differ in one number, such as delays or levels (Ctrl+Shift+D)")
         self.up = IconButton("arrow_up", "Move up", "Move up (Alt+Up)", size=34)
         self.down = IconButton("arrow_down", "Move down", "Move down (Alt+Down)", size=34)
         self.copy = IconButton("copy", "Duplicate", "Duplicate (Ctrl+D)", size=34)
@@ -95,7 +99,7 @@ class FormHead(QWidget):
         grid.addLayout(words, 0, 1)
         buttons = QHBoxLayout()
         buttons.setSpacing(8)
-        for part in (self.feel, self.up, self.down, self.copy, self.delete):
+        for part in (self.feel, self.series, self.up, self.down, self.copy, self.delete):
             buttons.addWidget(part)
         grid.addLayout(buttons, 0, 2)
         self.id_line = QWidget()
@@ -141,6 +145,7 @@ class FormHead(QWidget):
         self.feel.setVisible(bool(form.feel))
         self.feel.setAccessibleName(form.feel or "Feel")
         self.feel.setToolTip(f"{form.feel} in the lab")
+        self.series.setVisible(form.series and form.position is None and not read_only)
         place, count = form.position or (0, 0)
         for button in (self.up, self.down):
             button.setVisible(form.position is not None and not read_only)

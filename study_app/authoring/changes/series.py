@@ -1,0 +1,191 @@
+"""A series of elements: copies of one that differ from it in one number, each with an id and a title that say it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from study_app.authoring.additions import duplicated
+from study_app.authoring.edited_study import Study
+from study_app.authoring.fields import Row, label_of, refused_at, rows, why_not
+from study_app.authoring.names import references_to, renamed
+from study_app.authoring.writer.edits import Edit, Insert, Set
+from study_app.authoring.writer.refused import Refused
+from study_app.haptics.model.liquid import MAX_ID
+from study_app.protocol.source.document import Path, names, value_at
+
+MOST: Final = 24
+"""So many values a series may have; code letters end at Z."""
+NUMBERS: Final = frozenset({"number", "whole number"})
+"""Kinds of rows that hold one number."""
+_DEEPEST: Final = 2
+_NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_LAST_OF_ID: Final = re.compile(r"_(?:minus_)?\d+(?:_\d+)?$")
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One element of a series.
+
+    Attributes
+    ----------
+    value : int or float
+        Its number.
+    name : str
+        Its id.
+    titles : tuple of (path, str)
+        Its titles, one in each language, each with its place below the element.
+    """
+
+    value: int | float
+    name: str
+    titles: tuple[tuple[Path, str], ...] = ()
+
+    @property
+    def title(self) -> str:
+        """What it is called: its title in the first language, else its id in words."""
+        return next((text for _, text in self.titles), label_of(self.name))
+
+
+def number_rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
+    """Return the numbers of an element of which there can be a series, in the order of its form."""
+    table = len(path) == 2 and isinstance(path[1], str) and isinstance(value_at(document, path), Mapping)
+    return tuple(_numbers(document, path, _DEEPEST)) if table else ()
+
+
+def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
+    """Return the number that differs in a series.
+
+    Raises
+    ------
+    Refused
+        It is not a number of the element.
+    """
+    found = next((row for row in number_rows(document, path) if row.path == field), None)
+    if found is None:
+        raise Refused("choose a number of this element")
+    return found
+
+
+def members(study: Study, path: Path, row: Row, text: str) -> tuple[Member, ...]:
+    """Return the elements of a series, of which the first one is the element at ``path``.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    path : tuple of str or int
+        The element.
+    row : Row
+        The number that differs, one of `number_rows`.
+    text : str
+        The values, separated by spaces, commas or lines; each may be followed by the unit.
+
+    Raises
+    ------
+    Refused
+        A value is not a number that is permitted there, or is given twice, or there are fewer than two or too many.
+    """
+    document, name = study.document, str(path[1])
+    values = _values(document, row, text)
+    taken = {*names(document, str(path[0]))} - {name}
+    numbered = _LAST_OF_ID.search(name)
+    own = numbered is not None and row.value is not None and numbered[0] == f"_{_word(row.value)}"
+    found: list[Member] = []
+    for at, value in enumerate(values):
+        chosen = name if at == 0 and not own else _free(taken, _LAST_OF_ID.sub("", name), _word(value))
+        taken.add(chosen)
+        found.append(Member(value, chosen, tuple(_titles(document, path, value, row, first=at == 0))))
+    return tuple(found)
+
+
+def first_edits(study: Study, path: Path, row: Row, member: Member) -> tuple[tuple[Edit, ...], Path]:
+    """Return the edits that make an element the first one of a series, and its path after them."""
+    edits: list[Edit] = []
+    if member.name != path[1]:
+        edits += renamed(study.document, path, member.name)
+    after = (path[0], member.name)
+    return (*edits, *_given(member, after, path, row)), after
+
+
+def next_edits(study: Study, previous: Path, row: Row, member: Member) -> tuple[tuple[Edit, ...], Path]:
+    """Return the edits that make the next element of a series, and its path; blocks list it after the one before."""
+    edits, copy = duplicated(study, previous, member.name)
+    after, _ = study.edited(*edits)
+    listing = (place for place in references_to(after.document, previous) if place[0] == "blocks")
+    ends = {place[:-1]: place[-1] for place in listing if isinstance(place[-1], int)}
+    listed = (Insert((*place, at + 1), copy[1]) for place, at in ends.items() if isinstance(at, int))
+    return (*edits, *_given(member, copy, previous, row), *listed), copy
+
+
+def _given(member: Member, path: Path, before: Path, row: Row) -> Iterator[Edit]:
+    """Yield the edits that give an element its number and titles."""
+    yield Set((*path, *row.path[len(before) :]), member.value)
+    for inner, text in member.titles:
+        yield Set((*path, *inner), text)
+
+
+def _numbers(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[Row]:
+    refused = refused_at(document, path)
+    below: list[Path] = []
+    for row in rows(document, path):
+        if row.kind == "table" and isinstance(row.value, Mapping) and deepest > 1:
+            below.append(row.path)
+        elif row.kind in NUMBERS and (row.value is not None or row.path[-1] not in refused):
+            known = isinstance(row.value, int | float) and not isinstance(row.value, bool)
+            yield row if known else replace(row, value=None)
+    for inner in below:
+        yield from _numbers(document, inner, deepest - 1)
+
+
+def _values(document: Mapping[str, Any], row: Row, text: str) -> tuple[int | float, ...]:
+    words = (word.removesuffix(row.unit) if row.unit else word for word in re.split(r"[\s,;]+", text))
+    found: list[int | float] = []
+    for word in filter(None, words):
+        if _NUMBER.fullmatch(word) is None:
+            raise Refused(f'"{word}" is not a number')
+        value = int(word) if word.lstrip("+-").isdecimal() else float(word)
+        if why := why_not(document, row, value):
+            raise Refused(f"{word} is not permitted: {row.label} is {why}")
+        if value in found:
+            raise Refused(f"{word} is there twice")
+        found.append(value)
+    if len(found) < 2:
+        raise Refused("a series has two values or more")
+    if len(found) > MOST:
+        raise Refused(f"a series has at most {MOST} values")
+    return tuple(found)
+
+
+def _word(value: float) -> str:
+    """Return a number as a part of an id: "0_5", "minus_60"."""
+    return f"{value:g}".replace("-", "minus_").replace("+", "").replace(".", "_")
+
+
+def _free(taken: set[str], stem: str, word: str) -> str:
+    """Return an id with a number at its end that is free."""
+    name, again = f"{stem[: MAX_ID - len(word) - 1]}_{word}", 1
+    while name in taken:
+        again += 1
+        ending = f"_{word}_{again}"
+        name = f"{stem[: MAX_ID - len(ending)]}{ending}"
+    return name
+
+
+def _titles(
+    document: Mapping[str, Any], path: Path, value: float, row: Row, *, first: bool
+) -> Iterator[tuple[Path, str]]:
+    """Yield the titles of an element with a number; those of the first one only where they said its number before."""
+    title = value_at(document, (*path, "title"))
+    number = re.compile(rf"-?\d+(?:\.\d+)?(?=\s*(?:{re.escape(row.unit)})?\s*$)")
+    for language, text in title.items() if isinstance(title, Mapping) else (("", title),):
+        if not isinstance(text, str) or not text.strip():
+            continue
+        last = number.search(text)
+        said = last is not None and row.value is not None and last[0] == f"{row.value:g}"
+        if said or (last is not None and not first):
+            yield ("title", *filter(None, [language])), number.sub(f"{value:g}", text)
+        elif not first:
+            yield ("title", *filter(None, [language])), f"{text}, {value:g} {row.unit}".rstrip()

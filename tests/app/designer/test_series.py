@@ -1,0 +1,129 @@
+"""A series of elements, made in the window: by keys, by the mouse, from the list of what can be added."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+
+from study_app.gui.designer.prompts import SeriesCard
+from study_app.viewmodels.designer.requests import MakeSeries
+
+pytestmark = pytest.mark.slow
+
+LEFT = Qt.MouseButton.LeftButton
+CONDITION = ("conditions", "thin")
+LISTED = ("blocks", "liquids", "conditions")
+
+
+@pytest.fixture
+def water(designer: Any) -> Any:
+    """The designer at a condition that a block with a Williams design lists alone."""
+    text = designer.file.read_text().replace('conditions = ["thin", "thick"]', 'conditions = ["thin"]')
+    designer.file.write_text(text)
+    designer.controller.open("kitchen")
+    designer.select(CONDITION)
+    return designer
+
+
+def document(designer: Any) -> Any:
+    return designer.editing.opened.study.document
+
+
+def card(designer: Any) -> SeriesCard:
+    shown = designer.place.prompt
+    assert isinstance(shown, SeriesCard)
+    return shown
+
+
+def test_a_series_of_delays_is_made_by_keys_alone_in_one_step(qtbot: Any, water: Any) -> None:
+    before = water.text
+    qtbot.keyClick(water.window, Qt.Key.Key_D, Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier)
+    values = card(water).values
+    assert values.hasFocus()
+    assert card(water).number.currentText() == "Delay [ms]"
+    qtbot.keyClicks(values, "0 60 120 240")
+    assert card(water).lines.text().splitlines()[1] == "Thin 60: 60 ms  ·  thin_60"
+    assert card(water).make.text() == "Make 4 conditions"
+    qtbot.keyClick(values, Qt.Key.Key_Return)
+    assert water.place.prompt is None
+    conditions = document(water)["conditions"]
+    named = ["thin", "thin_60", "thin_120", "thin_240"]
+    assert [conditions[name]["delay_ms"] for name in named] == [0, 60, 120, 240]
+    assert list(document(water)["blocks"]["liquids"]["conditions"]) == named
+    assert water.editing.opened.study.faults == ()
+    assert water.editing.selected == CONDITION
+    assert water.place.outline.selected == tuple(("conditions", name) for name in named)
+    assert len(water.editing.opened.history.done) == 1
+    water.editing.undo()
+    assert water.text == before
+
+
+def test_values_are_refused_in_the_card_and_enter_then_makes_nothing(qtbot: Any, water: Any) -> None:
+    before = water.text
+    qtbot.mouseClick(water.place.form.head.series, LEFT)
+    values = card(water).values
+    qtbot.keyClick(values, Qt.Key.Key_Return)
+    assert card(water).refusal.text() == "Type the values, such as 0 60 120 240."
+    for typed, why in (
+        ("0 sixty", '"sixty" is not a number.'),
+        ("0 5000", "5000 is not permitted: Delay is at most 1000."),
+        ("0 60 60", "60 is there twice."),
+    ):
+        values.selectAll()
+        qtbot.keyClicks(values, typed)
+        assert card(water).refusal.text() == why
+        assert not card(water).make.isEnabled()
+        qtbot.keyClick(values, Qt.Key.Key_Return)
+        assert water.text == before
+    qtbot.keyClick(values, Qt.Key.Key_Escape)
+    assert water.place.prompt is None
+    assert water.text == before
+
+
+def test_another_number_is_chosen_and_the_series_made_by_the_mouse(qtbot: Any, water: Any) -> None:
+    qtbot.mouseClick(water.place.form.head.series, LEFT)
+    shown = card(water)
+    shown.number.setCurrentIndex(shown.number.findText("Force loss"))
+    shown.number.activated.emit(shown.number.currentIndex())
+    qtbot.keyClicks(shown.values, "0, 0.25")
+    qtbot.mouseClick(shown.make, LEFT)
+    conditions = document(water)["conditions"]
+    assert conditions["thin_0_25"]["force_loss"] == 0.25
+    assert "delay_ms" not in conditions["thin_0_25"] or conditions["thin_0_25"]["delay_ms"] == 0
+
+
+@pytest.mark.parametrize("word", ["series", "levels", "delays"])
+@pytest.mark.parametrize("selected", [CONDITION, LISTED[:2]])
+def test_a_series_is_found_in_the_list_of_what_can_be_added(
+    qtbot: Any, water: Any, word: str, selected: tuple[str, str]
+) -> None:
+    water.select(selected)
+    water.place.ask_to_add()
+    adding = water.place.adding
+    qtbot.keyClicks(adding.words, word)
+    offered = [adding.list.item(at).text() for at in range(adding.list.count())]
+    assert "Series of Thin …" in offered
+    adding.list.setCurrentRow(offered.index("Series of Thin …"))
+    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
+    assert card(water).asked.path == CONDITION
+    assert card(water).values.hasFocus()
+
+
+def test_blocks_of_a_series_get_letters_titles_and_places_in_the_session(designer: Any) -> None:
+    block = ("blocks", "liquids")
+    designer.controller.open("rek2024")
+    designer.select(("conditions", "water"))
+    assert not designer.place.form.head.series.isVisible()  # read-only
+    designer.controller.begin("rek2024", "mine")
+    before = document(designer)["sequence"]
+    faults = designer.editing.opened.study.faults
+    designer.editing.ask(MakeSeries(block, (*block, "repetitions"), "1 2 3"))
+    after = document(designer)
+    at = before.index("liquids")
+    assert after["sequence"] == (*before[: at + 1], "liquids_2", "liquids_3", *before[at + 1 :])
+    letters = [one["code_prefix"] for one in after["blocks"].values() if "code_prefix" in one]
+    assert len(letters) == len(set(letters))
+    assert after["blocks"]["liquids_3"]["title"]["nl"] == "Basisinstellingen, 3"
+    assert designer.editing.opened.study.faults == faults
