@@ -10,7 +10,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, rows
 from study_app.authoring.names import named_at
 from study_app.protocol.groups.group import sequences_in
-from study_app.protocol.source.document import Path, entries, has
+from study_app.protocol.source.document import Path, entries, has, value_at
 
 TITLES: Final = ("title", "short", "text")
 """Keys of texts that an element is called by, the first that it has."""
@@ -88,14 +88,13 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
     return text if isinstance(text, str) and text.strip() else label_of(str(value.get("id", path[-1])))
 
 
-def found(document: Mapping[str, Any], path: Path, words: str) -> bool:
-    """Return whether title, id or any text of an element holds what is looked for, in any language."""
-    value: Any = document
-    for step in path:
-        value = value[step] if has(value, step) else None
-    wanted = words.casefold()
-    texts = (str(path[-1]), title_of(document, path), *_texts(value))
-    return any(wanted in text.casefold() for text in texts)
+def found(document: Mapping[str, Any], path: Path, words: str, *, named: bool = False) -> bool:
+    """Return whether title, id or any text of an element holds what is looked for, in any language.
+
+    ``named`` leaves the texts out, but the title.
+    """
+    texts = () if named else _texts(value_at(document, path))
+    return any(words.casefold() in text.casefold() for text in (str(path[-1]), title_of(document, path), *texts))
 
 
 def _session(study: Study) -> Iterator[Element]:

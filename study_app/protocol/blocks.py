@@ -132,7 +132,8 @@ class Block(Table):
     order: Order = Field(
         default="fixed",
         description="fixed: as written; shuffled: anew in each repetition; constrained: all trials together, within "
-        "max_repeats and min_distance; williams, latin: rows of a square, by the number in the participant's id.",
+        "max_repeats and min_distance; williams, latin: balanced, rows of a Williams design or Latin square, by the "
+        "number in the participant's id.",
     )
     max_repeats: int | None = Field(
         default=None,

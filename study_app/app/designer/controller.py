@@ -35,7 +35,7 @@ from study_app.errors import StudyError
 from study_app.gui.designer.view import DesignerPlace
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import find
-from study_app.viewmodels.designer.addable import addable
+from study_app.viewmodels.designer.addable import addable, fields_to_go_to
 from study_app.viewmodels.designer.designer_view import DesignerView, HeaderState, StudyChoice
 from study_app.viewmodels.designer.file_text import file_text
 from study_app.viewmodels.designer.form_rows import form
@@ -91,6 +91,7 @@ class DesignerController(QObject):
         place.repair_asked.connect(self.repair)
         place.find_changed.connect(self.find)
         place.add_asked.connect(self._show_addable)
+        place.adding.typed.connect(self._offer_fields)
         place.id_typed.connect(self._judge_id)
         editing.changed.connect(self.show)
         self.preview = ParticipantPreview(editing, place)
@@ -165,8 +166,9 @@ class DesignerController(QObject):
         if (before := self.editing.opened) is not None:
             self._others[before.file.resolve()] = before
         self._choices = studies(opened.file)
-        self._warnings, self._find = (), ""
+        self._warnings = ()
         self.editing.open(opened)
+        self.place.outline.words.clear()
         self.place.close_new()
         self.show()
         self.show_outline()
@@ -200,6 +202,11 @@ class DesignerController(QObject):
     def _show_addable(self) -> None:
         if (opened := self.editing.writable) is not None:
             self.place.show_addable(addable(opened.study, opened.history.selected))
+
+    def _offer_fields(self, words: str) -> None:
+        """Offer the fields that have the words typed in the list of what can be added."""
+        if (opened := self.editing.opened) is not None:
+            self.place.adding.offer_fields(fields_to_go_to(opened.study, words, opened.history.selected))
 
     def _judge_id(self, path: Place, name: str) -> None:
         """Say at once why an id cannot be taken."""

@@ -19,6 +19,7 @@ from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Icon
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
 from study_app.viewmodels.designer.form_rows import Form
+from study_app.viewmodels.designer.outline_rows import ElementPath
 
 OUTLINE_PX, DRAWER_PX = 284, 320
 DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
@@ -195,6 +196,11 @@ class Arrangement(QWidget):
         self.show_side("form")
         self.form.focus_first()
 
+    def focus_field(self, path: ElementPath) -> None:
+        """Give the keyboard to a field of the form."""
+        self.show_side("form")
+        self.form.focus(path)
+
     def focus_pane(self) -> None:
         """Give the keyboard to the page of the pane that is shown."""
         self.show_side("pane")
@@ -257,7 +263,7 @@ class Arrangement(QWidget):
                 return True
             if watched is self.outline.tree and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
                 self.close_drawer()
-                self.show_side("form")
-                self.form.focus_first()
+                if not self.outline.open_current():
+                    self.focus_form()
                 return True
         return super().eventFilter(watched, event)

@@ -117,6 +117,7 @@ class DesignerPlace(Place):
         self.banner.asked.connect(self.banner_asked)
         outline.chosen.connect(self._select)
         outline.find_changed.connect(self.find_changed)
+        outline.field_asked.connect(self.parts.focus_field)
         outline.add_asked.connect(self.ask_to_add)
         outline.duplicate_asked.connect(self._duplicate)
         outline.delete_asked.connect(self._delete)
@@ -290,8 +291,7 @@ class DesignerPlace(Place):
     def _go_to(self, element: ElementPath, field: ElementPath) -> None:
         """Select an element and give the keyboard to one of its fields."""
         self._select(element)
-        self.parts.show_side("form")
-        self.form.focus(field)
+        self.parts.focus_field(field)
 
     def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
         """Return the element of the form, and those that are selected with it."""

@@ -19,15 +19,17 @@ from study_app.protocol.formats import TABLES, is_second
 from study_app.protocol.instruments.instrument import instrument, instruments
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import LANGUAGES
+from study_app.viewmodels.designer.finding import found_fields
 from study_app.viewmodels.designer.outline_rows import icon_of
 from study_app.viewmodels.designer.requests import AddElement, AddInstrument, AskSeries, ChangeLanguage, GoTo
 
-SERIES: Final = "Copies of it that differ in one number: delays, levels, forces and others"
+MOST_FIELDS: Final = 12
+SERIES: Final = "Copies at several levels of one number: {}"
 
 
 @dataclass(frozen=True, slots=True)
 class Addable:
-    """One thing that can be added: its words and icon, what is asked for, and a line of help."""
+    """One thing that can be added, or a field to go to: its words and icon, what is asked for, and a line of help."""
 
     words: str
     icon: str
@@ -71,9 +73,23 @@ def _series(study: Study, selected: Path) -> Iterator[Addable]:
     lists = (row for row in rows(study.document, selected) if row.kind == "references" and len(selected) == 2)
     listed = (named_at(study.document, place) for row in lists for place in _entries(row))
     for path in dict.fromkeys((selected, *(one for one in listed if one is not None))):
-        if number_rows(study.document, path):
-            words = f"Series of {title_of(study.document, path)} …"
-            yield Addable(words, "bars", AskSeries(path), SERIES)
+        if numbers := number_rows(study.document, path):
+            words, help_ = f"Series of {title_of(study.document, path)} …", ", ".join(row.label for row in numbers)
+            yield Addable(words, "bars", AskSeries(path), SERIES.format(help_))
+
+
+def fields_to_go_to(study: Study, words: str, selected: Path) -> tuple[Addable, ...]:
+    """Return the fields whose labels or choices have words that begin so, those of the selected element first."""
+    found = sorted(found_fields(study, words), key=lambda one: (one.rank, one.element != selected))
+    offered = []
+    for one in found[:MOST_FIELDS]:
+        path, title = one.element, title_of(study.document, one.element)
+        kind = singular(path[-2]) if isinstance(path[-1], int) else singular(path[0]) if len(path) > 1 else ""
+        named = f"{one.label} of {' '.join(filter(None, (kind, title)))}"
+        asks = GoTo(path, one.field)
+        choice = f", {one.choice}" if one.choice else ""
+        offered.append(Addable(f"{named}{choice}", icon_of(path, study.document), asks, one.help))
+    return tuple(offered)
 
 
 @cache

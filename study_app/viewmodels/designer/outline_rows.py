@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
 
 from study_app.authoring.changes.initial_values import singular
@@ -11,6 +11,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.outline import Element, found, outline
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.viewmodels.designer.element_facts import brief
+from study_app.viewmodels.designer.finding import LABEL, FoundField, found_in_elements
 from study_app.viewmodels.number_words import minutes
 
 ICONS: Final = {
@@ -50,6 +51,8 @@ class OutlineRow:
         What a screen reader says of it.
     step : tuple of str or int
         Its entry in the list that orders it; () where it cannot be moved.
+    field : tuple of str or int
+        The field of it that was found, () where none was looked for.
     """
 
     path: Path
@@ -60,6 +63,7 @@ class OutlineRow:
     faults: int = 0
     name: str = ""
     step: Path = ()
+    field: Path = ()
 
 
 def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
@@ -72,19 +76,29 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
     times_s : mapping of str to float
         How long each step takes [s], by its id; empty while the study has faults.
     find : str
-        What an element's title, id or one of its texts must hold.
+        What an element's title, id or one of its texts must hold, or the label or a choice of one of its fields.
     """
-    shown = outline(study)
+    shown, words = outline(study), find.strip()
+    fields = found_in_elements(study, words)
     rows: list[OutlineRow] = []
     for heading, elements in zip(SECTIONS, (shown.session, shown.parts, shown.study), strict=True):
         inner = [_row(study, element, times_s, in_session=heading == SECTIONS[0]) for element in elements]
-        if find.strip():
+        if words:
             inner = [row for row in inner if len(row.path) > 1 or heading == SECTIONS[2]]
-            inner = [row for row in inner if found(study.document, row.path, find.strip())]
+            inner = [kept for row in inner if (kept := _found(study, row, words, fields.get(row.path))) is not None]
         total = minutes(sum(times_s.values())) if times_s and heading == SECTIONS[0] else ""
         if inner:
             rows += [OutlineRow((), heading, note=total, name=heading), *inner]
     return tuple(rows)
+
+
+def _found(study: Study, row: OutlineRow, words: str, field: FoundField | None) -> OutlineRow | None:
+    """Return a row where its element was found, with the label of the field that was; else None."""
+    named = found(study.document, row.path, words, named=True)
+    if field is not None and (field.rank == LABEL or not named):
+        title, name = f"{row.title} · {field.label}", f"{row.name}, field {field.label}"
+        return replace(row, title=title, name=name, field=field.field)
+    return row if named or found(study.document, row.path, words) else None
 
 
 def icon_of(path: Path, document: Mapping[str, Any]) -> str:

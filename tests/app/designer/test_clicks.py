@@ -115,7 +115,7 @@ def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_type
     assert density.selectedText() == density.text()
     qtbot.keyClicks(density, "1402")
     qtbot.waitUntil(lambda: "density_kg_m3 = 1402" in designer.text)
-    qtbot.mouseClick(next(one for one in designer.place.form.adds if one.isVisible()), LEFT)
+    qtbot.mouseClick(next(one for one in designer.place.form.adds.values() if one.isVisible()), LEFT)
     assert designer.editing.opened.study.document["liquids"]["honey"]["density_kg_m3"] == 1402
     assert "thick" not in designer.editing.opened.study.document["liquids"]
 

@@ -105,6 +105,7 @@ def test_a_series_is_found_in_the_list_of_what_can_be_added(
     qtbot.keyClicks(adding.words, word)
     offered = [adding.list.item(at).text() for at in range(adding.list.count())]
     assert "Series of Thin …" in offered
+    assert ("Series of Liquids …" in offered) == (selected[0] == "blocks" and word != "delays")
     adding.list.setCurrentRow(offered.index("Series of Thin …"))
     qtbot.keyClick(adding.words, Qt.Key.Key_Return)
     assert card(water).asked.path == CONDITION

@@ -64,7 +64,7 @@ class FormCard(Card):
         self._later.setInterval(0)
         self._later.timeout.connect(self._finish)
         self.others: list[QuestionRow] = []
-        self.adds: list[QWidget] = []
+        self.adds: dict[tuple[str | int, ...], QWidget] = {}
         self._focused: RowWidget | None = None
         self._renamed: tuple[str | int, ...] = ()
         self._chosen: tuple[tuple[str | int, ...], tuple[int, ...]] | None = None
@@ -126,7 +126,7 @@ class FormCard(Card):
         whole = QVBoxLayout(inside)
         whole.setContentsMargins(0, 2, 8, 2)
         whole.setSpacing(7)
-        self._made, self.adds, self.others = [], [], []
+        self._made, self.adds, self.others = [], {}, []
         self._unmade = self._fill(form, whole)
         room = self.area.viewport().height() if before is None else INFINITE_PX
         for height in self._unmade:
@@ -201,7 +201,7 @@ class FormCard(Card):
             made.setToolTip(absent.help)
             made.clicked.connect(lambda _checked=False, path=absent.path: self.asked.emit(AddKey(self._now(path))))
             grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
-            self.adds.append(made)
+            self.adds[absent.path] = made
         return grid
 
     def _finish(self) -> None:
@@ -305,11 +305,17 @@ class FormCard(Card):
                 part.flush()
 
     def focus(self, path: tuple[str | int, ...], caret: Caret | None = None) -> bool:
-        """Give the keyboard to the row of a place, or to an editor in it, and scroll; return whether there is one."""
+        """Give the keyboard to the row of a place, or to an editor in it, and scroll; return whether there is one.
+
+        A key that the file does not have has a button that adds it instead.
+        """
         inner = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
         found = max(inner, key=lambda row: len(row.row.row.path), default=None)
         if found is None:
-            return False
+            if (button := self.adds.get(path)) is not None:
+                button.setFocus(Qt.FocusReason.OtherFocusReason)
+                self.area.ensureWidgetVisible(button)
+            return button is not None
         found.field.take_keyboard()
         if caret is not None:
             caret.put_into(found)

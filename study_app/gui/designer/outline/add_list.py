@@ -17,15 +17,17 @@ MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
 
 class AddList(Themed, QFrame):
-    """A list over the place; ``chosen`` carries an `Addable`."""
+    """A list over the place; ``chosen`` carries an `Addable`, ``typed`` the words that it is filtered by."""
 
     chosen = Signal(object)
+    typed = Signal(str)
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent, Qt.WindowType.Popup)
         self.setAccessibleName("Add")
         self.setProperty("role", "card")
         self._every: tuple[Addable, ...] = ()
+        self._fields: tuple[Addable, ...] = ()
         self.words = QLineEdit()
         self.words.setFont(font("label", weight=400))
         self.words.setProperty("dense", "true")
@@ -47,7 +49,7 @@ class AddList(Themed, QFrame):
         column.addWidget(self.words)
         column.addWidget(self.list, 1)
         column.addWidget(self.help)
-        self.words.textChanged.connect(self._filter)
+        self.words.textChanged.connect(self._type)
         self.words.installEventFilter(self)
         self.list.currentItemChanged.connect(lambda item: self.help.setText(item.toolTip() if item else ""))
         self.list.itemClicked.connect(lambda _item: self._choose())
@@ -64,7 +66,7 @@ class AddList(Themed, QFrame):
         """Show what can be added, with its lower left corner at a place of the screen."""
         self._every = every
         self.words.clear()
-        self._filter("")
+        self._type("")
         height = min(HIGHEST, 82 + HELP_PX + ROW_PX * len(every))
         screen = self.screen().availableGeometry()
         at = QPoint(min(above.x(), screen.right() - WIDTH), max(screen.top(), above.y() - height))
@@ -72,17 +74,23 @@ class AddList(Themed, QFrame):
         self.show()
         self.words.setFocus(Qt.FocusReason.PopupFocusReason)
 
-    def _filter(self, words: str) -> None:
-        wanted = words.casefold().split()
+    def offer_fields(self, fields: tuple[Addable, ...]) -> None:
+        """Take the fields that have the words that were ``typed``; they come last."""
+        self._fields = fields
+
+    def _type(self, words: str) -> None:
+        self._fields = ()
+        self.typed.emit(words)
+        wanted = [part.removesuffix("s") for part in words.casefold().split()]
         self.list.clear()
-        for one in self._every:
-            if all(part in f"{one.words} {one.help}".casefold() for part in wanted):
-                item = QListWidgetItem(icon(one.icon, self.theme.text2, 18), one.words)
-                item.setData(Qt.ItemDataRole.UserRole, one)
-                item.setToolTip(one.help)
-                item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, one.help)
-                item.setSizeHint(QSize(WIDTH - 40, ROW_PX))
-                self.list.addItem(item)
+        fitting = (one for one in self._every if all(part in f"{one.words} {one.help}".casefold() for part in wanted))
+        for one in (*fitting, *self._fields):
+            item = QListWidgetItem(icon(one.icon, self.theme.text2, 18), one.words)
+            item.setData(Qt.ItemDataRole.UserRole, one)
+            item.setToolTip(one.help)
+            item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, one.help)
+            item.setSizeHint(QSize(WIDTH - 40, ROW_PX))
+            self.list.addItem(item)
         self.list.setCurrentRow(0)
         if not self.list.count():
             self.help.setText("Nothing that can be added here has this name")

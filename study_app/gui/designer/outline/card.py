@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QItemSelectionModel, QModelIndex, QPoint, Qt, Signal
-from PySide6.QtGui import QStandardItem, QStandardItemModel
+from PySide6.QtCore import QEvent, QItemSelectionModel, QModelIndex, QObject, QPoint, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QMenu
 
 from study_app.gui.designer.outline.rows import ROW_ROLE, Index
@@ -20,8 +20,8 @@ class OutlineCard(Card):
 
     Signals: ``chosen`` (path), ``settled`` (an element was clicked), ``find_changed`` (words), ``add_asked``,
     ``duplicate_asked``, ``delete_asked``, ``copy_asked``, ``paste_asked``, ``rename_asked``, ``move_asked`` (by how
-    many places), ``dropped`` (entries of a list, and the index of the one that they come before), ``several_changed``
-    (what else is selected).
+    many places), ``field_asked`` (path of a field that was found), ``dropped`` (entries of a list, and the index of the
+    one that they come before), ``several_changed`` (what else is selected).
     """
 
     chosen = Signal(object)
@@ -36,6 +36,7 @@ class OutlineCard(Card):
     move_asked = Signal(int)
     dropped = Signal(object, int)
     several_changed = Signal()
+    field_asked = Signal(object)
 
     def __init__(self) -> None:
         super().__init__(padding=12, gap=8)
@@ -71,12 +72,15 @@ class OutlineCard(Card):
         buttons.addWidget(self.duplicate, 1)
         self.column.addLayout(buttons)
         self.words.textChanged.connect(self.find_changed)
+        self.words.returnPressed.connect(self._open_first)
+        self.words.installEventFilter(self)
         self.tree.selectionModel().currentChanged.connect(self._choose)
         self.tree.selectionModel().selectionChanged.connect(lambda _now, _before: self.several_changed.emit())
         self.tree.clicked.connect(self._click)
         self.tree.expanded.connect(lambda index: self._opened.add(self._key(index)))
         self.tree.collapsed.connect(lambda index: self._opened.discard(self._key(index)))
         self.tree.key_pressed.connect(self._key_pressed)
+        self.tree.entered_row.connect(self.open_current)
         self.tree.copy_asked.connect(self.copy_asked)
         self.tree.paste_asked.connect(self.paste_asked)
         self.tree.dropped.connect(self.dropped)
@@ -206,6 +210,35 @@ class OutlineCard(Card):
             self.tree.setExpanded(index, not self.tree.isExpanded(index))
         if len(index.data(ROW_ROLE).path) > int(inner):  # not the heading of several
             self.settled.emit()
+        self.open_current()
+
+    def open_current(self) -> bool:
+        """Go to the field of the current row that was found; return whether there is one."""
+        current = self.tree.currentIndex()
+        field: ElementPath = current.data(ROW_ROLE).field if current.isValid() else ()
+        if field:
+            self.field_asked.emit(field)
+        return bool(field)
+
+    def _go_to_first(self) -> bool:
+        """Select the first element that is shown; return whether there is one."""
+        first = next((index for index in self.indexes() if index.data(ROW_ROLE).path), None)
+        if first is not None:
+            self.tree.setCurrentIndex(first)
+        return first is not None
+
+    def _open_first(self) -> None:
+        """Select the first element that was found, and go to its field."""
+        if self.words.text().strip() and self._go_to_first() and not self.open_current():
+            self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+        """Go from the words that find into the tree by Down."""
+        down = event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Down
+        if down and self._go_to_first():
+            self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
+            return True
+        return super().eventFilter(watched, event)
 
     def _key_pressed(self, key: int) -> None:
         (self.add_asked if key == Qt.Key.Key_Insert else self.delete_asked).emit()

@@ -18,11 +18,12 @@ EDGE_PX = 24
 class Tree(Themed, QTreeView):
     """The rows.
 
-    Signals: ``key_pressed`` (Insert, Delete), ``copy_asked``, ``paste_asked``, ``dropped`` (entries of a list, and the
-    index of the one that they come before).
+    Signals: ``key_pressed`` (Insert, Delete), ``entered_row`` (by Enter), ``copy_asked``, ``paste_asked``, ``dropped``
+    (entries of a list, and the index of the one that they come before).
     """
 
     key_pressed = Signal(int)
+    entered_row = Signal()
     copy_asked = Signal()
     paste_asked = Signal()
     dropped = Signal(object, int)
@@ -74,6 +75,8 @@ class Tree(Themed, QTreeView):
             self._let_go()
         elif event.key() in {Qt.Key.Key_Insert, Qt.Key.Key_Delete} and not event.modifiers():
             self.key_pressed.emit(event.key())
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self.entered_row.emit()
         elif event.matches(QKeySequence.StandardKey.Copy):
             self.copy_asked.emit()
         elif event.matches(QKeySequence.StandardKey.Paste):

@@ -1,0 +1,127 @@
+"""Words of the grammar are found in the outline and in the list of what can be added, and lead to their fields."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
+
+from study_app.gui.designer.outline.rows import ROW_ROLE
+
+pytestmark = pytest.mark.slow
+
+CONTROL = Qt.KeyboardModifier.ControlModifier
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def find(qtbot: Any, designer: Any) -> Any:
+    """Types words into the field that finds, which Ctrl+F leads to; returns the titles that are left."""
+    designer.controller.open("kitchen")
+
+    def type_words(words: str) -> list[str]:
+        qtbot.keyClick(designer.window, Qt.Key.Key_F, CONTROL)
+        field = designer.place.outline.words
+        assert field.hasFocus()
+        field.selectAll()
+        qtbot.keyClicks(field, words)
+        return [row.title for row in designer.place.outline.rows if row.path]
+
+    return type_words
+
+
+def has_keyboard(designer: Any, *path: str | int) -> bool:
+    return bool(designer.row(*path).field.isAncestorOf(QApplication.focusWidget()))
+
+
+def test_enter_goes_to_the_field_whose_label_or_choice_was_found(qtbot: Any, designer: Any, find: Any) -> None:
+    words = designer.place.outline.words
+    assert find("force limit") == ["Device · Force limit"]
+    qtbot.keyClick(words, Qt.Key.Key_Return)
+    assert designer.editing.selected == ("device",)
+    assert has_keyboard(designer, "device", "force_limit_n")
+    titles = find("williams")
+    assert titles
+    assert all(title.endswith(" · Order") for title in titles)
+    qtbot.keyClick(words, Qt.Key.Key_Return)
+    block = designer.editing.selected
+    assert block[0] == "blocks"
+    assert has_keyboard(designer, *block, "order")
+    assert "Thin · Delay" in find("delays")
+
+
+def test_down_leads_into_the_tree_and_enter_or_a_click_there_to_the_field(qtbot: Any, designer: Any, find: Any) -> None:
+    outline = designer.place.outline
+    find("delay")
+    qtbot.keyClick(outline.words, Qt.Key.Key_Down)
+    assert outline.tree.hasFocus()
+    at = next(one for one in outline.indexes() if one.data(ROW_ROLE).path == ("conditions", "thin"))
+    qtbot.mouseClick(outline.tree.viewport(), LEFT, pos=outline.tree.visualRect(at).center())
+    assert designer.editing.selected == ("conditions", "thin")
+    assert has_keyboard(designer, "conditions", "thin", "delay_ms")
+    find("delay")
+    qtbot.keyClick(outline.words, Qt.Key.Key_Down)
+    for _ in outline.rows:
+        if designer.editing.selected == ("conditions", "thick"):
+            break
+        qtbot.keyClick(outline.tree, Qt.Key.Key_Down)
+    assert outline.tree.hasFocus()  # arrows alone only select
+    qtbot.keyClick(outline.tree, Qt.Key.Key_Return)
+    assert has_keyboard(designer, "conditions", "thick", "delay_ms")
+
+
+def test_a_key_that_the_file_does_not_have_leads_to_the_button_that_adds_it(
+    qtbot: Any, designer: Any, find: Any
+) -> None:
+    titles = find("break every")
+    assert titles[0].endswith(" · Break every")
+    qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Return)
+    assert QApplication.focusWidget().accessibleName() == "Add Break every"
+    qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Space)
+    assert "break_every" in designer.editing.opened.study.document["blocks"][designer.editing.selected[1]]
+
+
+def test_a_title_that_has_the_words_comes_without_a_field(qtbot: Any, designer: Any, find: Any) -> None:
+    assert "A first look" in find("first look")
+    qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Return)
+    assert designer.editing.selected == ("pages", "welcome")
+    assert designer.place.outline.tree.hasFocus()
+
+
+def test_the_words_are_cleared_when_another_study_opens(designer: Any, find: Any) -> None:
+    find("williams")
+    designer.controller.open("rek2024")
+    assert designer.place.outline.words.text() == ""
+    assert ("pages", "debrief") in [row.path for row in designer.place.outline.rows]
+
+
+def test_enter_in_the_drawer_closes_it_and_goes_to_the_field(qtbot: Any, designer: Any, find: Any) -> None:
+    designer.window.resize(1024, 640)
+    QApplication.processEvents()
+    find("force limit")
+    qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Return)
+    assert has_keyboard(designer, "device", "force_limit_n")
+    assert not designer.place.outline.isVisible()
+
+
+def test_the_list_of_what_can_be_added_offers_fields_to_go_to(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("blocks", "liquids"))
+    adding = designer.place.adding
+    designer.place.ask_to_add()
+    count = adding.list.count()
+    before = designer.text
+    qtbot.keyClicks(adding.words, "williams design")
+    assert adding.list.item(0).text() == "Order of block Liquids, Williams"
+    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
+    assert designer.editing.selected == ("blocks", "liquids")
+    assert has_keyboard(designer, "blocks", "liquids", "order")
+    designer.place.ask_to_add()
+    assert adding.list.count() == count
+    qtbot.keyClicks(adding.words, "force limit")
+    assert [adding.list.item(at).text() for at in range(adding.list.count())] == ["Force limit of Device"]
+    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
+    assert has_keyboard(designer, "device", "force_limit_n")
+    assert designer.text == before
