@@ -21,6 +21,7 @@ from study_app.app.designer.element_steps import (
 )
 from study_app.authoring.additions import added
 from study_app.authoring.changes.initial_values import initial, singular
+from study_app.authoring.changes.short_texts import followed
 from study_app.authoring.conversions import left_by, switched
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at, rows
@@ -80,7 +81,8 @@ class Steps:
             name = label_of(asked.path[-1])
             return Step(f"Change {name}", (Set(asked.path, asked.value),), None, asked.path if asked.typing else None)
         if isinstance(asked, SetText):
-            return Step(f"Type {label_of(asked.path[-1])}", _text(study, asked), None, (*asked.path, asked.language))
+            edits = (*_text(study, asked), *followed(study, asked.path, asked.language, asked.text))
+            return Step(f"Type {label_of(asked.path[-1])}", edits, None, (*asked.path, asked.language))
         if isinstance(asked, RemoveKey):
             return Step(f"Remove {label_of(asked.path[-1])}", (Unset(asked.path),))
         if isinstance(asked, AddKey):

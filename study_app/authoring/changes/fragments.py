@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from study_app.authoring.additions import added
+from study_app.authoring.changes.short_texts import short_of
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.names import free_name, references_to, renamed
@@ -21,8 +22,6 @@ from study_app.authoring.writer.values import tables
 from study_app.protocol.source.document import Path, entries, frozen, names, value_at
 
 MOST_LINES: Final = 200
-SHORT: Final = 40
-"""So many letters of a line name its question in figures and tables."""
 _ID: Final = re.compile(r"[^a-z0-9]+")
 _BULLET: Final = re.compile(r"^\s*(?:[-*•]|\d{1,3}[.)])\s+")
 
@@ -183,9 +182,8 @@ def _questions_of(study: Study, selected: Path, pasted_text: str) -> Pasted:
     for line in lines:
         name = free_name(taken, _id_of(line))
         taken.add(name)
-        short = line[:SHORT].rstrip(" ?.!:")
-        text, short_text = ({languages[0]: one} if len(languages) > 1 else one for one in (line, short))
-        value = {"id": name, **kind, "text": text, "short": short_text}
+        text, short = ({languages[0]: one} if len(languages) > 1 else one for one in (line, short_of(line)))
+        value = {"id": name, **kind, "text": text, "short": short}
         edits, path = added(now, ("questionnaires", form, "items"), value, behind=at)
         now, _ = now.edited(*edits)
         paths.append(path)
