@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from study_app.authoring.changes.initial_values import initial
+from study_app.authoring.changes.languages import filled_in, languages_of
 from study_app.authoring.edited_study import Study
 from study_app.authoring.names import choices_at
 from study_app.authoring.writer.edits import Edit, Insert, Rename, Set, Unset
@@ -38,7 +39,7 @@ class Repair:
 def repairs(study: Study, fault: Fault) -> tuple[Repair, ...]:
     """Return the repairs of a fault: after each of them it is gone."""
     offered = (repair for kind in _KINDS for repair in kind(study, fault))
-    return tuple(repair for repair in offered if removes(study, fault, repair))
+    return (*(repair for repair in offered if removes(study, fault, repair)), *_every_text(study, fault))
 
 
 def removes(study: Study, fault: Fault, repair: Repair) -> bool:
@@ -127,6 +128,13 @@ def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
     elif fault.in_one_language and isinstance(text, str) and languages:
         copies = dict.fromkeys(languages, text)
         yield Repair("Use this text in every language", (Set(fault.path, copies),))
+
+
+def _every_text(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield copies of all texts in the first language that another one lacks; they are too many to be tried out."""
+    edits = filled_in(study, fault.missing_language) if fault.missing_language else ()
+    if len(edits) > 1 and any(edit.path[: len(fault.path)] == fault.path for edit in edits):
+        yield Repair(f"Copy all {len(edits)} from {language_name(languages_of(study)[0])}", edits)
 
 
 def _steps(study: Study, fault: Fault) -> Iterator[Repair]:

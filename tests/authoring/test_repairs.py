@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from study_app.authoring.additions import additions_for
+from study_app.authoring.changes.languages import with_language
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.repairs import repairs
 from tests.authoring.grown import PROTOCOLS
@@ -104,3 +105,24 @@ def test_a_level_beyond_the_slope_limit_is_repaired_by_the_highest_that_passes()
     highest = after.document["stimuli"]["damping"]["levels"][1]
     above = study.text.replace("levels = [0.02, 3]", f"levels = [0.02, {highest * 1.01}]")
     assert read(above.encode()).protocol is None
+
+
+def test_every_text_that_a_language_lacks_is_copied_in_one_step() -> None:
+    study = study_of("demo")
+    edits = with_language(study, "nl")
+    study, _ = study.edited(*edits)
+    missing = [fault for fault in study.faults if fault.missing_language]
+    assert len(missing) > 10
+    (every,) = {
+        repair.words: repair
+        for fault in missing
+        for repair in repairs(study, fault)
+        if repair.words.startswith("Copy all")
+    }.values()
+    assert every.words == f"Copy all {len(missing)} from English"
+    assert study.edited(*every.edits)[0].faults == ()
+
+
+def test_a_single_text_that_is_missing_is_copied_alone() -> None:
+    study = study_of("rek2024", ('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'))
+    assert [repair.words for fault in study.faults for repair in repairs(study, fault)] == ["Copy the English text"]

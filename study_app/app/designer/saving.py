@@ -23,6 +23,7 @@ from study_app.gui.designer.view import DesignerPlace
 from study_app.viewmodels.designer.designer_view import Banner
 from study_app.viewmodels.designer.versions.changes_view import FILE
 from study_app.viewmodels.designer.versions.standing import save_prompt
+from study_app.viewmodels.sessions import counted
 
 DRAFT_MS: Final = 50
 RETRY_MS: Final = 2_000
@@ -47,6 +48,7 @@ class Saving(QObject):
         self.editing, self.place, self.runs = editing, place, runs
         self.banner: Banner | None = None
         self._notice: Banner | None = None
+        self._faulty: Banner | None = None
         self.card: SaveCard | None = None
         self._others, self._trouble = 0, ""
         self._drafting = QTimer(self)
@@ -55,6 +57,7 @@ class Saving(QObject):
         self._watch = FileWatch(editing)
         self._watch.touched.connect(self._look_while_shown)
         editing.opened_other.connect(self._begin)
+        editing.edited.connect(self._forget_saving)
         place.left.connect(self.leave)
         place.save_asked.connect(self.save)
         place.banner_asked.connect(self.answer_banner)
@@ -99,6 +102,9 @@ class Saving(QObject):
             return
         if action == "copy":
             self.copy_asked.emit(source_of(opened.file))
+            return
+        if action == "problems":
+            self.place.parts.focus_problems()
             return
         if action == "compare":
             drafts = [one.hash for one in kept_versions(opened.file) if one.origin == "draft"]
@@ -183,9 +189,18 @@ class Saving(QObject):
             self.place.message.emit("The study was not saved", f"{error}.")
             self.editing.announce()
             return
-        self._notice = None
+        count = len(opened.study.faults)
+        said = f"Saved. It cannot be run yet: {counted(count, 'problem')}"
+        self._notice = self._faulty = Banner(said, (("problems", "Show the list"),)) if count else None
         self._show_banner(opened)
         self.saved.emit(opened.file)
+
+    def _forget_saving(self) -> None:
+        """Take back that the study was saved with problems: it is edited."""
+        opened = self.editing.opened
+        if opened is not None and opened.edited and self._notice is not None and self._notice is self._faulty:
+            self._notice, self.banner = None, _banner(opened)
+            self.place.banner.show_banner(self.banner)
 
     # drafts
 

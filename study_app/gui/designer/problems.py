@@ -16,7 +16,7 @@ from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEn
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
-HIGHEST = 290
+HIGHEST, NARROW_BELOW = 290, 1000
 HEAD_PX, ROW_PX, LINE_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 39, 56, 190, 110
 
 
@@ -37,7 +37,7 @@ class ProblemLine(Themed, QWidget):
         where = f"{row.title}, {row.field}" if row.field else row.title
         self.go.setAccessibleName(f"{where}: {row.message}")
         self.go.clicked.connect(self.opened)
-        self.go.setFixedWidth(150)
+        self.go.setFixedWidth(130 if narrow else 150)
         self.go.setStyleSheet("text-align: left; padding-left: 0;")
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         across = QHBoxLayout(self)
@@ -50,8 +50,9 @@ class ProblemLine(Themed, QWidget):
         field.show_text(row.field)
         field.setFixedWidth(90 if narrow else 130)
         across.addWidget(field)
-        words = row.message if not row.hint else f"{row.message}  ({row.hint})"
+        words = row.message if narrow or not row.hint else f"{row.message}  ({row.hint})"
         said = Clamped(words, 2, "label")
+        self.setToolTip(f"{row.message}  ({row.hint})" if row.hint else row.message)
         said.setAlignment(Qt.AlignmentFlag.AlignVCenter)
         line = figures("" if row.line is None else f"line {row.line}", "small", "text2")
         line.setFixedWidth(LINE_PX)
@@ -150,7 +151,7 @@ class ProblemsCard(Card):
         column.setSpacing(0)
         self.lines = []
         for row in listed:
-            made = ProblemLine(row, repairs.get(row, ()), narrow=(self.parentWidget() or self).width() < 900)
+            made = ProblemLine(row, repairs.get(row, ()), narrow=(self.parentWidget() or self).width() < NARROW_BELOW)
             made.opened.connect(lambda row=row: self._open(row))
             made.repair_asked.connect(lambda words, row=row: self.repair_asked.emit(row, words))
             made.here = row == self._at

@@ -13,7 +13,7 @@ from study_app.viewmodels.tones import Tone
 
 NO_FILE: Final = FileText()
 NO_VERSION: Final = VersionChip()
-BannerAction: TypeAlias = Literal["copy", "keep", "take", "compare", "discard"]
+BannerAction: TypeAlias = Literal["copy", "keep", "take", "compare", "discard", "problems"]
 
 
 @dataclass(frozen=True, slots=True)

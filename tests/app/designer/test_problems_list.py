@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent, QPointF
+from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.authoring.study_facts import facts
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.requests import SetValue
+from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -78,3 +78,27 @@ def test_a_text_that_is_missing_hides_no_force_and_is_counted_the_same_everywher
     assert [entry.note for entry in languages] == ["every text", "1 missing"]
     assert facts(designer.editing.opened.study).missing == {"nl": 1}
     assert [problem.message for problem in designer.place.view.problems] == ["Is missing in Dutch"]
+
+
+def test_every_text_of_a_second_language_is_copied_from_the_list_or_a_field_in_one_step(
+    qtbot: Any, designer: Any
+) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(ChangeLanguage("add", "nl"))
+    before, count = designer.text, len(designer.place.view.problems)
+    designer.place.header.problems.click()
+    words = f"Copy all {count} from English"
+    line = designer.place.problems.lines[0]
+    qtbot.waitUntil(lambda: len(line.repairs) == 2)
+    assert [button.text() for button in line.repairs] == ["Copy the English text", words]
+    qtbot.mouseClick(line.repairs[1], Qt.MouseButton.LeftButton)
+    assert designer.place.view.problems == ()
+    assert designer.editing.opened.study.faults == ()
+    designer.editing.undo()
+    assert designer.text == before
+    designer.editing.select(("pages", "welcome"))
+    title = designer.row("pages", "welcome", "title")
+    qtbot.waitUntil(lambda: any(button.text() == words for button in title.repairs), timeout=20_000)
+    next(button for button in title.repairs if button.text() == words).click()
+    assert designer.editing.opened.study.faults == ()
+    assert "not translated yet" in designer.row("pages", "welcome", "title").field.copied.text()

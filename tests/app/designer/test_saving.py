@@ -12,7 +12,7 @@ from study_app.authoring.versions.contents import kept_content
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.viewmodels.designer.requests import SetText, SetValue
+from study_app.viewmodels.designer.requests import ChangeLanguage, SetText, SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -145,3 +145,23 @@ def test_letters_typed_after_saving_a_version_are_a_step_of_their_own(drafted: A
     drafted.editing.ask(SetText(TITLE, "en", "He"))
     drafted.editing.undo()
     assert drafted.text == numbered
+
+
+def test_saving_says_that_the_study_cannot_be_run_until_it_is_edited(drafted: Any, said: list[str]) -> None:
+    drafted.editing.ask(ChangeLanguage("add", "nl"))
+    count = len(drafted.editing.opened.study.faults)
+    assert count > 10
+    drafted.saving.save()
+    words = f"Saved. It cannot be run yet: {count} problems"
+    assert drafted.place.banner_words.text() == words
+    assert drafted.place.banner.isVisible()
+    assert said == [words]
+    drafted.place.banner.buttons[0].click()
+    assert drafted.place.problems.isVisible()
+    drafted.editing.select(("device",))
+    assert drafted.place.banner.isVisible()
+    drafted.editing.ask(ChangeLanguage("copy", "nl"))
+    assert not drafted.place.banner.isVisible()
+    drafted.saving.save()
+    assert not drafted.place.banner.isVisible()
+    assert drafted.file.read_text() == drafted.text
