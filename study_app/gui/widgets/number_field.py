@@ -116,7 +116,7 @@ class NumberField(QLineEdit):
     def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
         """Take what was typed."""
         super().focusOutEvent(event)
-        self._take()
+        self.flush()
 
     @staticmethod
     def _writes(text: str) -> bool:
@@ -126,9 +126,9 @@ class NumberField(QLineEdit):
         """Take what was typed, a refused number once more: what was in its way may be gone."""
         if self._state == "refused":
             self.setModified(True)
-        self._take()
+        self.flush()
 
-    def _take(self) -> None:
+    def flush(self) -> None:
         """Say what was typed, once; it stays where it is not a number."""
         if not self.isModified():
             return

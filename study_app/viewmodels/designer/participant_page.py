@@ -44,6 +44,8 @@ class ParticipantView:
         The study's languages.
     step : str
         Which step it is, as "Liquids, trial 1 of 6".
+    trial, trials : int
+        Which trial of its block it is, from 1, and how many the block has; 0 where it is none.
     has_before, has_after : bool
         Whether there is a step before and after it.
     moments : tuple of (Moment, str)
@@ -69,6 +71,14 @@ class ParticipantView:
     focused: str | None = None
     note: str = ""
     photodiode: bool = True
+    trial: int = 0
+    trials: int = 0
+
+    @property
+    def around_trial(self) -> tuple[str, str]:
+        """The words of the step before and after the number of its trial: "Liquids, trial", "of 6"."""
+        before, _, after = self.step.rpartition(f" {self.trial} of ")
+        return before, f"of {after}"
 
     @property
     def words(self) -> Words:

@@ -147,8 +147,7 @@ class Tasks:
         user.press("Make study")
         user.select("Viscosity", "Session, in order")
         user.choose("View of the study", "Participant")
-        for _ in range(9):
-            user.press("Next step")
+        user.write("Viscosity, trial, 1 to *", "10")
         user.shortcut("F5", "Play from here")
         wait_until(participant, "the participant's window", 300_000)
         user.hand.come_forward(user.window)

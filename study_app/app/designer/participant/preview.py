@@ -85,6 +85,7 @@ class ParticipantPreview(QObject):
         tab.shown.connect(self._follow)
         tab.language_asked.connect(self.show_language)
         tab.step_asked.connect(self.go)
+        tab.trial_asked.connect(self.go_to_trial)
         tab.moment_asked.connect(self.show_moment)
         tab.happened.connect(self._hear)
         tab.frame_due.connect(self._move_ball)
@@ -95,6 +96,7 @@ class ParticipantPreview(QObject):
     @property
     def position(self) -> StepPosition | None:
         """Where the preview is; None where it shows nothing, or a page that is not in the first session."""
+        self.tab.trial.flush()
         self._update()
         found = self._found
         if found is None or found.session:
@@ -125,6 +127,17 @@ class ParticipantPreview(QObject):
             self._found = Found(found.shown, index, found.session)
             self._moment = None
             self._show()
+
+    def go_to_trial(self, number: int) -> None:
+        """Show a trial of the block that is shown; its first or its last one where there is none of that number."""
+        found = self._found
+        shown = None if found is None else found.shown.schedule.steps[found.index]
+        if found is None or not isinstance(shown, Trial):
+            return
+        number = min(max(number, 1), shown.of)
+        steps = enumerate(found.shown.schedule.steps)
+        at = next(at for at, one in steps if isinstance(one, Trial) and (one.block, one.index) == (shown.block, number))
+        self.go(at - found.index)
 
     def show_moment(self, moment: Moment) -> None:
         """Show another page of the step: its tank, or its questions."""
@@ -242,7 +255,9 @@ class ParticipantPreview(QObject):
         page = previewed_page(shown, index, self._moment, self._language, self._answers.get(self._page_key, NO_ANSWERS))
         if isinstance(page, TaskPage):
             self._place_ball(page, tested_condition(shown, index))
-        step = step_words(shown, shown.schedule.steps[index], shown.protocol.study.languages[0])
+        now = shown.schedule.steps[index]
+        trial, trials = (now.index, now.of) if isinstance(now, Trial) and now.of > 1 else (0, 0)
+        step = step_words(shown, now, shown.protocol.study.languages[0])
         if found.session and found.session != STANDALONE:
             step = f"{step} ({found.session})"
         self.tab.show_view(
@@ -258,6 +273,8 @@ class ParticipantPreview(QObject):
                 self._question(study),
                 self._note(study, found),
                 self._photodiode,
+                trial,
+                trials,
             )
         )
 

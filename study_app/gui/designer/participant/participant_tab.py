@@ -14,10 +14,12 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import Choice, IconButton
 from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.number_field import NumberField
 from study_app.session.trial import TankView
 from study_app.viewmodels.designer.participant_page import ParticipantView, ScreenSize
 
 MOST_IN_ROW: Final = 2
+TRIAL_PX: Final = 48
 BAR_PX: Final = 34
 """The height of what stands beside the tabs."""
 
@@ -26,12 +28,13 @@ class ParticipantTab(Card):
     """Draws a `ParticipantView`.
 
     ``aside`` holds language and screen, for the right of the tabs. Signals: ``language_asked`` (code), ``step_asked``
-    (−1 or 1), ``moment_asked`` (moment), ``resized`` when it needs another height; ``happened``, ``frame_due`` and
-    ``shown`` as of `LivePage`.
+    (−1 or 1), ``trial_asked`` (its number in its block), ``moment_asked`` (moment), ``resized`` when it needs another
+    height; ``happened``, ``frame_due`` and ``shown`` as of `LivePage`.
     """
 
     language_asked = Signal(str)
     step_asked = Signal(int)
+    trial_asked = Signal(int)
     moment_asked = Signal(object)
     happened = Signal(object)
     frame_due = Signal()
@@ -63,8 +66,12 @@ class ParticipantTab(Card):
         across.addWidget(self.screens)
         self.before = IconButton("chevron_left", "Previous step", "Previous step", size=36)
         self.after = IconButton("chevron", "Next step", "Next step", size=36)
+        for button in (self.before, self.after):
+            button.setAutoRepeat(True)
         self.step = label("", "label", wraps=True)
-        self.step.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.trial, self.trials = NumberField(), label("", "label")
+        self.trial.setFixedWidth(TRIAL_PX)
+        self.trial.setToolTip("Trial of the block; Play from here begins with it")
         self.moments = Segments("Page of the trial")
         self.zoom = Segments("Size of the page")
         self.zoom.show_values(((True, "Fit"), (False, "100 %")), chosen=True)
@@ -73,6 +80,8 @@ class ParticipantTab(Card):
         second.addStretch()
         row.addWidget(self.before)
         row.addWidget(self.step, 1)
+        row.addWidget(self.trial)
+        row.addWidget(self.trials)
         row.addWidget(self.after)
         row.addWidget(self.moments)
         row.addWidget(self.zoom)
@@ -93,6 +102,9 @@ class ParticipantTab(Card):
         self.screens.activated.connect(self._choose_screen)
         self.before.clicked.connect(lambda: self.step_asked.emit(-1))
         self.after.clicked.connect(lambda: self.step_asked.emit(1))
+        self.trial.entered.connect(lambda number: self.trial_asked.emit(round(number)))
+        self.trial.unread.connect(lambda _text: self.trial.put_back())
+        self.trial.stepped.connect(lambda steps: self.trial_asked.emit(self.view.trial + steps))
         self.moments.chosen.connect(self.moment_asked)
         self.zoom.chosen.connect(self._show_fitted)
 
@@ -104,7 +116,7 @@ class ParticipantTab(Card):
         self.languages.show_values([(code, code.upper()) for code in view.languages], view.language)
         self.note.setText(view.note)
         self.note.setVisible(bool(view.note))
-        self.step.setText(view.step)
+        self._show_step(view)
         self.before.setEnabled(view.has_before)
         self.after.setEnabled(view.has_after)
         self.moments.setVisible(bool(view.moments))
@@ -117,6 +129,18 @@ class ParticipantTab(Card):
         if (high := self.column.minimumSize().height()) != self._high:  # another note, or another row of pages
             self._high = high
             self.resized.emit()
+
+    def _show_step(self, view: ParticipantView) -> None:
+        """Name the step; the number of a trial is a field."""
+        before, after = view.around_trial if view.trials else (view.step, "")
+        sides = Qt.AlignmentFlag.AlignVCenter
+        self.step.setText(before)
+        self.step.setAlignment(sides | (Qt.AlignmentFlag.AlignRight if after else Qt.AlignmentFlag.AlignHCenter))
+        self.trials.setText(after)
+        for part in (self.trial, self.trials):
+            part.setVisible(bool(after))
+        self.trial.setAccessibleName(f"{before}, 1 to {view.trials}; Play from here begins with it")
+        self.trial.show_text(str(view.trial))
 
     def show_tank(self, view: TankView) -> None:
         """Draw the ball in the tank."""
