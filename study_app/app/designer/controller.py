@@ -96,6 +96,7 @@ class DesignerController(QObject):
         editing.changed.connect(self.show)
         self.preview = ParticipantPreview(editing, place)
         self.playing.where = lambda: self.preview.position
+        self.playing.kept.connect(self.runs.look)
         editing.edited.connect(self._resting.start)
         editing.refused.connect(self._refuse)
         editing.made.connect(self._show_step)

@@ -31,7 +31,8 @@ class Run:
     version : str
         Its version.
     sessions, pilots, rehearsals : int
-        How many there are; rehearsals are all sessions on simulated devices.
+        How many there are; pilots are marked as such, also those that were played in the study designer and kept;
+        rehearsals are the other sessions on simulated devices.
     last : str
         When the newest began, as ISO 8601.
     receipt : Path or None
@@ -72,8 +73,8 @@ def runs(results: Path, study: str) -> tuple[Run, ...]:
     if not _NAME.fullmatch(study):
         return ()
     found: dict[str, Run] = {}
-    folders = (results / study, results / f"{study}-pilot", *sorted(results.glob(f"{study}-rehearsal-*")))
-    for folder in folders:
+    others = (folder for kind in ("pilot", "rehearsal") for folder in sorted(results.glob(f"{study}-{kind}-*")))
+    for folder in (results / study, results / f"{study}-pilot", *others):
         for session in StudyFolder(folder).sessions():
             if (one := run_of(session.receipt)) is not None:
                 run = found.get(one.hash, replace(one, sessions=0, pilots=0, rehearsals=0))
@@ -100,7 +101,7 @@ def _run(path: Path, _changed_ns: int) -> Run:
     held = receipt.read(path)
     version = str(held.get("protocol", {}).get("study", {}).get("version", ""))
     simulated, pilot = bool(held.get("simulated")), bool(held.get("pilot"))
-    counted = (int(not simulated and not pilot), int(pilot and not simulated), int(simulated))
+    counted = (int(not simulated and not pilot), int(pilot), int(simulated and not pilot))
     return Run(str(held.get("protocol_hash")), version, *counted, str(held.get("started_at") or ""), path)
 
 

@@ -73,9 +73,11 @@ def rows(designer: Any) -> list[str]:
 
 
 def test_a_study_that_was_not_run_is_saved_without_a_question(designer: Any, qtbot: Any) -> None:
-    run(designer, "P001", designer.file.read_bytes(), study="kitchen-pilot", pilot=True)
     designer.controller.open("kitchen")
     qtbot.waitUntil(lambda: designer.place.header.version.words == "Not run yet")
+    run(designer, "P001", designer.file.read_bytes(), study="kitchen-pilot", pilot=True)
+    designer.controller.enter()
+    qtbot.waitUntil(lambda: designer.place.header.version.words == "Piloted")
     assert "1 pilot" in designer.place.header.version.toolTip()
     designer.editing.ask(SetValue(REPETITIONS, 3))
     qtbot.wait(250)

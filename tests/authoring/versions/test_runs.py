@@ -42,12 +42,13 @@ def test_runs_counts_sessions_pilots_and_rehearsals_by_content(tmp_path: Path) -
     session(tmp_path / "demo", "P002", one)
     session(tmp_path / "demo", "P003", other, started_at="2026-11-22T12:00:00+00:00")
     session(tmp_path / "demo-pilot", "P001", one, pilot=True)
+    session(tmp_path / "demo-pilot-2", "P001", other, pilot=True, simulated=True)  # played and kept
     session(tmp_path / "demo-rehearsal-1", "P001", other, simulated=True)
     (tmp_path / "demo" / "data" / "sub-P004" / "ses-01").mkdir(parents=True)
     found = runs(tmp_path, "demo")
     assert [(run.version, run.sessions, run.pilots, run.rehearsals) for run in found] == [
         ("1.0", 2, 1, 0),
-        ("1.1", 1, 0, 1),
+        ("1.1", 1, 1, 1),
     ]
     assert [run.hash for run in found] == [protocol_hash(one), protocol_hash(other)]
     assert found[0].protocol == json.loads(json.dumps(without_conditions(parse(one, "demo"))))

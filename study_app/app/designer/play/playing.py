@@ -6,6 +6,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -21,8 +22,9 @@ from study_app.app.lab_rows import device_choices
 from study_app.app.session.live_session import BUG
 from study_app.app.session.termination import Patience
 from study_app.app.workstation_controller import settings_here
+from study_app.authoring.versions.contents import keep_content
 from study_app.devices.registry import descriptor_of, title_of
-from study_app.errors import StudyError
+from study_app.errors import StoreError, StudyError
 from study_app.gui.designer.view import DesignerPlace
 from study_app.gui.widgets.background import Background
 from study_app.session.request import NewSession, resumed
@@ -192,6 +194,8 @@ class Playing(QObject):
         except StudyError as error:
             self.place.message.emit("The pilot was not kept", f"{error}.")
             return
+        with suppress(StoreError):  # only the tab Changes would miss it
+            keep_content(pilot.what.source)
         self._delete()
         self._show(shown.kept(to.name))
         self.kept.emit(to)

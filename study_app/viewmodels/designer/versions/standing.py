@@ -56,7 +56,8 @@ def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     tip = run_words(known)
     save = f"Save {standing.version} …" if standing.asks else "Save"
     if not standing.was:
-        return VersionChip("neutral", "ring", "Not run yet", tip or "No session was run with this study", save)
+        words = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not run yet"
+        return VersionChip("neutral", "ring", words, tip or "No session was run with this study", save)
     if standing.sessions:
         words = f"{standing.version}, run by {standing.sessions}"
         return VersionChip("ok", "check", words, tip, save)

@@ -119,6 +119,11 @@ def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, 
     assert "to the end" in likert.place.header.strip.words.text()
     assert list(folders.iterdir())
     study = kept(qtbot, likert)
+    qtbot.waitUntil(lambda: likert.place.header.version.words == "Piloted")
+    qtbot.mouseClick(likert.place.header.version, Qt.MouseButton.LeftButton)
+    changes = likert.controller.changes.card
+    assert changes.version.currentText().startswith("1.0: 1 pilot, last today")
+    assert changes.view.note == "The study does not differ from this version."
     lines = lines_of(study)
     assert lines[0]["pilot"] is True
     assert lines[0]["simulated"] is True
