@@ -82,7 +82,7 @@ def make_participant_window(
         on_card=in_step and has_card(),
         text_scale=text_scale,
         photodiode=photodiode,
-        strip=Strip() if shares_screen and not chosen.played else None,
+        strip=Strip(played=chosen.played) if shares_screen else None,
     )
 
 

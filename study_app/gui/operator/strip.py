@@ -19,18 +19,21 @@ HEIGHT = 52
 
 
 class Strip(Themed, QWidget):
-    """State, where the session is, the way to the operator's window and the force stop; it never takes the keyboard."""
+    """State, where the session is, the way to the operator's window and the force stop; it never takes the keyboard.
+
+    A session that is ``played`` has no operator's window; its stop ends it.
+    """
 
     stop_asked = Signal()
     operator_asked = Signal()
 
-    def __init__(self) -> None:
+    def __init__(self, *, played: bool = False) -> None:
         super().__init__()
         self.setFixedHeight(HEIGHT)
         self.state = Chip("neutral", "clock", "Preparing")
         self.where = Elided("label", "text2")
         self.operator = ActionButton("", "Operator's window", key=OTHER_WINDOW, height=40)
-        self.stop = CompactStop()
+        self.stop = CompactStop("Stop playing") if played else CompactStop()
         self.operator.clicked.connect(self.operator_asked)
         self.stop.pressed.connect(self.stop_asked)
         row = QHBoxLayout(self)
@@ -41,6 +44,7 @@ class Strip(Themed, QWidget):
         for button in (self.operator, self.stop):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             row.addWidget(button)
+        self.operator.setHidden(played)
         apply_theme_within(self, PARTICIPANT)
 
     def show_view(self, view: OperatorView) -> None:

@@ -14,15 +14,17 @@ HEIGHT = 44
 
 
 class CompactStop(Themed, QPushButton):
-    """Stop force, in the force stop's own colour; it acts when pressed, not when released, and is never disabled."""
+    """Stop force, in the force stop's own colour; it acts when pressed, not when released, and is never disabled.
 
-    WORDS = "Stop force"
+    Where the stop ends more than the force, ``words`` say so.
+    """
 
-    def __init__(self) -> None:
+    def __init__(self, words: str = "Stop force") -> None:
         super().__init__()
+        self.words = words
         self.setProperty("role", "stop")
-        self.setAccessibleName(f"{self.WORDS}. Holding Esc does the same.")
-        self.setToolTip("Stop force (or hold Esc)")
+        self.setAccessibleName(f"{words}. Holding Esc does the same.")
+        self.setToolTip(f"{words} (or hold Esc)")
         self.setFixedHeight(HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -30,7 +32,7 @@ class CompactStop(Themed, QPushButton):
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the room for octagon and words."""
-        return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.WORDS)) + 62, HEIGHT)
+        return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.words)) + 62, HEIGHT)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the same: it is never cut."""
@@ -47,4 +49,4 @@ class CompactStop(Themed, QPushButton):
         draw_icon(painter, "stop", QRectF(17, self.height() / 2 - 10, 20, 20), ink, 2.0)
         painter.setPen(ink)
         painter.setFont(self._font)
-        painter.drawText(QRectF(46, 0, self.width() - 46, self.height()), Qt.AlignmentFlag.AlignVCenter, self.WORDS)
+        painter.drawText(QRectF(46, 0, self.width() - 46, self.height()), Qt.AlignmentFlag.AlignVCenter, self.words)

@@ -1,7 +1,8 @@
 """A pilot in one window: it goes on by itself after the skipped steps, and is over where it is stopped.
 
-The researcher is participant and operator. Holding Esc in any window, closing the participant's window and every
-failure end the force first, then the session, then the window; the journal has an end unless the disk took none.
+The researcher is participant and operator. Holding Esc in any window, "Stop playing" above the page where all windows
+share a screen, closing the participant's window and every failure end the force first, then the session, then the
+window; the journal has an end unless the disk took none.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ class PlayedSession(LiveSession):
         participant, runner = self.bridge.participant, self.bridge.runner
         participant.installEventFilter(self)
         participant.event.connect(self._hear)
-        self.bridge.operator.stop_asked.connect(self._stop_later)
+        for stop in (self.bridge.operator, self.bridge.strip):
+            if stop is not None:
+                stop.stop_asked.connect(self._stop_later)
         runner.on_change(self._follow)
         self._follow(runner.state)
         if runner.state.phase is Phase.PAUSED and runner.state.held is None:

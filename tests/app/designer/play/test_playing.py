@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QAbstractButton, QApplication
 
 from study_app.app.designer.participant.shown_step import StepPosition
 from study_app.app.designer.play import playing
@@ -21,6 +21,7 @@ from study_app.authoring.new_study import template
 from study_app.errors import DeviceLost
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
+from study_app.gui.widgets.compact_stop import CompactStop
 from study_app.session.pages import ChoicePage, FeedbackPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.simulated.preview import preview
 from study_app.store.verification.verify_study import verify
@@ -160,11 +161,20 @@ def test_holding_escape_ends_at_zero_force_and_the_data_are_deleted(qtbot: Any, 
     assert not likert.place.header.strip.isVisible()
 
 
-def test_closing_the_window_a_failure_and_leaving_the_place_stop(
+def stop_of(participant: ParticipantWindow) -> CompactStop:
+    """Return the stop above the pages; nothing there leads to an operator's window."""
+    (stop,) = (one for one in participant.strip.findChildren(QAbstractButton) if one.isVisible())
+    assert isinstance(stop, CompactStop)
+    assert stop.accessibleName() == "Stop playing. Holding Esc does the same."
+    return stop
+
+
+def test_stop_above_the_page_closing_the_window_a_failure_and_leaving_the_place_stop(
     qtbot: Any, likert: Any, folders: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     pilots = likert.controller.playing
     for leave in (
+        lambda: qtbot.mousePress(stop_of(window(ParticipantWindow)), Qt.MouseButton.LeftButton),
         lambda: window(ParticipantWindow).close(),
         lambda: pilots.pilot.session.bridge.fail(DeviceLost("the device is gone")),
         lambda: likert.window.go("home"),
