@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Final
 from weakref import WeakSet
 
-from PySide6.QtCore import QEvent, QPoint, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QBrush,
     QColor,
@@ -35,8 +35,9 @@ from PySide6.QtWidgets import (
 from shiboken6 import isValid
 
 from study_app.gui.participant.forms.questions_page import QuestionsPage
+from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL
+from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
 from study_app.session.pages import Page, QuestionnairePage, TaskPage
 from study_app.session.trial import TankView
@@ -44,6 +45,7 @@ from study_app.viewmodels.designer.participant_page import SIZES, ParticipantVie
 
 FRAME_MS: Final = 33
 RING: Final = 2
+LEAVES: Final = "Esc leaves the page"
 QWIDGETSIZE_MAX: Final = (1 << 24) - 1
 """The height of a part without a limit, as Qt has it [px]."""
 
@@ -70,6 +72,7 @@ class LivePage(Themed, QGraphicsView):
         self.setBackgroundBrush(QBrush(QColor(PARTICIPANT.window)))
         self.setRenderHints(QPainter.RenderHint.SmoothPixmapTransform | QPainter.RenderHint.TextAntialiasing)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleDescription(f"{LEAVES}, and so does Tab after its last control.")
         self.setMinimumHeight(120)
         self.setTransformationAnchor(QGraphicsView.ViewportAnchor.NoAnchor)
         self.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
@@ -240,8 +243,9 @@ class LivePage(Themed, QGraphicsView):
             super().keyReleaseEvent(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Show the ring; the page has had its focus before."""
+        """Show the ring and say how to leave; the page has had its focus before."""
         QAbstractScrollArea.focusInEvent(self, event)
+        say(self, LEAVES)
         self.viewport().update()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
@@ -256,7 +260,7 @@ class LivePage(Themed, QGraphicsView):
         return super().viewportEvent(event)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the page, round corners where it is a picture of a screen, and a ring while it receives keys."""
+        """Paint the page, round corners where it is whole, and while it receives keys a ring and how to leave."""
         super().paintEvent(event)
         painter = QPainter(self.viewport())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -270,6 +274,14 @@ class LivePage(Themed, QGraphicsView):
             painter.setPen(QPen(QColor(self.theme.accent), RING))
             inset = whole.adjusted(1, 1, -1, -1)
             painter.drawRoundedRect(inset, RADIUS_CONTROL, RADIUS_CONTROL)
+            painter.setFont(font("small", weight=600))
+            words = QRectF(painter.fontMetrics().boundingRect(LEAVES)).adjusted(-10, -4, 10, 4)
+            words.moveBottomLeft(inset.bottomLeft() + QPointF(6, -6))
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(self.theme.accent))
+            painter.drawRoundedRect(words, RADIUS_CONTROL, RADIUS_CONTROL)
+            painter.setPen(QColor(self.theme.on_accent))
+            painter.drawText(words, Qt.AlignmentFlag.AlignCenter, LEAVES)
         painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name

@@ -121,6 +121,20 @@ def test_keys_answer_the_page_and_go_on_and_esc_leaves_it(qtbot: Any, designer: 
     assert not designer.results.exists()
 
 
+def test_the_page_says_how_to_leave_it_and_tab_leaves_it_after_its_last_control(designer: Any, live: Any) -> None:
+    without = image(live)
+    for key, beyond in ((Qt.Key.Key_Tab, "Previous step"), (Qt.Key.Key_Backtab, "Id")):
+        live.setFocus()
+        corner = (image(live) != without)[-40:, 12:130]  # above the ring
+        assert corner[:, :, 0].mean() > 0.3
+        for _ in range(len(live.page_window.widget.fields) + 1):
+            if live.hasFocus():
+                QTest.keyClick(live, key)
+        assert QApplication.focusWidget().accessibleName() == beyond
+    assert live.accessibleDescription() == "Esc leaves the page, and so does Tab after its last control."
+    assert (image(live) == without).mean() > 0.99
+
+
 def test_the_mouse_answers_the_scaled_page(designer: Any, live: Any) -> None:
     assert live.scale_now < 0.6
     field = live.page_window.widget.fields[1]
