@@ -153,15 +153,28 @@ class MainWindow(QMainWindow):
         return False
 
     def _show(self, name: str, asked: Place) -> None:
-        if self.stack.currentWidget() is asked and name == self._here and asked.isVisible():
+        if self.stack.currentWidget() is not asked or name != self._here or not asked.isVisible():
+            if name != self._here:
+                self._now().leave()
+            self._here = name
+            self.rail.mark(name)
+            self.stack.setCurrentWidget(asked)
+            self._arrange()
+            asked.enter()
+        self._lead_in(self.rail.buttons[name], asked)
+
+    def _lead_in(self, button: QWidget, place: Place) -> None:
+        """Give a place the keyboard of its button in the rail: to the part that had it last, else to the first."""
+        if self.focusWidget() is not button:
             return
-        if name != self._here:
-            self._now().leave()
-        self._here = name
-        self.rail.mark(name)
-        self.stack.setCurrentWidget(asked)
-        self._arrange()
-        asked.enter()
+        last = place.focusWidget()
+        if last not in {None, place} and last.isVisible() and last.isEnabled():
+            last.setFocus(Qt.FocusReason.OtherFocusReason)
+            return
+        place.setFocus()
+        place.focusNextChild()
+        if not place.isAncestorOf(self.focusWidget()):
+            button.setFocus()
 
     def prepared(self, name: str) -> None:
         """Show a place that was waited for, if one is still there."""

@@ -19,7 +19,9 @@ class Room(Place):
     def __init__(self, name, log):
         super().__init__()
         self.name, self.log = name, log
-        QVBoxLayout(self).addWidget(QPushButton(name))
+        column = QVBoxLayout(self)
+        column.addWidget(QPushButton(name))
+        column.addWidget(QPushButton(f"{name} again"))
 
     def enter(self):
         self.log.append(f"enter {self.name}")
@@ -55,9 +57,32 @@ def test_one_begins_at_the_first_place_and_goes_by_the_rail(main, log, qtbot):
 def test_places_are_reached_by_the_keyboard_alone(main, qtbot):
     main.rail.buttons["home"].setFocus()
     for key, place in ((Qt.Key.Key_Space, "designer"), (Qt.Key.Key_Return, "results")):
+        main.rail.buttons[main.here].setFocus()
         qtbot.keyClick(main.focusWidget(), Qt.Key.Key_Tab)
         qtbot.keyClick(main.focusWidget(), key)
         assert main.here == place
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Space, Qt.Key.Key_Return])
+def test_keyboard_goes_from_the_rail_into_the_place(main, qtbot, key):
+    def go(name):
+        main.rail.buttons[name].setFocus()
+        qtbot.keyClick(main.focusWidget(), key)
+
+    go("lab")
+    first, second = main.place("lab").findChildren(QPushButton)
+    assert main.focusWidget() is first, "the first part of a place that had no keyboard yet"
+    second.setFocus()
+    go("home")
+    assert main.place("home").isAncestorOf(main.focusWidget())
+    go("lab")
+    assert main.focusWidget() is second, "the part that had the keyboard last"
+    second.hide()
+    go("lab")
+    assert main.focusWidget() is first, "one is here already, and the last part is gone"
+    first.hide()
+    go("lab")
+    assert main.focusWidget() is main.rail.buttons["lab"], "a place without parts takes no keyboard"
 
 
 def test_the_window_closes_by_the_keyboard_where_no_frame_has_a_way(main, qtbot):
