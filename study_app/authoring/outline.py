@@ -81,11 +81,21 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
         value = value[step] if has(value, step) else None
     if not isinstance(value, Mapping) or len(path) == 1:
         return label_of(path[-1])
+    return _called(document, value) or label_of(str(value.get("id", path[-1])))
+
+
+def study_title(document: Mapping[str, Any]) -> str:
+    """Return the title of a study in its first language; "" where it has none."""
+    head = document.get("study")
+    return _called(document, head) if isinstance(head, Mapping) else ""
+
+
+def _called(document: Mapping[str, Any], value: Mapping[str, Any]) -> str:
     text = next((value[key] for key in TITLES if key in value), None)
     language = next((name for _, name in entries(document, "study.languages.*")), None)
     if isinstance(text, Mapping):
         text = text.get(language) or next(iter(text.values()), None)
-    return text if isinstance(text, str) and text.strip() else label_of(str(value.get("id", path[-1])))
+    return text if isinstance(text, str) and text.strip() else ""
 
 
 def found(document: Mapping[str, Any], path: Path, words: str, *, named: bool = False) -> bool:

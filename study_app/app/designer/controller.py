@@ -113,7 +113,7 @@ class DesignerController(QObject):
 
     def enter(self) -> None:
         """Look again at what there is; a file that another program changed is taken in where nothing was edited."""
-        self._choices = studies(None if self.editing.opened is None else self.editing.opened.file)
+        self._choices = studies(self.editing.opened)
         self.saving.look_again()
         self.runs.look()
         self.show()
@@ -166,7 +166,7 @@ class DesignerController(QObject):
     def _take(self, opened: OpenStudy) -> None:
         if (before := self.editing.opened) is not None:
             self._others[before.file.resolve()] = before
-        self._choices = studies(opened.file)
+        self._choices = studies(opened)
         self._warnings = ()
         self.editing.open(opened)
         self.place.outline.words.clear()
@@ -267,8 +267,11 @@ class DesignerController(QObject):
     def _header(self) -> HeaderState:
         warnings = len({*self._warnings, *self.measures.warnings})
         opened = self.editing.opened
-        if opened is not None and source_of(opened.file) not in {choice.source for choice in self._choices}:
-            self._choices = studies(opened.file)  # a file that was saved for the first time has a name of its own
+        if opened is not None:
+            source = source_of(opened.file)
+            known = next((choice.title for choice in self._choices if choice.source == source), None)
+            if known != (opened.title or opened.file.stem):  # another title, or a file saved for the first time
+                self._choices = studies(opened)
         return header_state(opened, self._choices, warnings, self.runs.chip)
 
     def _show_header(self) -> None:

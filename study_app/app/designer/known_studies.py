@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from datetime import datetime
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 from study_app.app.designer.open_study import OpenStudy, unsaved_studies
-from study_app.authoring.drafts import drafted_files
+from study_app.authoring.drafts import draft_of, drafted_files
+from study_app.authoring.edited_study import read
 from study_app.authoring.fields import row_at
 from study_app.authoring.names import Document
 from study_app.authoring.new_study import template
+from study_app.authoring.outline import study_title
 from study_app.authoring.templates import templates
 from study_app.errors import StudyError
 from study_app.protocol.load import read_document
@@ -25,21 +27,45 @@ from study_app.viewmodels.designer.versions.standing import VersionChip
 from study_app.viewmodels.home import holds_liquids_alone, is_shipped, sources
 
 
-def studies(opened: Path | None) -> tuple[StudyChoice, ...]:
+def studies(opened: OpenStudy | None) -> tuple[StudyChoice, ...]:
     """Return what can be opened: the open file, drafts that were never saved, recent files, names at hand.
 
-    Studies that ship with the program come last.
+    They are in the order of their titles; studies that ship with the program come last.
     """
     found = dict.fromkeys([*map(str, unsaved_studies()), *sources()])
+    own = "" if opened is None else source_of(opened.file)
     if opened is not None:
-        found = {source_of(opened): None, **found}
+        found[own] = None
     drafted = {file.resolve() for file in drafted_files()}
-    choices = [
-        StudyChoice(Path(source).stem, source, is_shipped(source), bool(drafted) and _resolved(source) in drafted)
-        for source in found
-        if not (Path(source).suffix == ".toml" and Path(source).exists() and holds_liquids_alone(source))
-    ]
-    return tuple(sorted(choices, key=lambda choice: choice.shipped))
+    choices = []
+    for source in found:
+        file = _resolved(source)
+        if Path(source).suffix == ".toml" and Path(source).exists() and holds_liquids_alone(source):
+            continue
+        title = _title(file, drafted=file in drafted) if opened is None or source != own else opened.title
+        stem = Path(source).stem
+        choices.append(StudyChoice(title or stem, f"{stem}.toml", source, is_shipped(source), file in drafted))
+    return tuple(sorted(choices, key=lambda choice: (choice.shipped, choice.title.casefold(), choice.source)))
+
+
+def _title(file: Path | None, *, drafted: bool) -> str:
+    """Return the title of a study, of its draft where one is kept; "" where it has none or cannot be read."""
+    if file is not None and drafted and (draft := draft_of(file)) is not None:
+        return study_title(read(draft.text.encode(), file.parent).document)
+    try:
+        state = None if file is None else file.stat()
+    except OSError:
+        return ""
+    return "" if file is None or state is None else _title_of_file(file, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=256)
+def _title_of_file(file: Path, _changed_ns: int, _size: int) -> str:
+    try:
+        document, _places = read_document(file.read_bytes(), file.name)
+    except (StudyError, OSError):
+        return ""
+    return study_title(document)
 
 
 def header_state(

@@ -12,6 +12,7 @@ from typing import Final
 from study_app.authoring.drafts import Draft, Keeper, draft_of, drafted_files
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.new_study import check_free, copy_of
+from study_app.authoring.outline import study_title
 from study_app.authoring.undo_stack import History
 from study_app.authoring.versions.contents import content_hash, keep_content, save, write_whole
 from study_app.authoring.versions.runs import Run, Standing, check_saving, standing
@@ -68,6 +69,11 @@ class OpenStudy:
     def study(self) -> Study:
         """The study as it is now."""
         return self.history.study
+
+    @property
+    def title(self) -> str:
+        """Its title in its first language; "" where it has none."""
+        return study_title(self.study.document)
 
     @property
     def edited(self) -> bool:

@@ -8,11 +8,12 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.designer.play.play_controls import PlayControls
 from study_app.gui.designer.play.play_strip import PlayStrip
+from study_app.gui.designer.study_list import StudyList
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
-from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, PressedByEnter
+from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.designer_view import HeaderState
 from study_app.viewmodels.tones import Tone
@@ -80,7 +81,7 @@ class DesignerHeader(QWidget):
         super().__init__()
         self.setAccessibleName("Header")
         self.state = HeaderState()
-        self.study = Choice()
+        self.study = StudyList()
         self.study.setAccessibleName("Study")
         self.study.setFont(font("body"))
         self.study.setMinimumWidth(150)
@@ -127,9 +128,7 @@ class DesignerHeader(QWidget):
             with QSignalBlocker(self.study):
                 self.study.clear()
                 for study in state.studies:
-                    self.study.addItem(
-                        f"{study.title}  (ships with the program)" if study.shipped else study.title, study.source
-                    )
+                    self.study.add_study(study, opened=study.source == state.chosen)
                 self.study.addItem("New study …", NEW)
                 self.study.addItem("Open file …", OPEN)
                 self.study.setCurrentIndex(self.study.findData(state.chosen) if state.chosen else -1)

@@ -22,16 +22,22 @@ class StudyChoice:
 
     Attributes
     ----------
-    title, source : str
-        What it is called, and what it is opened by.
+    title, file, source : str
+        What it is called, the name of its file, and what it is opened by.
     shipped, drafted : bool
         Whether it ships with the program, and whether a draft of it was kept that is not saved.
     """
 
     title: str
+    file: str
     source: str
     shipped: bool = False
     drafted: bool = False
+
+    @property
+    def words(self) -> str:
+        """Title and file: titles are not unique."""
+        return f"{self.title}  ·  {self.file}"
 
 
 @dataclass(frozen=True, slots=True)

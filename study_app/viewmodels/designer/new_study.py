@@ -13,7 +13,7 @@ from study_app.authoring.fields import row_at, unit_of
 from study_app.authoring.known_answers import KnownAnswer, known_answers
 from study_app.authoring.names import Document
 from study_app.authoring.new_study import NAME_LENGTH, Answers
-from study_app.authoring.outline import title_of
+from study_app.authoring.outline import study_title, title_of
 from study_app.authoring.templates import QUESTIONS
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
@@ -170,14 +170,16 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
 def copy_choice(source: str, document: Document, note: str) -> TemplateChoice:
     """Return what is shown of a study that can be copied."""
     title, words = _described(document)
-    return TemplateChoice(source, title, words, copy=True, note=note, study_title=title, languages=_languages(document))
+    return TemplateChoice(
+        source, title or source, words, copy=True, note=note, study_title=title, languages=_languages(document)
+    )
 
 
 def _described(document: Document) -> tuple[str, str]:
     """Return title and description of a study."""
     head = document.get("study", {})
     description = head.get("description", "") if isinstance(head, Mapping) else ""
-    return title_of({**document, "one": {"it": head}}, ("one", "it")), " ".join(str(description).split())
+    return study_title(document), " ".join(str(description).split())
 
 
 def _languages(document: Document) -> tuple[str, ...]:

@@ -205,7 +205,7 @@ def test_a_new_study_that_was_never_saved_is_found_again(designer: Any) -> None:
     assert draft_of(file) is not None
     again = type(designer.controller)(designer.results)
     again.enter()
-    assert "mine" in [choice.title for choice in again.place.header.state.studies]
+    assert "mine.toml" in [choice.file for choice in again.place.header.state.studies]
     again.open(str(file))
     assert again.editing.opened.study.document["study"]["name"] == "mine"
     again.saving.save()

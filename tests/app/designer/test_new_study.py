@@ -126,10 +126,10 @@ def test_the_title_gives_the_short_name_where_none_is_typed(qtbot: Any, designer
 
 def test_the_header_names_a_study_that_was_saved_for_the_first_time(designer: Any) -> None:
     designer.controller.begin("template:compare-liquids", "mine")
-    assert designer.place.header.study.currentText() == "mine"
+    assert designer.place.header.study.currentText() == "Feeling liquids  ·  mine.toml"
     designer.place.save_asked.emit()
     assert designer.editing.opened.file.exists()
-    assert designer.place.header.study.currentText() == "mine"
+    assert designer.place.header.study.currentText() == "Feeling liquids  ·  mine.toml"
 
 
 def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:

@@ -100,7 +100,7 @@ class Tasks:
 
     def changes(self) -> None:
         """What differs from the version that was saved."""
-        self.user.choose("Study", "threedrinks")
+        self.user.choose("Study", "Three drinks  ·  threedrinks.toml")
         self.user.choose("View of the study", "Changes")
         wait_until(lambda: self.user.window.findChildren(ChangeLine), "the differences")
 
@@ -120,7 +120,7 @@ class Tasks:
     def faults(self) -> None:
         """A file with five faults made valid."""
         user = self.user
-        user.choose("Study", "faulty")
+        user.choose("Study", "A first look  ·  faulty.toml")
         wait_until(lambda: self.header().problems.words == f"{len(FAULTS)} problems", "the problems")
         user.shortcut("ctrl+4", name_of(self.header().problems))
         (card,) = user.window.findChildren(ProblemsCard)

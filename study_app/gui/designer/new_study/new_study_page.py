@@ -58,7 +58,7 @@ class NoStudyCard(Card):
             remove_widget(old)
         self.drafts = []
         for study in (one for one in studies if one.drafted):
-            made = ActionButton("save", f"Continue {study.title} with its unsaved changes")
+            made = ActionButton("save", f"Continue {study.title} ({study.file}) with its unsaved changes")
             made.clicked.connect(lambda _on=False, source=study.source: self.study_asked.emit(source))
             apply_theme_within(made, self.theme)
             self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignHCenter)

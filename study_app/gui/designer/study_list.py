@@ -1,0 +1,61 @@
+"""The list of the studies that can be opened: each with its title and file, the open one with a mark."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt
+from PySide6.QtGui import QKeyEvent, QPainter
+from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem
+
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.widgets.controls import Choice
+from study_app.viewmodels.designer.designer_view import StudyChoice
+
+MARK_PX = 28
+OPENS = {Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Return, Qt.Key.Key_Enter}
+Index = QModelIndex | QPersistentModelIndex
+
+
+class StudyLine(QStyledItemDelegate):
+    """A study in the list of all; the open one has a check mark."""
+
+    def __init__(self, studies: StudyList) -> None:
+        super().__init__(studies)
+        self._studies = studies
+
+    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for the words and the mark."""
+        return super().sizeHint(option, index) + QSize(MARK_PX, 0)
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        """Paint the words, and the mark at the right."""
+        super().paint(painter, option, index)
+        if index.row() == self._studies.currentIndex():
+            place = QRectF(option.rect)  # type: ignore[attr-defined]  # missing in the stubs
+            mark = QRectF(place.right() - MARK_PX, place.center().y() - 8, 16, 16)
+            draw_icon(painter, "check", mark, self._studies.theme.accent, 2.2)
+
+
+class StudyList(Choice):
+    """The studies that can be opened; an arrow key opens the list, it does not open another study."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setItemDelegate(StudyLine(self))
+
+    def add_study(self, study: StudyChoice, *, opened: bool) -> None:
+        """Add a study, by title and file."""
+        words = f"{study.words}  (ships with the program)" if study.shipped else study.words
+        self.addItem(words, study.source)
+        if opened:
+            self.setItemData(self.count() - 1, f"{words}, open", Qt.ItemDataRole.AccessibleTextRole)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Open the list at an arrow key and at Enter, as at Space, and at a letter."""
+        shift_or_pad = Qt.KeyboardModifier.KeypadModifier | Qt.KeyboardModifier.ShiftModifier
+        letter = event.text().strip() if event.text().isprintable() else ""
+        if (event.key() in OPENS or letter) and not event.modifiers() & ~shift_or_pad:
+            self.showPopup()
+            if letter:
+                self.view().keyboardSearch(letter)
+        else:
+            super().keyPressEvent(event)

@@ -1,0 +1,80 @@
+"""The list of studies in the designer's header: in the order of titles, with files, whatever was saved last."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
+
+from study_app.protocol.source.files import shipped
+from study_app.viewmodels.designer.requests import SetText
+
+pytestmark = pytest.mark.slow
+
+
+def listed(designer: Any) -> list[str]:
+    box = designer.place.header.study
+    return [box.itemText(at) for at in range(box.count())]
+
+
+def add_study(designer: Any, name: str, title: str) -> None:
+    text = designer.file.read_text()
+    before = next(line for line in text.splitlines() if line.startswith("title = "))
+    made = text.replace('name = "kitchen"', f'name = "{name}"').replace(before, f'title = "{title}"', 1)
+    (designer.file.parent / f"{name}.toml").write_text(made)
+
+
+def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(designer: Any) -> None:
+    for name, title in (("zeta", "apples"), ("beta", "Melons"), ("alpha", "Melons")):
+        add_study(designer, name, title)
+    designer.controller.open("kitchen")
+    own = [words for words in listed(designer) if "ships" not in words][:-2]
+    assert own[:2] == ["A first look  ·  kitchen.toml", "apples  ·  zeta.toml"]
+    assert [words for words in own if words.startswith("Melons")] == ["Melons  ·  alpha.toml", "Melons  ·  beta.toml"]
+    assert own == sorted(own, key=str.casefold)
+    shipped_ones = [words for words in listed(designer) if "ships" in words]
+    assert len(shipped_ones) == len(shipped())
+    assert listed(designer)[len(own) : len(own) + len(shipped_ones)] == sorted(shipped_ones, key=str.casefold)
+    before = listed(designer)
+    designer.controller.open("beta")
+    designer.place.save_asked.emit()
+    designer.controller.enter()
+    assert listed(designer) == before
+    box = designer.place.header.study
+    assert box.currentText() == "Melons  ·  beta.toml"
+    assert box.itemData(box.currentIndex(), Qt.ItemDataRole.AccessibleTextRole) == "Melons  ·  beta.toml, open"
+
+
+def test_the_list_shows_a_title_as_it_is_edited(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.ask(SetText(("study", "title"), "en", "Zest"))
+    assert designer.place.header.study.currentText() == "Zest  ·  kitchen.toml"
+    designer.editing.undo()
+    assert not designer.place.header.study.currentText().startswith("Zest")
+
+
+def test_a_file_that_cannot_be_read_is_listed_by_its_name(designer: Any) -> None:
+    (designer.file.parent / "odd.toml").write_text("this is not TOML")
+    designer.controller.open("kitchen")
+    assert "odd  ·  odd.toml" in listed(designer)
+
+
+def test_keys_open_the_list_and_no_other_study(qtbot: Any, designer: Any) -> None:
+    add_study(designer, "zeta", "Zebra")
+    designer.controller.open("kitchen")
+    box, opened = designer.place.header.study, designer.editing.opened
+    qtbot.keyClick(box, Qt.Key.Key_Escape)
+    assert not box.view().isVisible()
+    for key in (Qt.Key.Key_Down, Qt.Key.Key_Return, Qt.Key.Key_Z):
+        box.setFocus()
+        qtbot.keyClick(box, key)
+        assert box.view().isVisible(), key
+        assert designer.editing.opened is opened
+        if key != Qt.Key.Key_Z:
+            box.hidePopup()
+    assert box.view().currentIndex().data() == "Zebra  ·  zeta.toml"
+    qtbot.keyClick(box.view(), Qt.Key.Key_Return)
+    QApplication.processEvents()
+    assert designer.editing.opened.name == "zeta"
