@@ -24,6 +24,7 @@ class RepairSearch(QObject):
         super().__init__(parent)
         self._study: Study | None = None
         self._waiting: list[ProblemRow] = []
+        self._problems: tuple[ProblemRow, ...] = ()
         self._known: dict[ProblemRow, tuple[Repair, ...]] = {}
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
@@ -33,7 +34,7 @@ class RepairSearch(QObject):
         """Search for the repairs of a study's problems, anew where the study changed."""
         if study is self._study:
             return
-        self._study, self._known = study, {}
+        self._study, self._known, self._problems = study, {}, problems
         self._waiting = list(problems) if study.is_toml else []
         if self._waiting:
             self._timer.start(REST_MS)
@@ -41,14 +42,19 @@ class RepairSearch(QObject):
             self._timer.stop()
 
     def repair(self, row: ProblemRow, words: str) -> Repair | None:
-        """Return a repair that was found, by its words."""
+        """Return a repair by its words; one that was offered before the last edit is looked for at once."""
+        if row in self._problems and row not in self._known and self._study is not None and self._study.is_toml:
+            self._look(self._study, row)
         return next((one for one in self._known.get(row, ()) if one.words == words), None)
+
+    def _look(self, study: Study, row: ProblemRow) -> None:
+        self._known[row] = (*repairs(study, row.fault), *additions_for(study, row.fault))
 
     def _find(self) -> None:
         if self._study is None or not self._waiting:
             return
         row = self._waiting.pop(0)
-        self._known[row] = (*repairs(self._study, row.fault), *additions_for(self._study, row.fault))
+        self._look(self._study, row)
         self.found.emit(row, tuple(one.words for one in self._known[row]))
         if self._waiting:
             self._timer.start(0)

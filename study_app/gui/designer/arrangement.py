@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from PySide6.QtCore import QEvent, QObject, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from study_app.gui.designer.designer_header import DesignerHeader
 from study_app.gui.designer.form.element_form import FormCard
 from study_app.gui.designer.outline.card import OutlineCard
 from study_app.gui.designer.pane.right_pane import RightPane
@@ -19,7 +16,6 @@ from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Icon
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
 from study_app.viewmodels.designer.form_rows import Form
-from study_app.viewmodels.designer.outline_rows import ElementPath
 
 OUTLINE_PX, DRAWER_PX = 284, 320
 DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
@@ -190,41 +186,6 @@ class Arrangement(QWidget):
         """Give the keyboard to the field that finds; a drawer opens."""
         self.focus_outline()
         self.outline.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
-
-    def focus_form(self) -> None:
-        """Give the keyboard to the form's first row."""
-        self.show_side("form")
-        self.form.focus_first()
-
-    def focus_field(self, path: ElementPath) -> None:
-        """Give the keyboard to a field of the form."""
-        self.show_side("form")
-        self.form.focus(path)
-
-    def focus_pane(self) -> None:
-        """Give the keyboard to the page of the pane that is shown."""
-        self.show_side("pane")
-        page = next(one for one in self.pane.pages if one.name == self.pane.tab)
-        (page.body.focusProxy() or self.pane.tabs).setFocus(Qt.FocusReason.ShortcutFocusReason)
-
-    def focus_problems(self) -> None:
-        """Give the keyboard to the list of problems, which opens."""
-        self.problems.show()
-        self.problems.next.setFocus(Qt.FocusReason.ShortcutFocusReason)
-
-    def cycle(self, by: int, header: DesignerHeader) -> None:
-        """Give the keyboard to the next part, or with -1 to the one before; the header comes before the outline."""
-        stops: list[tuple[QWidget, Callable[[], None]]] = [
-            (header, header.study.setFocus),
-            (self.outline, self.focus_outline),
-            (self.form, self.focus_form),
-            (self.pane, self.focus_pane),
-        ]
-        if self.problems.isVisible():
-            stops.append((self.problems, self.focus_problems))
-        focused = self.window().focusWidget()
-        here = next((at for at, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -by)
-        stops[(here + by) % len(stops)][1]()
 
     def toggle_drawer(self) -> None:
         """Open the drawer, or close it."""

@@ -8,6 +8,7 @@ from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QMouseEvent, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
+from study_app.gui.designer.repair_button import RepairButton, lead_by_tab
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
@@ -65,21 +66,20 @@ class ProblemLine(Themed, QWidget):
         self._repairs.setSpacing(6)
         self._repairs.addStretch()
         across.addWidget(buttons)
-        self.repairs: list[ActionButton] = []
+        self.repairs: list[RepairButton] = []
         self.setMinimumHeight(ROW_PX)
         self.show_repairs(repairs)
 
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
         """Offer repairs, two at most."""
         for words in repairs[len(self.repairs) : 2]:
-            made = ActionButton("", words, height=32)
-            made.setProperty("dense", "true")
-            made.setFont(font("label"))
-            made.setAccessibleName(f"{words}: {self.row.title}, {self.row.field}")
+            made = RepairButton(self.row, words, f"{self.row.title}, {self.row.field}")
             made.clicked.connect(lambda _checked=False, words=words: self.repair_asked.emit(words))
             apply_theme_within(made, self.theme)
             self._repairs.addWidget(made)
+            made.show()  # at once: Tab passes what a layout is still to show
             self.repairs.append(made)
+        lead_by_tab(self.go, self.repairs)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
         """Open the problem."""
@@ -108,7 +108,8 @@ class ProblemsCard(Card):
         self._here_only = False
         self._listed: tuple[ProblemRow, ...] | None = None
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
-        self._at: ProblemRow | None = None
+        self.at: ProblemRow | None = None
+        self._number = 0
         self.heading = label("", "card")
         self.limit = Segments("Problems of")
         self.limit.chosen.connect(self._limit)
@@ -154,7 +155,7 @@ class ProblemsCard(Card):
             made = ProblemLine(row, repairs.get(row, ()), narrow=(self.parentWidget() or self).width() < NARROW_BELOW)
             made.opened.connect(lambda row=row: self._open(row))
             made.repair_asked.connect(lambda words, row=row: self.repair_asked.emit(row, words))
-            made.here = row == self._at
+            made.here = row == self.at
             column.addWidget(made)
             column.addWidget(Rule())
             self.lines.append(made)
@@ -182,13 +183,22 @@ class ProblemsCard(Card):
                 line.show_repairs(repairs)
 
     def open_next(self) -> None:
-        """Go to the next problem."""
+        """Go to the next problem: where the last one is solved, to the one that took its place in the list."""
         if self.rows:
-            at = self.rows.index(self._at) + 1 if self._at in self.rows else 0
+            at = self.rows.index(self.at) + 1 if self.at in self.rows else self._number
             self._open(self.rows[at % len(self.rows)])
 
+    def repairs_of(self, problem: ProblemRow) -> list[RepairButton]:
+        """Return the buttons that repair a problem."""
+        return [button for line in self.lines for button in line.repairs if line.row == problem]
+
+    def note(self, row: ProblemRow) -> None:
+        """Note at which problem one is."""
+        if row in self.rows:
+            self.at, self._number = row, self.rows.index(row)
+
     def _open(self, row: ProblemRow) -> None:
-        self._at = row
+        self.note(row)
         for line in self.lines:
             line.here = line.row == row
             line.update()

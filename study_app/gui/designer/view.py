@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QFileDialog, QStackedWidget, QVBoxLayout, QWidget
 from study_app.gui.designer.arrangement import Arrangement
 from study_app.gui.designer.banner import BannerCard
 from study_app.gui.designer.designer_header import DesignerHeader
+from study_app.gui.designer.focus_areas import FocusAreas
 from study_app.gui.designer.form.element_form import FormCard
 from study_app.gui.designer.measures.measures_page import MeasuresPage
 from study_app.gui.designer.new_study import NewStudyPage, NoStudyCard
@@ -18,6 +19,7 @@ from study_app.gui.designer.outline.add_list import AddList
 from study_app.gui.designer.outline.card import OutlineCard
 from study_app.gui.designer.pane.file_editor import FileCard
 from study_app.gui.designer.pane.right_pane import PanePage, RightPane
+from study_app.gui.designer.problem_steps import ProblemSteps
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt
 from study_app.gui.participant.pages.screen_reader import say
@@ -66,7 +68,6 @@ class DesignerPlace(Place):
         super().__init__()
         self.view = DesignerView()
         self.prompt: Prompt | None = None
-        self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
         self.header, self.banner = DesignerHeader(), BannerCard()
         self.banner_words = self.banner.words
         self.form, self.file, self.problems = FormCard(), FileCard(), ProblemsCard()
@@ -77,6 +78,8 @@ class DesignerPlace(Place):
         self.pane.add_page(PanePage("file", "File", self.file, self.file.aside))
         self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
         self.sides = self.parts.sides
+        self.areas = FocusAreas(self.header, self.parts, self.file, self.problems)
+        self.problem_steps = ProblemSteps(self.problems, self.form, self.file, self.areas)
         self.adding, self.nothing = AddList(self), NoStudyCard()
         self._steps = [partial(self._ask, asked) for asked in (self.undo_asked, self.redo_asked, self.save_asked)]
         self._lay_out()
@@ -113,11 +116,11 @@ class DesignerPlace(Place):
         header.save_asked.connect(save)
         self.nothing.new.clicked.connect(self.new_asked)
         self.nothing.study_asked.connect(self.study_asked)
-        self.nothing.study_asked.connect(self.parts.focus_form)
+        self.nothing.study_asked.connect(self.areas.focus_form)
         self.banner.asked.connect(self.banner_asked)
         outline.chosen.connect(self._select)
         outline.find_changed.connect(self.find_changed)
-        outline.field_asked.connect(self.parts.focus_field)
+        outline.field_asked.connect(self.areas.focus_field)
         outline.add_asked.connect(self.ask_to_add)
         outline.duplicate_asked.connect(self._duplicate)
         outline.delete_asked.connect(self._delete)
@@ -140,24 +143,24 @@ class DesignerPlace(Place):
         form.head.id_typed.connect(self.id_typed)
         form.copy_asked.connect(self.copy_asked)
         self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
-        self.problems.opened.connect(self._open_problem)
-        self.problems.repair_asked.connect(self.repair_asked)
-        form.repair_asked.connect(self.repair_asked)
+        self.problem_steps.selected.connect(self._select)
+        self.problem_steps.repair_asked.connect(self._ask_for_repair)
         self.problems.close_asked.connect(self.problems.hide)
         self.new_page.begin_asked.connect(self.begin_asked)
         self.new_page.given_up.connect(self.close_new)
 
     def _take_keys(self) -> None:
         undo, redo, save = self._steps
+        areas = self.areas
         for keys, act in (
             ("Ctrl+Z", undo), ("Ctrl+Shift+Z", redo), ("Ctrl+Y", redo), ("Ctrl+S", save),
             ("F8", self._next_problem), ("Ctrl+F", self.parts.focus_find),
             ("Ctrl+D", self._duplicate), ("Ctrl+Shift+D", self._series),
             ("Alt+Up", lambda: self._move_by(-1)), ("Alt+Down", lambda: self._move_by(1)),
-            ("Alt+Left", self.back_asked.emit), ("F2", self._rename), ("Ctrl+E", self._switch_to_file),
-            ("F6", lambda: self.parts.cycle(1, self.header)), ("Shift+F6", lambda: self.parts.cycle(-1, self.header)),
-            ("Ctrl+1", self.parts.focus_outline), ("Ctrl+2", self.parts.focus_form), ("Ctrl+3", self.parts.focus_pane),
-            ("Ctrl+4", self.parts.focus_problems), ("Ctrl+5", self.header.study.setFocus),
+            ("Alt+Left", self.back_asked.emit), ("F2", self._rename), ("Ctrl+E", areas.switch_to_file),
+            ("F6", lambda: areas.cycle(1)), ("Shift+F6", lambda: areas.cycle(-1)),
+            ("Ctrl+1", self.parts.focus_outline), ("Ctrl+2", areas.focus_form), ("Ctrl+3", areas.focus_pane),
+            ("Ctrl+4", areas.focus_problems), ("Ctrl+5", areas.focus_header),
         ):  # fmt: skip
             made = QShortcut(QKeySequence(keys), self)
             made.setContext(Qt.ShortcutContext.WindowShortcut)
@@ -181,13 +184,9 @@ class DesignerPlace(Place):
         self.parts.path.show_form(view.form)  # before the form: Tab goes on from what was made first
         self.form.show_form(view.form, read_only=view.header.read_only)
         self.file.show_file(view.file, scroll=elsewhere, read_only=view.header.read_only)
-        self._repairs = {row: words for row, words in self._repairs.items() if row in view.problems}
-        self.form.show_repairs(self._repairs)
-        self.problems.show_problems(view.problems, view.form.path, self._repairs)
+        self.problem_steps.show_problems(view.problems, view.form.path)
         self.outline.duplicate.setEnabled(self.form.head.copy.isEnabled())
         self.outline.add.setEnabled(not view.header.read_only)
-        if not view.problems and before.problems and not self.problems.under_pointer:
-            self.problems.hide()
         self.outline.tree.rows.movable = not view.header.read_only
         if self.outline.rows:
             self.outline.mark(view.form.path)
@@ -202,9 +201,7 @@ class DesignerPlace(Place):
 
     def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
         """Offer the repairs of a problem."""
-        self._repairs[row] = words
-        self.form.show_repairs(self._repairs)
-        self.problems.show_repairs(row, words)
+        self.problem_steps.show_repairs(row, words)
 
     def show_new(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
         """Show what a new study can begin from."""
@@ -217,7 +214,7 @@ class DesignerPlace(Place):
         """Go back to the study."""
         if self.stack.currentIndex():
             self.stack.setCurrentIndex(0)
-            self.outline.tree.setFocus()
+            self.areas.focus_element()
 
     def refuse_new(self, sentence: str) -> None:
         """Say why a study cannot begin so."""
@@ -253,7 +250,7 @@ class DesignerPlace(Place):
             held = closing.isAncestorOf(self.focusWidget())
             remove_widget(closing)
             if held:  # else Qt hands the keyboard to the rail
-                self.outline.tree.setFocus()
+                self.areas.focus_element()
 
     def flush(self) -> None:
         """Hand on what is being typed."""
@@ -291,7 +288,7 @@ class DesignerPlace(Place):
     def _go_to(self, element: ElementPath, field: ElementPath) -> None:
         """Select an element and give the keyboard to one of its fields."""
         self._select(element)
-        self.parts.focus_field(field)
+        self.areas.focus_field(field)
 
     def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
         """Return the element of the form, and those that are selected with it."""
@@ -348,15 +345,9 @@ class DesignerPlace(Place):
         if chosen:
             self.study_asked.emit(chosen)
 
-    def _open_problem(self, row: ProblemRow) -> None:
-        self.problems.show()
-        if row.element:
-            self._select(row.element)
-        in_form = bool(row.element) and self.form.focus(row.fault.path)
-        if row.line is not None and not in_form:
-            self.show_tab("file")
-        if row.line is not None:
-            self.file.editor.go_to(row.line - 1)
+    def _ask_for_repair(self, row: ProblemRow, words: str) -> None:
+        self.flush()
+        self.repair_asked.emit(row, words)
 
     def _next_problem(self) -> None:
         if self.view.form is not None:
@@ -369,14 +360,7 @@ class DesignerPlace(Place):
 
     def show_tab(self, name: str) -> None:
         """Show a page of the right pane, and give it the keyboard."""
-        self.pane.show_tab(name)
-        self.parts.focus_pane()
-
-    def _switch_to_file(self) -> None:
-        if self.file.editor.hasFocus():
-            self.parts.focus_form()
-        else:
-            self.show_tab("file")
+        self.areas.show_tab(name)
 
     def enter(self) -> None:
         """Look again at what there is."""

@@ -18,6 +18,7 @@ from study_app.gui.designer.form.question_rows import Panel, QuestionRow, Questi
 from study_app.gui.designer.form.row_fields import add_button
 from study_app.gui.designer.form.row_widget import RowWidget, is_wide, language_heads, structure_of
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import IconButton
@@ -360,6 +361,10 @@ class FormCard(Card):
         self._known = {} if self.read_only else known
         for row in self._made:
             row.show_repairs(self._known)
+
+    def repairs_of(self, problem: ProblemRow) -> list[RepairButton]:
+        """Return the buttons that repair a problem."""
+        return [button for row in self._made for button in row.repairs if button.problem == problem]
 
     def _come(self, row: RowWidget) -> None:
         self._focused = row if row in self._made else self._focused  # its own step may just have replaced it

@@ -15,11 +15,11 @@ from study_app.gui.designer.form.list_fields import field, structure
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.gui.designer.repair_button import RepairButton, lead_by_tab
 from study_app.gui.designer.segments import Segments
-from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import Icon
-from study_app.gui.widgets.controls import ActionButton, IconButton
+from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form_rows import FormRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
@@ -76,7 +76,7 @@ class RowWidget(Themed, QWidget):
             across.addSpacing(FIELD_PX + across.spacing())
         else:
             across.addWidget(self.remove, 0, top)
-        self.repairs: list[ActionButton] = []
+        self.repairs: list[RepairButton] = []
         self._offered: dict[ProblemRow, tuple[str, ...]] = {}
         self._buttons = QVBoxLayout()
         self._buttons.setContentsMargins(LABEL_PX + 32, 0, 0, 0)
@@ -162,14 +162,17 @@ class RowWidget(Themed, QWidget):
         asked = [(one, word) for one, words in offered.items() for word in words[: 1 if several else 2]]
         times = Counter(word for _problem, word in asked)
         for problem, word in [(one, word) for one, word in asked if times[word] == 1][:MOST_REPAIRS]:
-            made = ActionButton("", word, height=32)
-            made.setProperty("dense", "true")
-            made.setFont(font("label"))
-            made.setAccessibleName(f"{word}: {self.row.row.label}")
+            made = RepairButton(problem, word, self.row.row.label)
             made.clicked.connect(lambda _on=False, one=problem, word=word: self.repair_asked.emit(one, word))
             apply_theme_within(made, self.theme)
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
+            made.show()  # at once: Tab passes what a layout is still to show
             self.repairs.append(made)
+        last: QWidget = self.field
+        for part in self.field.findChildren(QWidget):  # lists that drop down are windows of their own
+            if part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.window() is self.window():
+                last = part
+        lead_by_tab(last, self.repairs)
 
     @property
     def help(self) -> str:

@@ -1,0 +1,86 @@
+"""The parts of the designer that the keyboard goes to: header, outline, form, views and problems."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
+
+from study_app.gui.designer.arrangement import Arrangement
+from study_app.gui.designer.designer_header import DesignerHeader
+from study_app.gui.designer.pane.file_editor import FileCard
+from study_app.gui.designer.problems import ProblemsCard
+from study_app.viewmodels.designer.outline_rows import ElementPath
+
+SHORTCUT = Qt.FocusReason.ShortcutFocusReason
+
+
+class FocusAreas:
+    """Gives the keyboard to a part of the designer, and shows the part where it is hidden."""
+
+    def __init__(self, header: DesignerHeader, parts: Arrangement, file: FileCard, problems: ProblemsCard) -> None:
+        self._header, self._parts, self._file, self._problems = header, parts, file, problems
+
+    def focus_header(self) -> None:
+        """Go to the list of studies."""
+        self._header.study.setFocus(SHORTCUT)
+
+    def focus_form(self) -> None:
+        """Go to the first row of the form."""
+        self._parts.show_side("form")
+        self._parts.form.focus_first()
+
+    def focus_field(self, path: ElementPath) -> None:
+        """Go to a field of the form."""
+        self._parts.show_side("form")
+        self._parts.form.focus(path)
+
+    def focus_element(self) -> None:
+        """Go to the selected element: to its row, or to its form where the outline is a drawer."""
+        if self._parts.drawer:
+            self.focus_form()
+        else:
+            self._parts.focus_outline()
+
+    def focus_pane(self) -> None:
+        """Go to the page of the right pane."""
+        self._parts.show_side("pane")
+        pane = self._parts.pane
+        page = next(one for one in pane.pages if one.name == pane.tab)
+        (page.body.focusProxy() or pane.tabs).setFocus(SHORTCUT)
+
+    def show_tab(self, name: str) -> None:
+        """Show a page of the right pane, and go to it."""
+        self._parts.pane.show_tab(name)
+        self.focus_pane()
+
+    def focus_problems(self) -> None:
+        """Go to the list of problems."""
+        self._problems.show()
+        self._problems.next.setFocus(SHORTCUT)
+
+    def switch_to_file(self) -> None:
+        """Go to the file, and from there back to where the keyboard was in the form."""
+        last: QWidget | None = self._parts.form.focusWidget()
+        if not self._file.editor.hasFocus():
+            self.show_tab("file")
+        elif last is None:
+            self.focus_form()
+        else:
+            self._parts.show_side("form")
+            last.setFocus(SHORTCUT)
+
+    def cycle(self, by: int) -> None:
+        """Go to the next part, or to the one before."""
+        stops: list[tuple[QWidget, Callable[[], None]]] = [
+            (self._header, self.focus_header),
+            (self._parts.outline, self._parts.focus_outline),
+            (self._parts.form, self.focus_form),
+            (self._parts.pane, self.focus_pane),
+        ]
+        if self._problems.isVisible():
+            stops.append((self._problems, self.focus_problems))
+        focused = self._parts.window().focusWidget()
+        here = next((at for at, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -by)
+        stops[(here + by) % len(stops)][1]()

@@ -1,0 +1,79 @@
+"""From problem to problem, and from each to its repairs."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QWidget
+
+from study_app.gui.designer.focus_areas import FocusAreas
+from study_app.gui.designer.form.element_form import FormCard
+from study_app.gui.designer.pane.file_editor import FileCard
+from study_app.gui.designer.problems import ProblemsCard
+from study_app.gui.designer.repair_button import RepairButton, lead_by_tab
+from study_app.viewmodels.designer.problem_rows import ProblemRow
+
+
+class ProblemSteps(QObject):
+    """Opens problems at their fields and offers their repairs, at the field and in the list.
+
+    Signals: ``selected`` (path of an element), ``repair_asked`` (row, words).
+    """
+
+    selected = Signal(object)
+    repair_asked = Signal(object, str)
+
+    def __init__(self, card: ProblemsCard, form: FormCard, file: FileCard, areas: FocusAreas) -> None:
+        super().__init__(card)
+        self._card, self._form, self._file, self._areas = card, form, file, areas
+        self._problems: tuple[ProblemRow, ...] = ()
+        self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
+        self._opened_at: QWidget | None = None
+        card.opened.connect(self._open)
+        for part in (card, form):
+            part.repair_asked.connect(self._repair)
+
+    def show_problems(self, problems: tuple[ProblemRow, ...], element: object) -> None:
+        """Show problems; ``element`` is the selected one. The list closes when the last problem is solved."""
+        before, self._problems = self._problems, problems
+        self._repairs = {row: words for row, words in self._repairs.items() if row in problems}
+        self._form.show_repairs(self._repairs)
+        self._card.show_problems(problems, element, self._repairs)
+        if before and not problems and not self._card.under_pointer:
+            self._card.hide()
+
+    def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
+        """Offer the repairs of a problem."""
+        self._repairs[row] = words
+        self._form.show_repairs(self._repairs)
+        self._card.show_repairs(row, words)
+        self._lead_to_repairs()
+
+    def _open(self, row: ProblemRow) -> None:
+        """Go to the field of a problem; where there is none, to its line in the file."""
+        self._card.show()
+        if row.element:
+            self.selected.emit(row.element)
+        in_form = bool(row.element) and self._form.focus(row.fault.path)
+        if row.line is not None and not in_form:
+            self._areas.show_tab("file")
+        if row.line is not None:
+            self._file.editor.go_to(row.line - 1)
+        self._opened_at = self._card.window().focusWidget()
+        self._lead_to_repairs()
+
+    def _lead_to_repairs(self) -> None:
+        """Let Tab go to the repairs of a problem from where it was opened."""
+        here, row = self._card.window().focusWidget(), self._card.at
+        if here is not None and here is self._opened_at and row is not None:
+            lead_by_tab(here, self._form.repairs_of(row) or self._card.repairs_of(row))
+
+    def _repair(self, row: ProblemRow, words: str) -> None:
+        """Make a repair; one that was made by keys leads to the next problem, and the last one to its field."""
+        here = self._card.window().focusWidget()
+        by_keys = isinstance(here, RepairButton) and here.by_keys and here.problem == row
+        self._card.note(row)
+        self.repair_asked.emit(row, words)
+        if by_keys and self._problems and row not in self._problems:
+            self._card.open_next()
+        elif by_keys and not self._problems and not self._form.focus(row.fault.path):
+            self._areas.focus_form()

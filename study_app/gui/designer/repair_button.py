@@ -1,0 +1,37 @@
+"""The button that makes a repair, at a field and in the list of problems."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QFocusEvent
+from PySide6.QtWidgets import QWidget
+
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.controls import ActionButton
+from study_app.viewmodels.designer.problem_rows import ProblemRow
+
+
+class RepairButton(ActionButton):
+    """Makes a repair of ``problem``; ``by_keys`` says whether a key led to it, not a click."""
+
+    def __init__(self, problem: ProblemRow, words: str, where: str) -> None:
+        super().__init__("", words, height=32)
+        self.problem = problem
+        self.setProperty("dense", "true")
+        self.setFont(font("label"))
+        self.setAccessibleName(f"{words}: {where}")
+        self.by_keys = False
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Note what led here."""
+        super().focusInEvent(event)
+        self.by_keys = event.reason() != Qt.FocusReason.MouseFocusReason
+
+
+def lead_by_tab(first: QWidget, repairs: Sequence[RepairButton]) -> None:
+    """Let Tab go from a part to repairs; made later than what follows the part, they would come last."""
+    for before, after in pairwise((first, *repairs)):
+        QWidget.setTabOrder(before, after)

@@ -1,0 +1,108 @@
+"""Problems by keys alone: F8 goes to a problem, Tab to its repair, Enter makes it and goes to the next problem."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
+
+from study_app.gui.designer.repair_button import RepairButton
+
+pytestmark = pytest.mark.slow
+
+KEY = Qt.Key
+
+
+def press(qtbot: Any, key: KEY) -> Any:
+    """Press a key in the part with the keyboard, and return the part that has it then."""
+    qtbot.keyClick(QApplication.focusWidget(), key)
+    QApplication.processEvents()
+    return QApplication.focusWidget()
+
+
+@pytest.fixture
+def broken(qtbot: Any, designer: Any) -> Any:
+    """The study with two problems, whose repairs were found."""
+    text = designer.file.read_text()
+    assert text.count('liquid = "thick"') == 1
+    designer.file.write_text(
+        text.replace('liquid = "thick"', 'liquid = "thik"').replace("force_limit_n = 6", "force_limit_n = 60")
+    )
+    designer.controller.open("kitchen")
+    found = designer.place.problems
+    qtbot.waitUntil(lambda: len(found.lines) == 2 and all(line.repairs for line in found.lines))
+    designer.place.outline.tree.setFocus()
+    return designer
+
+
+def test_tab_goes_from_a_problem_to_its_repair_and_enter_to_the_next_problem(qtbot: Any, broken: Any) -> None:
+    first, second = broken.place.view.problems
+    field = press(qtbot, KEY.Key_F8)
+    assert broken.place.form.isAncestorOf(field)
+    assert broken.editing.selected == first.element
+    repair = press(qtbot, KEY.Key_Tab)
+    assert isinstance(repair, RepairButton)
+    assert repair.problem == first
+    field = press(qtbot, KEY.Key_Return)
+    assert [problem.fault.path for problem in broken.place.view.problems] == [second.fault.path]
+    assert broken.editing.selected == second.element
+    assert broken.row(*second.fault.path).isAncestorOf(field)
+    (problem,) = broken.place.view.problems
+    qtbot.waitUntil(lambda: bool(broken.place.form.repairs_of(problem)))
+    repair = press(qtbot, KEY.Key_Tab)
+    assert isinstance(repair, RepairButton)
+    field = press(qtbot, KEY.Key_Return)
+    assert broken.place.view.problems == ()
+    assert broken.row(*second.fault.path).isAncestorOf(field), "nothing is left: the field that was repaired"
+
+
+def test_tab_goes_on_from_a_repair_to_the_rest_of_the_form(qtbot: Any, broken: Any) -> None:
+    problem = next(one for one in broken.place.view.problems if one.fault.path[-1] == "liquid")
+    broken.select(problem.element)
+    row = broken.row(*problem.fault.path)
+    qtbot.waitUntil(lambda: bool(row.repairs))
+    row.field.list.setFocus()
+    assert press(qtbot, KEY.Key_Tab) is row.repairs[0]
+    assert broken.place.form.isAncestorOf(press(qtbot, KEY.Key_Tab))
+
+
+def test_tab_goes_from_a_line_of_the_list_to_its_repair(qtbot: Any, broken: Any) -> None:
+    broken.place.header.problems.click()
+    for line in broken.place.problems.lines:
+        line.go.setFocus()
+        assert press(qtbot, KEY.Key_Tab) is line.repairs[0]
+
+
+def test_a_repair_by_the_mouse_shows_what_was_repaired(qtbot: Any, broken: Any) -> None:
+    first, _second = broken.place.view.problems
+    broken.place.header.problems.click()
+    qtbot.mouseClick(broken.place.problems.lines[0].repairs[0], Qt.MouseButton.LeftButton)
+    assert len(broken.place.view.problems) == 1
+    assert broken.editing.selected == first.element
+
+
+def test_f8_goes_on_where_a_problem_was_solved(qtbot: Any, broken: Any) -> None:
+    text = broken.text.replace("[blocks.liquids]\n", "[blocks.liquids]\nnonsense = 1\n")
+    broken.editing.type_text("Break", text)
+    _first, second, third = broken.place.view.problems
+    for _ in range(2):
+        press(qtbot, KEY.Key_F8)
+    assert broken.place.problems.at == second
+    wrong, right = (
+        ("thik", "thick") if second.fault.path[-1] == "liquid" else ("force_limit_n = 60", "force_limit_n = 6")
+    )
+    broken.editing.type_text("Correct", text.replace(wrong, right, 1))
+    press(qtbot, KEY.Key_F8)
+    assert broken.place.problems.at.fault == third.fault
+
+
+def test_a_repair_that_is_pressed_right_after_an_edit_is_made(qtbot: Any, broken: Any) -> None:
+    """Repairs are looked for anew once the keyboard rests; what is offered meanwhile is still made."""
+    first, second = broken.place.view.problems
+    (button,) = (one for one in broken.place.problems.repairs_of(second)[:1])
+    words = button.text()
+    broken.editing.type_text("Add a comment", broken.text + "# a comment\n")
+    broken.place.problems.repair_asked.emit(second, words)
+    assert [problem.fault.path for problem in broken.place.view.problems] == [first.fault.path]
