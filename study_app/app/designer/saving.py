@@ -104,7 +104,7 @@ class Saving(QObject):
             self.copy_asked.emit(source_of(opened.file))
             return
         if action == "problems":
-            self.place.parts.focus_problems()
+            self.place.areas.focus_problems()
             return
         if action == "compare":
             drafts = [one.hash for one in kept_versions(opened.file) if one.origin == "draft"]

@@ -16,10 +16,12 @@ from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Icon
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
 from study_app.viewmodels.designer.form_rows import Form
+from study_app.viewmodels.designer.keys import key_cap, tip
 
 OUTLINE_PX, DRAWER_PX = 284, 320
 DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
 GAP = 14 - 2 * SHADOW
+ENTER = {Qt.Key.Key_Return, Qt.Key.Key_Enter}
 FORM_SHARE = 44
 """Percent of the width that the form takes beside the views."""
 
@@ -62,10 +64,10 @@ class PathBar(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.setAccessibleName("Path of the element")
-        self.outline = ActionButton("layers", "Outline", cap="Ctrl 1", height=40)
+        self.outline = ActionButton("layers", "Outline", cap=key_cap("outline"), height=40)
         self.outline.setProperty("dense", "true")
-        self.outline.setAccessibleName("Outline (Ctrl+1)")
-        self.outline.setToolTip("Outline (Ctrl+1)")
+        self.outline.setAccessibleName(tip("outline"))
+        self.outline.setToolTip(tip("outline"))
         self.outline.clicked.connect(self.outline_asked)
         self.steps: list[Crumb] = []
         self._parts: list[QWidget] = []
@@ -110,6 +112,7 @@ class Arrangement(QWidget):
         self.path = PathBar()
         self.path.outline_asked.connect(self.toggle_drawer)
         self.sides = Segments("Side")
+        self.sides.tips = {"form": tip("form"), "pane": tip("views")}
         self.sides.chosen.connect(lambda side: self.show_side(str(side)))
         self.prompts = QVBoxLayout()
         self._across = across = QHBoxLayout()
@@ -225,6 +228,7 @@ class Arrangement(QWidget):
             if watched is self.outline.tree and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
                 self.close_drawer()
                 if not self.outline.open_current():
-                    self.focus_form()
+                    self.show_side("form")
+                    self.form.focus_first()
                 return True
         return super().eventFilter(watched, event)

@@ -16,6 +16,7 @@ from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.designer_view import HeaderState
+from study_app.viewmodels.designer.keys import tip, with_key
 from study_app.viewmodels.tones import Tone
 
 NEW, OPEN = "\0new", "\0open"
@@ -67,7 +68,7 @@ class ChipButton(Themed, PressedByEnter):
 
 
 class DesignerHeader(QWidget):
-    """Signals: ``study_asked`` (source), ``new_asked``, ``file_asked``, ``problems_asked``, undo, redo and save."""
+    """Signals: ``study_asked`` (source), ``new_asked``, ``file_asked``, ``problems_asked``, undo, redo, save, keys."""
 
     study_asked = Signal(str)
     new_asked = Signal()
@@ -76,6 +77,7 @@ class DesignerHeader(QWidget):
     undo_asked = Signal()
     redo_asked = Signal()
     save_asked = Signal()
+    keys_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -88,11 +90,14 @@ class DesignerHeader(QWidget):
         self.study.setMaxVisibleItems(24)
         self.study.setPlaceholderText("Choose a study")
         self.problems = ChipButton("show the list")
+        self.problems.setToolTip(f"{tip('problems')}; {tip('next problem')}")
         self.version = ChipButton("show the changes")
         self.draft = Chip("neutral", "save", "")
+        self.keys = IconButton("question", "Keys", tip("keys"))
         self.undo = IconButton("undo", "Undo")
         self.redo = IconButton("redo", "Redo")
         self.save = ActionButton("save", "Save", role="primary")
+        self.save.setToolTip(tip("save"))
         self.play = PlayControls()
         self.strip = PlayStrip()
         self.strip.left.connect(self.play.play.setFocus)
@@ -111,13 +116,14 @@ class DesignerHeader(QWidget):
         row.addWidget(self.draft)
         row.addWidget(self.version)
         row.addStretch()
-        for part in (self.undo, self.redo, self.play, self.save):
+        for part in (self.keys, self.undo, self.redo, self.play, self.save):
             row.addWidget(part)
         self.study.activated.connect(self._choose)
         self.problems.clicked.connect(self.problems_asked)
         self.undo.clicked.connect(self.undo_asked)
         self.redo.clicked.connect(self.redo_asked)
         self.save.clicked.connect(self.save_asked)
+        self.keys.clicked.connect(self.keys_asked)
         self.show_state(self.state)
 
     def show_state(self, state: HeaderState) -> None:
@@ -139,13 +145,11 @@ class DesignerHeader(QWidget):
         self.draft.show_state("neutral", "save", state.draft)
         self.version.show_state(state.version.tone, state.version.icon, state.version.words)
         self.version.setToolTip(state.version.tip)
-        for button, word, keys, what in (
-            (self.undo, "Undo", "Ctrl+Z", state.undo),
-            (self.redo, "Redo", "Ctrl+Shift+Z", state.redo),
-        ):
+        for button, action, what in ((self.undo, "undo", state.undo), (self.redo, "redo", state.redo)):
+            words = ": ".join(filter(None, (action.capitalize(), what)))
             button.setEnabled(bool(what) and not state.read_only)
-            button.setAccessibleName(f"{word}: {what}" if what else word)
-            button.setToolTip(f"{word}: {what} ({keys})" if what else word)
+            button.setAccessibleName(words)
+            button.setToolTip(with_key(words, action))
         self.save.show_action("save", state.version.save)
         self.save.setEnabled(state.can_save)
         self._make_room()

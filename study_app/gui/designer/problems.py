@@ -15,6 +15,7 @@ from study_app.gui.theme.themed import Themed, apply_theme_within, replace_insid
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label
+from study_app.viewmodels.designer.keys import key_cap, tip
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 HIGHEST, NARROW_BELOW = 290, 1000
@@ -113,7 +114,8 @@ class ProblemsCard(Card):
         self.heading = label("", "card")
         self.limit = Segments("Problems of")
         self.limit.chosen.connect(self._limit)
-        self.next = ActionButton("", "Next (F8)", height=36)
+        self.next = ActionButton("", "Next", cap=key_cap("next problem"), height=36)
+        self.next.setToolTip(tip("next problem"))
         self.next.setProperty("dense", "true")
         self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
         top = QHBoxLayout()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
@@ -51,7 +51,7 @@ class _Segment(Themed, QAbstractButton):
 
 
 class Segments(Themed, QWidget):
-    """One of few values; ``chosen`` carries the value that a press or an arrow key asks for."""
+    """One of few values; ``chosen`` carries the value that a press or an arrow key asks for; ``tips`` are of values."""
 
     chosen = Signal(object)
 
@@ -60,6 +60,7 @@ class Segments(Themed, QWidget):
         self.setAccessibleName(name)
         self._name, self._height = name, height
         self._values: tuple[object, ...] = ()
+        self.tips: Mapping[object, str] = {}
         self.buttons: list[_Segment] = []
         self._row = QHBoxLayout(self)
         self._row.setContentsMargins(INSIDE, INSIDE, INSIDE, INSIDE)
@@ -83,6 +84,7 @@ class Segments(Themed, QWidget):
         self._values = tuple(value for value, _ in values)
         for button, value in zip(self.buttons, self._values, strict=True):
             button.setChecked(value == chosen)
+            button.setToolTip(self.tips.get(value, ""))
             button.update()
         current = next((button for button in self.buttons if button.isChecked()), None)
         if self.buttons:

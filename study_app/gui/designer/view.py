@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import Qt, Signal, SignalInstance
-from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtCore import Signal, SignalInstance
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFileDialog, QStackedWidget, QVBoxLayout, QWidget
 
 from study_app.gui.designer.arrangement import Arrangement
@@ -13,6 +13,7 @@ from study_app.gui.designer.banner import BannerCard
 from study_app.gui.designer.designer_header import DesignerHeader
 from study_app.gui.designer.focus_areas import FocusAreas
 from study_app.gui.designer.form.element_form import FormCard
+from study_app.gui.designer.keys_card import KeysCard
 from study_app.gui.designer.measures.measures_page import MeasuresPage
 from study_app.gui.designer.new_study import NewStudyPage, NoStudyCard
 from study_app.gui.designer.outline.add_list import AddList
@@ -22,11 +23,13 @@ from study_app.gui.designer.pane.right_pane import PanePage, RightPane
 from study_app.gui.designer.problem_steps import ProblemSteps
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt
+from study_app.gui.designer.shortcuts import make_shortcuts
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.main_view import Place
 from study_app.viewmodels.designer.addable import Addable
 from study_app.viewmodels.designer.designer_view import DesignerView, HeaderState
+from study_app.viewmodels.designer.keys import tip
 from study_app.viewmodels.designer.new_study import TemplateChoice
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
@@ -75,12 +78,12 @@ class DesignerPlace(Place):
         self.pane = RightPane()
         self.measures = MeasuresPage()
         self.pane.add_page(PanePage("measures", "Measures", self.measures, self.measures.controls, with_facts=False))
-        self.pane.add_page(PanePage("file", "File", self.file, self.file.aside))
+        self.pane.add_page(PanePage("file", "File", self.file, self.file.aside, tip=tip("file")))
         self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
         self.sides = self.parts.sides
         self.areas = FocusAreas(self.header, self.parts, self.file, self.problems)
         self.problem_steps = ProblemSteps(self.problems, self.form, self.file, self.areas)
-        self.adding, self.nothing = AddList(self), NoStudyCard()
+        self.adding, self.nothing, self.keys = AddList(self), NoStudyCard(), KeysCard(self)
         self._steps = [partial(self._ask, asked) for asked in (self.undo_asked, self.redo_asked, self.save_asked)]
         self._lay_out()
         self._connect()
@@ -114,6 +117,7 @@ class DesignerPlace(Place):
         header.undo_asked.connect(undo)
         header.redo_asked.connect(redo)
         header.save_asked.connect(save)
+        header.keys_asked.connect(self.keys.switch)
         self.nothing.new.clicked.connect(self.new_asked)
         self.nothing.study_asked.connect(self.study_asked)
         self.nothing.study_asked.connect(self.areas.focus_form)
@@ -152,19 +156,19 @@ class DesignerPlace(Place):
     def _take_keys(self) -> None:
         undo, redo, save = self._steps
         areas = self.areas
-        for keys, act in (
-            ("Ctrl+Z", undo), ("Ctrl+Shift+Z", redo), ("Ctrl+Y", redo), ("Ctrl+S", save),
-            ("F8", self._next_problem), ("Ctrl+F", self.parts.focus_find),
-            ("Ctrl+D", self._duplicate), ("Ctrl+Shift+D", self._series),
-            ("Alt+Up", lambda: self._move_by(-1)), ("Alt+Down", lambda: self._move_by(1)),
-            ("Alt+Left", self.back_asked.emit), ("F2", self._rename), ("Ctrl+E", areas.switch_to_file),
-            ("F6", lambda: areas.cycle(1)), ("Shift+F6", lambda: areas.cycle(-1)),
-            ("Ctrl+1", self.parts.focus_outline), ("Ctrl+2", areas.focus_form), ("Ctrl+3", areas.focus_pane),
-            ("Ctrl+4", areas.focus_problems), ("Ctrl+5", areas.focus_header),
-        ):  # fmt: skip
-            made = QShortcut(QKeySequence(keys), self)
-            made.setContext(Qt.ShortcutContext.WindowShortcut)
-            made.activated.connect(act)
+        make_shortcuts(
+            self,
+            {
+                "outline": self.parts.focus_outline, "form": areas.focus_form, "views": areas.focus_pane,
+                "problems": areas.focus_problems, "header": areas.focus_header,
+                "next part": lambda: areas.cycle(1), "part before": lambda: areas.cycle(-1),
+                "find": self.parts.focus_find, "next problem": self._next_problem, "file": areas.switch_to_file,
+                "back": self.back_asked.emit, "duplicate": self._duplicate, "series": self._series,
+                "rename": self._rename,
+                "up": lambda: self._move_by(-1), "down": lambda: self._move_by(1),
+                "save": save, "undo": undo, "redo": redo, "keys": self.keys.switch,
+            },
+        )  # fmt: skip
 
     # what is shown
 
@@ -379,3 +383,4 @@ class DesignerPlace(Place):
         """Make room."""
         super().resizeEvent(event)
         self.parts.arrange(self.width())
+        self.keys.make_room()

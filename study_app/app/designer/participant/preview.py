@@ -36,6 +36,7 @@ from study_app.session.simulated.preview import preview
 from study_app.session.simulated.programmed_ball import ProgrammedBall
 from study_app.session.transitions.events import Chosen, Continue, LanguageChosen, Retracted, Submitted
 from study_app.session.transitions.previewed_pages import Moment, moments, previewed_page, tested_condition
+from study_app.viewmodels.designer.keys import keys_of, tip
 from study_app.viewmodels.designer.participant_page import (
     SIZES,
     ParticipantView,
@@ -58,7 +59,9 @@ class ParticipantPreview(QObject):
         super().__init__(editing)
         self.editing, self.place = editing, place
         self.tab = ParticipantTab()
-        page = PanePage("participant", "Participant", self.tab, self.tab.aside, most_px=lambda: self.tab.most_px)
+        page = PanePage(
+            "participant", "Participant", self.tab, self.tab.aside, most_px=lambda: self.tab.most_px, tip=tip("page")
+        )
         place.pane.add_page(page, first=True)
         self.tab.resized.connect(place.pane.make_room)
         self._language = ""
@@ -89,7 +92,7 @@ class ParticipantPreview(QObject):
         tab.moment_asked.connect(self.show_moment)
         tab.happened.connect(self._hear)
         tab.frame_due.connect(self._move_ball)
-        keys = QShortcut(QKeySequence("Ctrl+Return"), place)
+        keys = QShortcut(QKeySequence(keys_of("page")[0]), place)
         keys.activated.connect(self.enter_page)
         self._look_at_screen()
 

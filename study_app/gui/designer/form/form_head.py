@@ -14,6 +14,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.designer.form_rows import Form
+from study_app.viewmodels.designer.keys import tip
 from study_app.viewmodels.designer.requests import RenameElement, SetValue
 
 TILE = 40
@@ -79,11 +80,11 @@ class FormHead(QWidget):
         self.series = ActionButton("bars", "Series …", height=34)
         self.series.setProperty("dense", "true")
         self.series.setFont(font("label"))
-        self.series.setToolTip("Copies that differ in one number, such as delays or levels (Ctrl+Shift+D)")
-        self.up = IconButton("arrow_up", "Move up", "Move up (Alt+Up)", size=34)
-        self.down = IconButton("arrow_down", "Move down", "Move down (Alt+Down)", size=34)
-        self.copy = IconButton("copy", "Duplicate", "Duplicate (Ctrl+D)", size=34)
-        self.delete = IconButton("trash", "Delete", "Delete", size=34, role="danger")
+        self.series.setToolTip(tip("series"))
+        self.up = IconButton("arrow_up", "Move up", tip("up"), size=34)
+        self.down = IconButton("arrow_down", "Move down", tip("down"), size=34)
+        self.copy = IconButton("copy", "Duplicate", tip("duplicate"), size=34)
+        self.delete = IconButton("trash", "Delete", f"{tip('delete')} in the outline", size=34, role="danger")
         words = QVBoxLayout()
         words.setSpacing(0)
         words.addWidget(self.title)
@@ -172,7 +173,7 @@ class FormHead(QWidget):
         path, why = self._lock
         locked = bool(why) and self.form is not None and self.form.path == path
         self.id.setReadOnly(self._read_only or locked)
-        self.id.setToolTip(why if locked else "")
+        self.id.setToolTip(why if locked else tip("rename"))
         self.unlock.setVisible(locked and not self._read_only)
         self.unlock.setToolTip(why)
         self.unlock.setAccessibleDescription(why)

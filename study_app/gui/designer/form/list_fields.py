@@ -30,6 +30,7 @@ from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import Choice
 from study_app.viewmodels.designer.form_rows import STUDY_LANGUAGES, Entry, FormRow, new_words
+from study_app.viewmodels.designer.keys import with_key
 from study_app.viewmodels.designer.requests import AddElement, AddEntry, AddNamed, SetValue, Several
 
 KINDS = {
@@ -52,6 +53,7 @@ class EntriesField(EntryList):
             if kind != "tables":
                 for by, icon, word in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
                     button = shown.button(icon, f"Move {entry.title} {word}")
+                    button.setToolTip(with_key(button.accessibleName(), word))
                     button.setEnabled(0 <= at + by < count)
                     to = at - 1 if by < 0 else at + 2
                     button.clicked.connect(lambda _checked=False, at=at, to=to: self.move_entries((at,), to))
@@ -59,6 +61,7 @@ class EntriesField(EntryList):
             opens.clicked.connect(lambda _checked=False, at=at: self.open_asked.emit(self.place(at)))
             if kind != "tables":
                 away = shown.button("cross", f"Remove {entry.title} from {row.row.label}")
+                away.setToolTip(with_key(away.accessibleName(), "delete"))
                 away.clicked.connect(lambda _checked=False, at=at: self.remove((at,)))
             self.add_row(shown)
         self.add = add_button(f"Add to {row.row.label}", "Add")

@@ -14,6 +14,7 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.designer.form_rows import FormRow, choice_words, new_words
+from study_app.viewmodels.designer.keys import with_key
 from study_app.viewmodels.designer.requests import AddNamed, RemoveKey, SetValue, SwitchKind
 
 MOST_SEGMENTS, SEGMENT_LETTERS = 4, 34
@@ -180,7 +181,8 @@ class ChoiceField(Field):
             self.list.activated.connect(self._pick)
             self.box.addWidget(self.list, 1)
         self._values: list[str | None] = []
-        self.arrow = IconButton("arrow_right", f"Open what {row.row.label} names", size=FIELD_PX)
+        opens = f"Open what {row.row.label} names"
+        self.arrow = IconButton("arrow_right", opens, with_key(f"{opens}; back", "back"), size=FIELD_PX)
         self.arrow.clicked.connect(lambda: self.open_asked.emit(self.row.target))
         if row.row.kind == "reference":
             self.box.addWidget(self.arrow)

@@ -12,6 +12,7 @@ from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
+from study_app.viewmodels.designer.keys import key_cap, key_words, keys_of, tip
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 
 
@@ -57,11 +58,12 @@ class OutlineCard(Card):
         self.tree = Tree()
         self.items = QStandardItemModel(self.tree)
         self.tree.setModel(self.items)
-        self.add = ActionButton("plus", "Add", cap="Ins", height=40)
+        self.add = ActionButton("plus", "Add", cap=key_cap("add"), height=40)
         self.add.setAccessibleName("Add an element (Insert)")
-        self.duplicate = ActionButton("copy", "Duplicate", height=40)
+        self.add.setToolTip(tip("add"))
+        self.duplicate = ActionButton("copy", "Duplicate", cap=key_cap("duplicate"), height=40)
         self.duplicate.setAccessibleName("Duplicate the selected element (Ctrl+D)")
-        self.duplicate.setToolTip("Duplicate (Ctrl+D)")
+        self.duplicate.setToolTip(tip("duplicate"))
         for button in (self.add, self.duplicate):
             button.setFont(font("label", weight=600))
         self.column.addWidget(self.words)
@@ -171,17 +173,17 @@ class OutlineCard(Card):
         writable = self.add.isEnabled()
         row = self.tree.currentIndex().data(ROW_ROLE) if self.tree.currentIndex().isValid() else None
         ordered = writable and row is not None and bool(row.step)
-        for words, key, act, possible in (
-            ("Add …", "Ins", self.add_asked.emit, writable),
-            ("Duplicate", "Ctrl+D", self.duplicate_asked.emit, self.duplicate.isEnabled()),
-            ("Copy", "Ctrl+C", self.copy_asked.emit, row is not None and len(row.path) > 1),
-            ("Paste", "Ctrl+V", self.paste_asked.emit, writable),
-            ("Move up", "Alt+Up", lambda: self.move_asked.emit(-1), ordered),
-            ("Move down", "Alt+Down", lambda: self.move_asked.emit(1), ordered),
-            ("Rename", "F2", self.rename_asked.emit, writable and row is not None and len(row.path) > 1),
-            ("Delete", "Del", self.delete_asked.emit, self.duplicate.isEnabled()),
+        for words, name, act, possible in (
+            ("Add …", "add", self.add_asked.emit, writable),
+            ("Duplicate", "duplicate", self.duplicate_asked.emit, self.duplicate.isEnabled()),
+            ("Copy", "copy", self.copy_asked.emit, row is not None and len(row.path) > 1),
+            ("Paste", "paste", self.paste_asked.emit, writable),
+            ("Move up", "up", lambda: self.move_asked.emit(-1), ordered),
+            ("Move down", "down", lambda: self.move_asked.emit(1), ordered),
+            ("Rename", "rename", self.rename_asked.emit, writable and row is not None and len(row.path) > 1),
+            ("Delete", "delete", self.delete_asked.emit, self.duplicate.isEnabled()),
         ):
-            action = menu.addAction(f"{words}\t{key}")
+            action = menu.addAction(f"{words}\t{key_words(keys_of(name)[0])}")
             action.setEnabled(possible)
             action.triggered.connect(lambda _checked=False, act=act: act())
         menu.popup(self.tree.viewport().mapToGlobal(at))

@@ -35,6 +35,8 @@ class PanePage:
         Whether the facts stay below the page.
     most_px : callable
         Returns how high the body is at most; the facts take the rest [px].
+    tip : str
+        The tip of its tab.
     """
 
     name: str
@@ -43,6 +45,7 @@ class PanePage:
     aside: QWidget | None = None
     with_facts: bool = True
     most_px: Callable[[], int] = lambda: QWIDGETSIZE_MAX
+    tip: str = ""
 
 
 class RightPane(QWidget):
@@ -88,6 +91,7 @@ class RightPane(QWidget):
         """Show the page of a tab."""
         page = next(one for one in self.pages if one.name == name)
         changed, self.tab = name != self.tab, name
+        self.tabs.tips = {one.name: one.tip for one in self.pages}
         self.tabs.show_values([(one.name, one.words) for one in self.pages], name)
         self._stack.setCurrentWidget(page.body)
         for one in self.pages:

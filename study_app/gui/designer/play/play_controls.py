@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QMenu, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton, IconButton
+from study_app.viewmodels.designer.keys import keys_of, tip
 from study_app.viewmodels.designer.play import PlayDevices
 
 PLAY, PLAY_NARROW = "Play from here", "Play"
@@ -22,9 +23,9 @@ class PlayControls(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.devices = PlayDevices()
-        self.play = ActionButton("play", PLAY, key="F5")
+        self.play = ActionButton("play", PLAY, key=keys_of("play")[0])
         self.play.setAccessibleName(PLAY)
-        self.play.setToolTip("Play from here (F5)")
+        self.play.setToolTip(tip("play"))
         self.device = IconButton("device", "Device to play with")
         self.menu = QMenu(self)
         self.menu.setFont(font("label"))

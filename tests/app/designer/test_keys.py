@@ -1,0 +1,88 @@
+"""The keys of the designer: each is a shortcut, is shown at its button and in the card, and in the documentation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QShortcut
+from PySide6.QtWidgets import QApplication, QLabel
+
+from study_app.gui.designer.keys_card import HIGHEST, Cap
+from study_app.viewmodels.designer.keys import GROUPS, KEYS, key_words
+
+pytestmark = pytest.mark.slow
+
+SHIFT = Qt.KeyboardModifier.ShiftModifier
+PAGE = Path(__file__).parents[3] / "docs" / "designer.md"
+
+
+def test_every_key_of_the_place_is_one_shortcut(designer: Any) -> None:
+    made = [shortcut.key().toString() for shortcut in designer.place.findChildren(QShortcut)]
+    made.append(designer.place.header.play.play.shortcut().toString())
+    wanted = [keys for one in KEYS if not one.within for keys in one.keys]
+    named = {"Ins": "Insert", "Del": "Delete"}
+    assert sorted(named.get(keys, keys) for keys in made) == sorted(k for k in wanted if k not in {"Insert", "Delete"})
+
+
+def test_the_card_lists_every_key_and_esc_gives_the_keyboard_back(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    tree, card = designer.place.outline.tree, designer.place.keys
+    tree.setFocus()
+    qtbot.mouseClick(designer.place.header.keys, Qt.MouseButton.LeftButton)
+    assert card.isVisible()
+    words = {label.text() for label in card.findChildren(QLabel)}
+    assert {*GROUPS, "Duplicate", "Find in the study", "Delete (outline, lists)"} <= words
+    assert sorted(cap.words for cap in card.findChildren(Cap)) == sorted(key_words(k) for one in KEYS for k in one.keys)
+    qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape)
+    assert not card.isVisible()
+    tree.setFocus()
+    qtbot.keyClick(tree, Qt.Key.Key_F1, SHIFT)
+    assert card.isVisible()
+    assert card.isAncestorOf(QApplication.focusWidget())
+    qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape)
+    assert tree.hasFocus()
+    qtbot.keyClick(tree, Qt.Key.Key_F1, SHIFT)
+    qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_2, Qt.KeyboardModifier.ControlModifier)
+    assert not card.isVisible(), "it does not lie over what one goes to"
+    assert designer.place.form.isAncestorOf(QApplication.focusWidget())
+
+
+@pytest.mark.parametrize("size", [(1024, 640), (1366, 768)])
+def test_the_card_has_room_in_small_windows(qtbot: Any, designer: Any, size: tuple[int, int]) -> None:
+    designer.window.resize(*size)
+    designer.controller.open("kitchen")
+    qtbot.keyClick(designer.window, Qt.Key.Key_F1, SHIFT)
+    card = designer.place.keys
+    QApplication.processEvents()
+    assert designer.place.rect().contains(card.geometry())
+    assert card.height() <= HIGHEST
+    inside, viewport = card.area.widget(), card.area.viewport()
+    assert inside.minimumSizeHint().width() <= viewport.width()
+    assert inside.height() <= viewport.height(), "every key is seen without scrolling"
+
+
+def test_buttons_say_their_keys(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("blocks", "liquids"))
+    place = designer.place
+    head, header, outline = place.form.head, place.header, place.outline
+    sides, tabs = place.parts.sides.buttons, place.pane.tabs.buttons
+    for part, key in (
+        (head.up, "Alt+Up"), (head.down, "Alt+Down"), (head.copy, "Ctrl+D"), (head.delete, "Del"), (head.id, "F2"),
+        (header.undo, "Ctrl+Z"), (header.redo, "Ctrl+Shift+Z"), (header.save, "Ctrl+S"), (header.play.play, "F5"),
+        (header.problems, "F8"), (header.keys, "Shift+F1"), (outline.add, "Ins"), (outline.duplicate, "Ctrl+D"),
+        (place.problems.next, "F8"), (place.parts.path.outline, "Ctrl+1"), (sides[0], "Ctrl+2"), (sides[1], "Ctrl+3"),
+        (tabs[0], "Ctrl+Enter"), (tabs[2], "Ctrl+E"),
+    ):  # fmt: skip
+        assert f"({key})" in part.toolTip(), (key, part.toolTip())
+    assert "Ctrl+F" in outline.words.placeholderText()
+
+
+def test_the_documentation_lists_every_key() -> None:
+    section = PAGE.read_text().split("## Keys")[1].split("\n## ")[0]
+    long = {"Ins": "Insert", "Del": "Delete"}
+    words = [long.get(key_words(keys), key_words(keys)) for one in KEYS for keys in one.keys]
+    assert not [one for one in words if one not in section]
