@@ -139,7 +139,7 @@ class Arrangement(QWidget):
         self._whole.addWidget(outline)
         self._whole.addLayout(right, 1)
         outline.setFixedWidth(OUTLINE_PX)
-        outline.settled.connect(self.close_drawer)
+        outline.settled.connect(lambda: self._go_to_form() if self.drawer else None)
         for part in (outline.tree, outline.words):
             part.installEventFilter(self)
         application = QApplication.instance()
@@ -198,12 +198,20 @@ class Arrangement(QWidget):
             self.focus_outline()
 
     def close_drawer(self) -> None:
-        """Close the drawer, where there is one; the form takes the keyboard that it had."""
+        """Close the drawer, where there is one; the button that opens it takes the keyboard that it had."""
         if self.drawer and self.outline.isVisible():
             had = self.outline.isAncestorOf(self.window().focusWidget() or self)
             self.outline.hide()
             if had:
                 self.path.outline.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _go_to_form(self) -> None:
+        """Go from the chosen element to its form; a drawer closes, and lists every element when it opens again."""
+        self.close_drawer()
+        if self.drawer:
+            self.outline.words.clear()
+        self.show_side("form")
+        self.form.focus_first()
 
     def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
         """Close the drawer when another part of the place takes the keyboard."""
@@ -220,15 +228,16 @@ class Arrangement(QWidget):
             self._place_drawer()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Close the drawer at Esc and Enter."""
-        if self.drawer and event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
-            if event.key() == Qt.Key.Key_Escape and not self.outline.tree.dragged:
+        """Close the drawer at Esc; go from the outline to the form at Enter."""
+        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
+            tree = self.outline.tree
+            if self.drawer and event.key() == Qt.Key.Key_Escape and not tree.dragged:
                 self.close_drawer()
                 return True
-            if watched is self.outline.tree and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-                self.close_drawer()
-                if not self.outline.open_current():
-                    self.show_side("form")
-                    self.form.focus_first()
+            if watched is tree and event.key() in ENTER:
+                if self.outline.open_current():
+                    self.close_drawer()
+                else:
+                    self._go_to_form()
                 return True
         return super().eventFilter(watched, event)

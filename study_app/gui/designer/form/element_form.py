@@ -23,6 +23,7 @@ from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
+from study_app.viewmodels.designer.form_changes import added_row, shape_of
 from study_app.viewmodels.designer.form_rows import Form, FormRow, Section
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.requests import AddKey, RemoveKey, RenameElement
@@ -34,8 +35,6 @@ INFINITE_PX = 1 << 24
 FOOT_FROM = 460
 """The height of the form from which it has a foot [px]."""
 SHOWN_OR_HIDDEN = Qt.WidgetAttribute.WA_WState_ExplicitShowHide
-BELOW = 2
-"""Where the keys of an element begin in a path, after its section and its id."""
 
 
 class FormCard(Card):
@@ -102,7 +101,7 @@ class FormCard(Card):
         self.own.setText("\n".join(form.faults))
         self.own.setVisible(bool(form.faults))
         stays = before is not None and form.path in {before.path, self._renamed}
-        same = before is not None and stays and _shape(before) == _shape(form)
+        same = before is not None and stays and shape_of(before) == shape_of(form)
         if same and [row.key for row in self.rows] == [structure_of(row) for row in form.rows]:
             for widget, row in zip(self.rows, form.rows, strict=True):
                 widget.show_row(row)
@@ -113,10 +112,12 @@ class FormCard(Card):
     def _make(self, form: Form, before: Form | None) -> None:
         """Make the editors anew; ``before`` is the form of the same element before, None for another element."""
         keyboard = QApplication.focusWidget()
+        inside_form = keyboard is not None and self.inside.isAncestorOf(keyboard)
         held = next((row for row in self._made if keyboard is not None and row.isAncestorOf(keyboard)), None)
-        if held is None and self.isAncestorOf(self.focusWidget()):
+        added = added_row(form, before) if inside_form and held is None and before is not None else None
+        if held is None and added is None and self.isAncestorOf(self.focusWidget()):
             held = self._focused
-        focused = None
+        focused = added
         if held is not None and before is not None:
             focused = (*form.path, *held.row.row.path[len(before.path) :])
         caret = None if held is None else Caret.of(held.focusWidget())
@@ -143,6 +144,8 @@ class FormCard(Card):
         QTimer.singleShot(0, self.area, lambda: self._settle(down_px, other=before is None))
         if focused is not None:
             self.focus(focused, caret)
+        elif inside_form:
+            self.focus_first()
 
     def _settle(self, down_px: int, *, other: bool) -> None:
         """Scroll once the editors have their places: in another element to the row that got the keyboard meanwhile."""
@@ -378,15 +381,3 @@ class FormCard(Card):
             self.foot.show_help("", "", "")
         else:
             self.foot.show_help(row.row.row.label, row.row.place, row.help)
-
-
-def _shape(form: Form) -> object:
-    others = [line for line in form.questions.lines if line.path != form.path]
-    return (
-        others,
-        form.questions.languages,
-        [
-            (one.path[BELOW:], one.title, tuple(row.path[BELOW:] for row in one.absent), one.faults)
-            for one in form.sections
-        ],
-    )

@@ -44,10 +44,10 @@ class OutlineCard(Card):
         self.setAccessibleName("Outline")
         self.rows: tuple[OutlineRow, ...] = ()
         self._opened: set[object] = set()
-        self._filling = False
+        self._filling = self._finding = False
         self.words = QLineEdit()
         self.words.setAccessibleName("Find in the study")
-        self.words.setPlaceholderText("Find in the study (Ctrl+F)")
+        self.words.setPlaceholderText(tip("find"))
         self.words.setFont(font("label", weight=400))
         self.words.setProperty("dense", "true")
         self.words.setFixedHeight(36)
@@ -79,7 +79,7 @@ class OutlineCard(Card):
         self.tree.selectionModel().currentChanged.connect(self._choose)
         self.tree.selectionModel().selectionChanged.connect(lambda _now, _before: self.several_changed.emit())
         self.tree.clicked.connect(self._click)
-        self.tree.expanded.connect(lambda index: self._opened.add(self._key(index)))
+        self.tree.expanded.connect(lambda index: None if self._finding else self._opened.add(self._key(index)))
         self.tree.collapsed.connect(lambda index: self._opened.discard(self._key(index)))
         self.tree.key_pressed.connect(self._key_pressed)
         self.tree.entered_row.connect(self.open_current)
@@ -135,15 +135,25 @@ class OutlineCard(Card):
                 del above[depth + 1 :]
                 above[-1].appendRow(item)
                 above.append(item)
+            self._finding = bool(self.words.text().strip())
             for index in self.indexes():
-                if self._key(index) in self._opened or self.words.text().strip():
+                if self._key(index) in self._opened or self._finding:
                     self.tree.expand(index)
+            self._finding = False
             self.tree.verticalScrollBar().setValue(scrolled)
             self._filling = False
             self.mark(selected)
             if selected in several and len(several) > 1:
                 self.select_several(several)
         self.mark(selected)
+
+    def go_to_found(self) -> None:
+        """Select the first element that is listed, unless the selected one is among them, and go to the rows."""
+        if not self.tree.currentIndex().isValid():
+            first = next((index for index in self.indexes() if index.data(ROW_ROLE).path), None)
+            if first is not None:
+                self.tree.selectionModel().setCurrentIndex(first, QItemSelectionModel.SelectionFlag.ClearAndSelect)
+        self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def mark(self, path: object) -> None:
         """Mark the row of an element, the nearest to the one that is marked."""
@@ -207,10 +217,12 @@ class OutlineCard(Card):
             self.chosen.emit(index.data(ROW_ROLE).path)
 
     def _click(self, index: QModelIndex) -> None:
-        inner = self.items.hasChildren(index)
-        if inner:
+        """Open or close the heading of several, or what its sign is clicked of; else settle on the element."""
+        heading = self.items.hasChildren(index) and len(index.data(ROW_ROLE).path) == 1
+        if heading or self.tree.pressed_sign:
             self.tree.setExpanded(index, not self.tree.isExpanded(index))
-        if len(index.data(ROW_ROLE).path) > int(inner):  # not the heading of several
+        else:
+            self.tree.expand(index)
             self.settled.emit()
         self.open_current()
 

@@ -70,7 +70,7 @@ class RowPainter(QStyledItemDelegate):
                 painter.setPen(QPen(QColor(t.accent), 2))
                 painter.setBrush(Qt.BrushStyle.NoBrush)
                 painter.drawRoundedRect(place.adjusted(1, 2, -1, -2), RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
-        x = 12.0 + INDENT * (row.depth - 1)
+        x = sign_right(row) - INDENT
         if row.step and self.movable and (chosen or pointed):
             paint_grip(painter, QRectF(x - 8, place.top(), 8, place.height()), t.text2)
         if self.tree.model().hasChildren(index):
@@ -98,6 +98,11 @@ class RowPainter(QStyledItemDelegate):
         room = QRectF(x + 46, place.top(), right - x - 46, place.height())
         words = painter.fontMetrics().elidedText(row.title, Qt.TextElideMode.ElideRight, int(room.width()))
         painter.drawText(room, middle, words)
+
+
+def sign_right(row: OutlineRow) -> float:
+    """Return where the sign ends that shows whether what is below a row is shown [px]."""
+    return 12.0 + INDENT * row.depth
 
 
 def paint_grip(painter: QPainter, place: QRectF, ink: str) -> None:

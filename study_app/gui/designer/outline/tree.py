@@ -6,7 +6,7 @@ from PySide6.QtCore import QEvent, QModelIndex, QPoint, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QKeySequence, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QApplication, QFrame, QTreeView
 
-from study_app.gui.designer.outline.rows import ROW_ROLE, RowPainter
+from study_app.gui.designer.outline.rows import ROW_ROLE, RowPainter, sign_right
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Themed
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
@@ -46,6 +46,7 @@ class Tree(Themed, QTreeView):
         self.setStyleSheet("QTreeView { background: transparent; border: none; outline: none; }")
         self.dragged: tuple[ElementPath, ...] = ()
         self.target: tuple[int, float] | None = None
+        self.pressed_sign = False
         self._pressed: tuple[QPoint, tuple[ElementPath, ...]] | None = None
 
     def apply_theme(self, theme: Theme) -> None:
@@ -91,6 +92,8 @@ class Tree(Themed, QTreeView):
         index = self.indexAt(event.position().toPoint())
         row = index.data(ROW_ROLE) if index.isValid() else None
         self._pressed = None
+        sign = row is not None and self.model().hasChildren(index) and event.position().x() < sign_right(row)
+        self.pressed_sign = sign
         plain = event.button() == Qt.MouseButton.LeftButton and not event.modifiers()
         if plain and row is not None and row.step and self.rows.movable:
             selected = [one.step for one in self.selected_rows() if one.step[:-1] == row.step[:-1]]

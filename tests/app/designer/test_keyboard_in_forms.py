@@ -1,0 +1,83 @@
+"""The keyboard where a step shows another form, or the same form with other rows: it is never lost."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QWidget
+
+from study_app.gui.designer.outline.rows import ROW_ROLE
+
+pytestmark = pytest.mark.slow
+
+CONTROL, KEY = Qt.KeyboardModifier.ControlModifier, Qt.Key
+
+
+def press(qtbot: Any, key: KEY, held: Any = Qt.KeyboardModifier.NoModifier) -> Any:
+    """Press a key in the part with the keyboard, and return the part that has it then."""
+    qtbot.keyClick(QApplication.focusWidget(), key, held)
+    QApplication.processEvents()
+    return QApplication.focusWidget()
+
+
+def first_row(designer: Any) -> QWidget:
+    return designer.place.form.rows[0]
+
+
+@pytest.mark.parametrize("width", [1600, 1366])
+@pytest.mark.parametrize("area", ["form", "outline"])
+@pytest.mark.parametrize(
+    "path", [("blocks", "liquids"), ("conditions", "thick"), ("questionnaires", "liquid", "items", 0)]
+)
+def test_a_duplicate_is_selected_everywhere_and_has_the_keyboard(
+    qtbot: Any, designer: Any, width: int, area: str, path: tuple[str | int, ...]
+) -> None:
+    designer.window.resize(width, 768)
+    designer.controller.open("kitchen")
+    designer.select(path)
+    outline, tree = designer.place.outline, designer.place.outline.tree
+    designer.place.areas.focus_form() if area == "form" else designer.place.parts.focus_outline()
+    keyboard = press(qtbot, KEY.Key_D, CONTROL)
+    copy = (*path[:-1], path[-1] + 1 if isinstance(path[-1], int) else f"{path[-1]}_2")
+    assert designer.editing.selected == copy
+    assert designer.place.form.form.path == copy
+    assert outline.selected == (copy,)
+    assert tree.hasFocus() if area == "outline" else first_row(designer).isAncestorOf(keyboard)
+    assert press(qtbot, KEY.Key_1, CONTROL) is tree
+    assert tree.currentIndex().data(ROW_ROLE).path == copy
+    assert tree.viewport().rect().contains(tree.visualRect(tree.currentIndex()))
+    assert first_row(designer).isAncestorOf(press(qtbot, KEY.Key_Return))
+    assert designer.place.form.form.path == copy
+
+
+def test_a_reference_leads_to_the_form_of_its_element_and_back(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("blocks", "liquids"))
+    designer.row("blocks", "liquids", "task").field.arrow.setFocus()
+    keyboard = press(qtbot, KEY.Key_Return)
+    assert designer.editing.selected == ("tasks", "explore")
+    assert first_row(designer).isAncestorOf(keyboard)
+    keyboard = press(qtbot, KEY.Key_Left, Qt.KeyboardModifier.AltModifier)
+    assert designer.editing.selected == ("blocks", "liquids")
+    assert designer.place.form.isAncestorOf(keyboard)
+
+
+def test_a_field_that_is_added_has_the_keyboard(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("conditions", "thick"))
+    before = {row.row.row.path for row in designer.place.form.rows}
+    designer.place.form.adds[0].setFocus()
+    keyboard = press(qtbot, KEY.Key_Return)
+    (added,) = (row for row in designer.place.form.rows if row.row.row.path not in before)
+    assert added.isAncestorOf(keyboard)
+
+
+def test_ctrl_e_goes_to_the_file_and_back_to_the_same_field(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("blocks", "liquids"))
+    field = designer.row("blocks", "liquids", "repetitions").field.line
+    field.setFocus()
+    assert press(qtbot, KEY.Key_E, CONTROL) is designer.place.file.editor
+    assert press(qtbot, KEY.Key_E, CONTROL) is field
