@@ -148,11 +148,13 @@ class OutlineCard(Card):
         self.mark(selected)
 
     def go_to_found(self) -> None:
-        """Select the first element that is listed, unless the selected one is among them, and go to the rows."""
-        if not self.tree.currentIndex().isValid():
-            first = next((index for index in self.indexes() if index.data(ROW_ROLE).path), None)
-            if first is not None:
-                self.tree.selectionModel().setCurrentIndex(first, QItemSelectionModel.SelectionFlag.ClearAndSelect)
+        """Go to the rows; select the first element that is called so, else the first that is listed."""
+        words = self.words.text().strip().casefold()
+        listed = [index for index in self.indexes() if index.data(ROW_ROLE).path]
+        called = [index for index in listed if words in index.data(ROW_ROLE).title.casefold()]
+        if words and listed:
+            found = (called or listed)[0]
+            self.tree.selectionModel().setCurrentIndex(found, QItemSelectionModel.SelectionFlag.ClearAndSelect)
         self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def mark(self, path: object) -> None:
