@@ -68,7 +68,7 @@ def test_a_field_that_is_added_has_the_keyboard(qtbot: Any, designer: Any) -> No
     designer.controller.open("kitchen")
     designer.select(("conditions", "thick"))
     before = {row.row.row.path for row in designer.place.form.rows}
-    designer.place.form.adds[0].setFocus()
+    next(iter(designer.place.form.adds.values())).setFocus()
     keyboard = press(qtbot, KEY.Key_Return)
     (added,) = (row for row in designer.place.form.rows if row.row.row.path not in before)
     assert added.isAncestorOf(keyboard)

@@ -147,16 +147,6 @@ class OutlineCard(Card):
                 self.select_several(several)
         self.mark(selected)
 
-    def go_to_found(self) -> None:
-        """Go to the rows; select the first element that is called so, else the first that is listed."""
-        words = self.words.text().strip().casefold()
-        listed = [index for index in self.indexes() if index.data(ROW_ROLE).path]
-        called = [index for index in listed if words in index.data(ROW_ROLE).title.casefold()]
-        if words and listed:
-            found = (called or listed)[0]
-            self.tree.selectionModel().setCurrentIndex(found, QItemSelectionModel.SelectionFlag.ClearAndSelect)
-        self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
-
     def mark(self, path: object) -> None:
         """Mark the row of an element, the nearest to the one that is marked."""
         current = self.tree.currentIndex()
@@ -237,10 +227,14 @@ class OutlineCard(Card):
         return bool(field)
 
     def _go_to_first(self) -> bool:
-        """Select the first element that is shown; return whether there is one."""
-        first = next((index for index in self.indexes() if index.data(ROW_ROLE).path), None)
+        """Select the first element that is called so, else the first with a field that is; return whether one is."""
+        words = self.words.text().strip().casefold()
+        rows = [(index, index.data(ROW_ROLE)) for index in self.indexes() if index.data(ROW_ROLE).path]
+        called = [index for index, row in rows if words in row.title.casefold()]
+        with_field = [index for index, row in rows if row.field]
+        first = next(iter((*called, *with_field, *(index for index, _ in rows))), None)
         if first is not None:
-            self.tree.setCurrentIndex(first)
+            self.tree.selectionModel().setCurrentIndex(first, QItemSelectionModel.SelectionFlag.ClearAndSelect)
         return first is not None
 
     def _open_first(self) -> None:
