@@ -85,14 +85,11 @@ class Tasks:
         user.press("Template Empty study")
         user.write("Title", "Four delays", accept=False)
         user.press("Make study")
-        names = {"late": "60", "later": "120", "latest": "240"}
-        for name, delay in names.items():
-            user.add("Condition")
-            user.write("Id", name)
-            user.write("Delay", delay)
+        user.select("Water", "Conditions")
+        user.shortcut("ctrl+shift+d", "Series …")
+        user.write("Values of the series", "0 60 120 240", accept=False)
+        user.shortcut("Return", "Make 4 conditions")
         user.select("Liquids", "Session, in order")
-        for name in names:
-            user.choose("Add to Conditions", name)
         user.choose("Order", "Williams")
         QTest.qWait(1500)
         words = [label.text() for label in user.window.findChildren(QLabel) if label.isVisible()]
