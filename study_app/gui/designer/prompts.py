@@ -15,7 +15,7 @@ from study_app.viewmodels.designer.prompts import DeletePrompt, SeriesPlan, Seri
 from study_app.viewmodels.designer.requests import DeleteElement, MakeSeries
 
 HIGHEST = 560
-PLAN_PX, LINE_PX = 190, 18
+LEAST_PLAN_PX, PLAN_PX, LINE_PX = 62, 190, 18
 
 
 class Prompt(Card):
@@ -140,7 +140,9 @@ class SeriesCard(Prompt):
         self.values.setAccessibleDescription(plan.refusal)
         self.lines.setText("\n".join(plan.lines))
         self.area.setVisible(bool(plan.lines))
-        self.area.setFixedHeight(min(PLAN_PX, LINE_PX * len(plan.lines) + 8))
+        wanted = LINE_PX * len(plan.lines) + 8
+        self.area.setMinimumHeight(min(LEAST_PLAN_PX, wanted))  # a low window leaves no room for more
+        self.area.setMaximumHeight(min(PLAN_PX, wanted))
         self.make.show_action("bars", plan.make)
         self.make.setEnabled(bool(plan.lines))
 

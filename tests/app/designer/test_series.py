@@ -128,3 +128,14 @@ def test_blocks_of_a_series_get_letters_titles_and_places_in_the_session(designe
     assert len(letters) == len(set(letters))
     assert after["blocks"]["liquids_3"]["title"]["nl"] == "Basisinstellingen, 3"
     assert designer.editing.opened.study.faults == faults
+
+
+def test_a_long_series_leaves_its_buttons_free_in_a_low_window(qtbot: Any, water: Any) -> None:
+    water.window.resize(1024, 640)
+    water.place.series_asked.emit(CONDITION)
+    shown = card(water)
+    qtbot.keyClicks(shown.values, " ".join(map(str, range(0, 240, 10))))
+    qtbot.wait(50)
+    assert shown.make.text() == "Make 24 conditions"
+    assert shown.area.isVisible()
+    assert shown.area.geometry().bottom() < shown.make.geometry().top()
