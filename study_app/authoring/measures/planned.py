@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
+
+ENOUGH: Final = 0.8
+"""Participants are enough where so many simulated studies are as precise as planned."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +23,10 @@ class GroupPrecision:
         Of each standard, as planned and a third more.
     share, more_share : float
         Of the studies within the precision, with as many trials.
+    most : int
+        Up to so many participants it was looked for how many are enough.
+    enough : int or None
+        How many participants are enough; None: more than ``most``.
     """
 
     participants: int
@@ -28,6 +36,8 @@ class GroupPrecision:
     share: float
     more_trials: int
     more_share: float
+    most: int
+    enough: int | None
 
 
 @dataclass(frozen=True, slots=True)

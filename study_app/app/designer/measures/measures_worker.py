@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, TypeAlias
 
 from study_app.authoring.measures.observers import GivenUp, Measurable, Observed, measurable, observe
-from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision
+from study_app.authoring.measures.planned import ENOUGH, Detectable, Finding, GroupPrecision
 from study_app.protocol.checks.expected_precision import ThresholdPlan, imprecise
 from study_app.protocol.model import Protocol
 from study_app.workers.client import WorkerClient
@@ -14,6 +15,7 @@ from study_app.workers.messages import Stopped
 from study_app.workers.server import Send, Stop
 
 if TYPE_CHECKING:
+    from study_app.analysis.power import threshold_studies
     from study_app.session.simulated.trial_features import ConditionFeatures
 
 SEED: Final = 1
@@ -21,6 +23,8 @@ SEED: Final = 1
 STUDIES: Final = 200
 THRESHOLD_STUDIES: Final = 60
 MORE: Final = 4 / 3
+MOST_PEOPLE: Final = 60
+"""Up to so many participants it is looked for how many are enough."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,15 +133,30 @@ def _found(wanted: Wanted, stop: Stop) -> Found:
 
 
 def _group(wanted: Grouping, stop: Stop) -> GroupPrecision:
+    people, precision = wanted.participants, wanted.precision
     more = wanted.plan.with_trials(round(MORE * wanted.plan.trials))
-    shares = [_within(plan, wanted, stop) for plan in (wanted.plan, more)]
+    shares = [_studies(plan, (people,), stop).within(0, precision) for plan in (wanted.plan, more)]
+    enough = people if shares[0] >= ENOUGH else _enough(wanted, stop)
+    most = max(MOST_PEOPLE, people)
     return GroupPrecision(
-        wanted.participants, THRESHOLD_STUDIES, wanted.precision, wanted.plan.trials, shares[0], more.trials, shares[1]
+        people, THRESHOLD_STUDIES, precision, wanted.plan.trials, shares[0], more.trials, shares[1], most, enough
     )
 
 
-def _within(plan: ThresholdPlan, wanted: Grouping, stop: Stop) -> float:
-    """Return the share of simulated studies whose group's interval is narrow enough, as ``power`` counts it."""
+def _enough(wanted: Grouping, stop: Stop) -> int | None:
+    """Return how many participants are enough, looked for up to twice as many, then up to twice as many again."""
+    last = wanted.participants
+    while last < MOST_PEOPLE:
+        sizes = range(last + 1, min(2 * last, MOST_PEOPLE) + 1)
+        found, last = _studies(wanted.plan, sizes, stop), sizes[-1]
+        for at, size in enumerate(sizes):
+            if found.within(at, wanted.precision) >= ENOUGH:
+                return size
+    return None
+
+
+def _studies(plan: ThresholdPlan, sizes: Sequence[int], stop: Stop) -> threshold_studies.Found:
+    """Return what simulated studies of so many participants find, as ``power`` does."""
     from study_app.analysis.power import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
 
     total = threshold_studies.Found()
@@ -145,9 +164,8 @@ def _within(plan: ThresholdPlan, wanted: Grouping, stop: Stop) -> float:
         if stop():
             raise GivenUp
         case = threshold_studies.Case("", plan, (SEED, 0, plan.trials, number))
-        found = threshold_studies.study_batch(case, (wanted.participants,))
-        total.halves += found.halves
-    return total.within(0, wanted.precision)
+        total.halves += threshold_studies.study_batch(case, sizes).halves
+    return total
 
 
 def _detectable(wanted: Detecting, stop: Stop) -> Detectable | None:

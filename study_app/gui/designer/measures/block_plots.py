@@ -17,7 +17,7 @@ from study_app.viewmodels.designer.measures.number_cards import ForcesPlot, Func
 BARS = 0.14  # of the height, for how often each level is asked
 SYMBOLS = ("o", "t1", "s", "d")
 DASHED = (4.0, 3.0)
-LIMIT_PX = 66.0  # of the name of the force limit
+LIMIT_PX, LIMITS_PX = 66.0, 128.0  # of the name of the force limit, and of those of both limits
 
 
 class MeasurePlot(Plot):
@@ -199,8 +199,12 @@ class ForcesView(MeasurePlot):
         self.apply_theme(LIGHT)
 
     def draw(self, shown: ForcesPlot) -> None:
-        """Draw bars and limit."""
+        """Draw bars and limit; nothing where no force is known."""
         theme, count = self.theme, len(shown.bars)
+        self.show_ticks("left", list(shown.ticks_y))
+        self.show_ticks("bottom", list(shown.ticks_x))
+        if not shown.bars:
+            return
         for at, bar in enumerate(shown.bars):
             if bar.clipped and bar.asked_n > bar.sent_n:
                 lost = pg.BarGraphItem(
@@ -218,10 +222,13 @@ class ForcesView(MeasurePlot):
             self.add(bars, 0)
         top = max(shown.limit_n, *(bar.asked_n for bar in shown.bars))
         highest = 1.16 * top
-        room = count * LIMIT_PX / max(LIMIT_PX + 1.0, self.box.width() - LIMIT_PX)
-        self.curve([-0.7, count - 0.3], [shown.limit_n, shown.limit_n], theme.bad, 1.5, dashed=True)
-        self.words(f"limit {shown.limit_n:g} N", count - 0.2, shown.limit_n, theme.bad, (0.0, 0.5), over=True)
-        self.show_ticks("left", list(shown.ticks_y))
-        self.show_ticks("bottom", list(shown.ticks_x))
+        limits = [(f"limit {shown.limit_n:g} N", shown.limit_n, theme.bad, 0.5)]
+        if shown.slope_n is not None:  # one name above its line, the other below: the limits may be nearly equal
+            limits = [(*limits[0][:3], 1.0), (f"slope limit {shown.slope_n:.3g} N", shown.slope_n, theme.warn, 0.0)]
+        room_px = LIMIT_PX if shown.slope_n is None else LIMITS_PX
+        room = count * room_px / max(room_px + 1.0, self.box.width() - room_px)
+        for words, force_n, ink, above in limits:
+            self.curve([-0.7, count - 0.3], [force_n, force_n], ink, 1.5, dashed=True)
+            self.words(words, count - 0.2, force_n, ink, (0.0, above), over=True)
         self.box.setXRange(-0.8, count - 0.2 + room, padding=0)
         self.box.setYRange(0.0, highest, padding=0)

@@ -53,6 +53,7 @@ class NumberPart(Card):
         self.title = Elided("small", "text2")
         self.number, self.unit = figures("", "number"), label("", "small", "text2")
         self.icon, self.note = Icon("info", "text2", 14), Elided("small", "text2")
+        self.more = label("", "small", "text2", wraps=True)
         across, below = QHBoxLayout(), QHBoxLayout()
         across.setSpacing(6)
         across.addWidget(self.number)
@@ -64,6 +65,8 @@ class NumberPart(Card):
         self.column.addWidget(self.title)
         self.column.addLayout(across)
         self.column.addLayout(below)
+        self.column.addWidget(self.more)
+        self.column.addStretch()
 
     def show_card(self, shown: NumberCard) -> None:
         """Show another number."""
@@ -78,7 +81,10 @@ class NumberPart(Card):
         tone, icon, words = waiting if shown.anew else shown.note
         self.icon.show_icon(icon or "info", INKS[tone])
         self.note.show_text(words)
-        self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {words}")
+        self.more.setText(shown.more)
+        self.more.setVisible(bool(shown.more) and not shown.anew)
+        also = f". {shown.more}" if self.more.isVisibleTo(self) else ""
+        self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {words}{also}")
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name

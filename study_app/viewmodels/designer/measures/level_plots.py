@@ -10,7 +10,7 @@ from typing import Final
 from study_app.authoring.block_levels import Level, levels, standard_of
 from study_app.authoring.measures.forces import LevelLimits, level_limits
 from study_app.authoring.measures.observers import Measurable, Observed
-from study_app.authoring.measures.planned import GroupPrecision
+from study_app.authoring.measures.planned import ENOUGH, GroupPrecision
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder
@@ -28,7 +28,6 @@ from study_app.viewmodels.designer.measures.number_cards import (
 )
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
-ENOUGH: Final = 0.8
 MOST_LABELS: Final = 9
 
 
@@ -157,12 +156,15 @@ def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
 def _people(simulated: Simulated, participants: int, precision: float) -> NumberCard:
     found = simulated.group
     if found is None:
-        return _unknown(f"{participants} people in ± {100 * precision:g} %", "%", simulated)
+        return _unknown(f"{participants} people in ± {100 * precision:g} %", "% of studies", simulated)
     title = f"{found.participants} people in ± {100 * found.precision:g} %"
     enough = found.share >= ENOUGH
-    note: Verdict = ("ok" if enough else "warn", "check" if enough else "warning", "")
-    note = (*note[:2], f"{found.more_trials} trials: {100 * found.more_share:.0f} %")
-    return NumberCard(title, f"{100 * found.share:.0f}", "%", note, "group" in simulated.anew)
+    note: Verdict = ("ok", "check", "Enough") if enough else ("warn", "warning", "Not enough")
+    needed = f"{100 * ENOUGH:g} % needed" if enough else f"{100 * ENOUGH:g} % take more than {found.most} people"
+    if not enough and found.enough is not None:
+        needed = f"{100 * ENOUGH:g} % take about {found.enough} people"
+    more = f"{needed}; {found.more_trials} trials give {100 * found.more_share:.0f} %"
+    return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, "group" in simulated.anew, more)
 
 
 def function_plot(of: LevelBlock, simulated: Simulated) -> FunctionPlot | None:
@@ -266,23 +268,27 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
     top = max(limit_n, *(bar.asked_n for bar in bars))
     step = max(1, math.ceil(len(bars) / MOST_LABELS))
     standard = "" if of.standard is None else f"standard {rounded(of.standard)} {unit}, "
-    verdicts: list[Verdict] = [("ok", "check", f"{asked} of {len(of.levels)} as asked")]
+    told = f"{asked} of {len(of.levels)} as asked"
+    verdicts: tuple[Verdict, ...] = (("ok", "check", told),)
     if clipped:
-        verdicts.append(("bad" if row is not None else "warn", "warning", f"{clipped} clipped"))
+        verdicts = ("neutral", "info", told), ("bad" if row is not None else "warn", "warning", f"{clipped} clipped")
     strongest = max(one.asked_n or 0.0 for one in shown)
+    slope_n = min((one.sent_n or 0.0 for one in shown if one.clipped_by == "slope"), default=None)
+    slope = "" if slope_n is None else f", the slope limit of the loop {slope_n:.2f} N"
     return ForcesPlot(
         heading=f"N, {standard}at {of.limits.hand_mps:.3f} m/s of the hand",
         bars=tuple(bars),
         ticks_x=tuple((float(at), rounded(values[at])) for at in range(0, len(bars), step)),
         ticks_y=tuple((one, f"{one:g}") for one in even_ticks(0.0, 1.02 * top, 5)),
         limit_n=limit_n,
-        verdicts=tuple(verdicts),
+        slope_n=slope_n,
+        verdicts=verdicts,
         warning=warning,
         repair=repair,
         sentence=(
             f"Force at {len(shown)} levels from {rounded(values[0])} to {rounded(values[-1])} {unit}: at most "
-            f"{strongest:.2f} N are requested; the limit is {limit_n:g} N. {asked} of {len(of.levels)} levels are "
-            f"as requested, {clipped} are clipped."
+            f"{strongest:.2f} N are requested; the limit is {limit_n:g} N{slope}. {asked} of {len(of.levels)} levels "
+            f"are as requested, {clipped} are clipped."
         ),
     )
 

@@ -18,13 +18,17 @@ Values: TypeAlias = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class NumberCard:
-    """One number: its title, the number, its unit, and what is said of it; ``anew`` while another one is computed."""
+    """One number: its title, the number, its unit, its verdict or a note, and a sentence below it.
+
+    ``anew`` while another one is computed.
+    """
 
     title: str
     number: str
     unit: str = ""
     note: Verdict = ("neutral", "", "")
     anew: bool = False
+    more: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,6 +238,8 @@ class ForcesPlot:
         Where the axes are written at; along x bars are counted from 0.
     limit_n : float
         The force limit.
+    slope_n : float or None
+        What the slope limit of the loop leaves of the force; None where it clips nothing.
     verdicts : tuple of (str, str, str)
         How many levels are as asked, and how many are clipped, of all standards.
     warning : str
@@ -249,6 +255,7 @@ class ForcesPlot:
     ticks_x: Ticks
     ticks_y: Ticks
     limit_n: float
+    slope_n: float | None
     verdicts: tuple[Verdict, ...]
     warning: str
     repair: RepairOffer | None

@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 import pytest
+from pyqtgraph import TextItem
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit
@@ -43,6 +44,12 @@ class Worker:
         self.stops = 0
         self.works = True
 
+    @property
+    def sizes(self) -> list[int]:
+        """The numbers of participants of the studies that were ordered."""
+        wanted = [one for order in self.orders for one in order.wanted]
+        return [one.participants for one in wanted if isinstance(one, Grouping)]
+
     def order(self, order: MeasureOrder) -> int:
         self.orders.append(order)
         return len(self.orders)
@@ -77,7 +84,10 @@ def answer_to(wanted: Wanted) -> Any:
     if isinstance(wanted, Measuring):
         return Measurable((0.05, 0.5), ())
     if isinstance(wanted, Grouping):
-        return GroupPrecision(wanted.participants, 60, wanted.precision, 80, 0.93, 107, 0.98)
+        if wanted.participants < 20:
+            enough = 22 if wanted.participants > 8 else None
+            return GroupPrecision(wanted.participants, 60, wanted.precision, 80, 0.13, 107, 0.22, 60, enough)
+        return GroupPrecision(wanted.participants, 60, wanted.precision, 80, 0.93, 107, 0.98, 60, 20)
     if isinstance(wanted, Detecting):
         return Detectable(wanted.participants, 200, 7, (Finding("feels_liquid", 0.9), Finding("like_honey", None)))
     return ("methods.adaptive.trials: more trials",)
@@ -175,6 +185,24 @@ def test_what_is_simulated_is_typed_at_the_right(qtbot: Any, designer: Any, work
     assert controls.participants.isVisible()
 
 
+def test_a_verdict_says_whether_the_participants_are_enough(qtbot: Any, designer: Any, worker: Worker) -> None:
+    jnd(designer)
+    people = designer.place.measures.numbers.parts[2]
+    for participants, number, verdict, more in (
+        (20, "93", ("ok", "check", "Enough"), "80 % needed; 107 trials give 98 %"),
+        (12, "13", ("warn", "warning", "Not enough"), "80 % take about 22 people; 107 trials give 22 %"),
+        (8, "13", ("warn", "warning", "Not enough"), "80 % take more than 60 people; 107 trials give 22 %"),
+    ):
+        designer.place.measures.controls.participants.entered.emit(participants)
+        qtbot.waitUntil(lambda n=participants: worker.sizes[-1:] == [n])
+        worker.answer()
+        qtbot.waitUntil(lambda more=more: people.more.isVisible() and people.more.text() == more)
+        assert people.shown.note == verdict
+        assert (
+            people.accessibleName() == f"{participants} people in ± 15 %: {number} % of studies, {verdict[2]}. {more}"
+        )
+
+
 @pytest.mark.usefixtures("worker")
 def test_a_clipped_level_is_repaired_by_its_button(qtbot: Any, designer: Any) -> None:
     jnd(designer)
@@ -183,7 +211,11 @@ def test_a_clipped_level_is_repaired_by_its_button(qtbot: Any, designer: Any) ->
     page = designer.place.measures
     qtbot.waitUntil(lambda: "forces" in page.cards and page.cards["forces"].repair.isVisible())
     forces = page.cards["forces"]
-    assert [chip.word for chip in forces.chips] == ["29 of 31 as asked", "2 clipped"]
+    chips = [("neutral", "info", "29 of 31 as asked"), ("bad", "warning", "2 clipped")]
+    assert list(forces.shown.verdicts) == chips
+    assert [chip.word for chip in forces.chips] == [words for *_, words in chips]
+    assert f"{forces.shown.slope_n:.2f}" == "7.99"  # 53 N·s/m at 0.151 m/s, and not the force limit of 8 N
+    assert "slope limit 7.99 N" in [one.toPlainText() for one in page.forces.drawn if isinstance(one, TextItem)]
     assert forces.words.text() == designer.place.view.problems[0].message
     click(forces.repair)
     assert designer.editing.opened.study.protocol is not None

@@ -18,6 +18,7 @@ from study_app.app.designer.measures.measures_worker import (
 )
 from study_app.app.designer.measures.wanted import wanted_of
 from study_app.authoring.edited_study import read
+from study_app.authoring.measures.planned import ENOUGH
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.checks.expected_precision import imprecise
@@ -46,7 +47,11 @@ def test_the_share_of_studies_is_that_of_the_command_power() -> None:
     ((_, group),) = answers
     assert done == group.studies
     assert group.share == found["viscosity", 20].within(0, 0.5)
-    assert 0.0 < group.share < 1.0
+    assert 0.0 < group.share < ENOUGH
+    sizes = range(7, 13)
+    ((_, found),) = list(sweep(planned, sizes, THRESHOLD_STUDIES, 1, Serial()))[-1:]
+    shares = [found["viscosity", 20].within(at, 0.5) for at in range(len(sizes))]
+    assert group.enough == next(size for size, share in zip(sizes, shares, strict=True) if share >= ENOUGH)
 
 
 @pytest.mark.slow
