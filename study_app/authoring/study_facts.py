@@ -60,10 +60,11 @@ def facts(study: Study) -> Facts:
     language = protocol.study.languages[0]
     known = Facts(
         steps_s={step: step_duration_s(protocol, step, language) for step in protocol.steps},
-        forces_n={name: steady(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids},
         missing=missing,
-        warnings=warnings(protocol, simulates=False),
     )
+    if valid.forces:
+        forces_n = {name: steady(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids}
+        known = replace(known, forces_n=forces_n, warnings=warnings(protocol, simulates=False))
     if not valid.whole:
         return known
     orders = orders_of(protocol)

@@ -119,8 +119,9 @@ def stylesheet(theme: Theme) -> str:
 
     Dynamic properties: a QPushButton is outlined, ``role="primary"`` filled, ``role="danger"`` outlined in bad,
     ``role="plain"`` without an edge, ``role="stop"`` the force stop; a QFrame is a card with ``role="card"``; a QLabel
-    takes ``role`` text2, text3, ok, warn, bad or accent; fields and buttons are low with ``dense="true"``; the edge of
-    a field is accent with ``state="changed"`` and bad with ``state="refused"``.
+    takes ``role`` text2, text3, ok, warn, bad or accent, and is text3 within a disabled widget named "earlier"; fields
+    and buttons are low with ``dense="true"``; the edge of a field is accent with ``state="changed"`` and bad with
+    ``state="refused"``.
     """
     t = theme
     return "\n".join(
@@ -133,6 +134,7 @@ def stylesheet(theme: Theme) -> str:
                 f"QLabel[role='{role}'] {{ color: {getattr(t, role)}; }}"
                 for role in ("text2", "text3", "ok", "warn", "bad", "accent")
             ),
+            f"QWidget#earlier QLabel:disabled {{ color: {t.text3}; }}",
             _buttons(t),
             _fields(t),
             _scrollbars(t),

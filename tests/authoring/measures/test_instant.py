@@ -126,9 +126,25 @@ def test_numbers_that_depend_on_a_broken_element_are_not_known() -> None:
     assert "delays" in left.steps_s
     unlimited, _ = study.edited(Set(("device", "force_limit_n"), 60))
     assert facts(unlimited).forces_n == {}
+    assert facts(unlimited).warnings == ()  # those of forces are not known
+    assert facts(unlimited).expected_s == before.expected_s
+
+
+def test_a_question_without_a_sound_id_counts_and_another_fault_leaves_the_question_out() -> None:
+    study = study_of("rek2024")
+    items = ("questionnaires", "liquid", "items")
+    unnamed, _ = study.edited(Unset((*items, 2, "id")))
+    assert facts(unnamed).answers == facts(study).answers
+    unknown, _ = study.edited(Set((*items, 2, "kind"), "nothing"))
+    assert facts(unknown).answers is None
+    protocol = valid_part(unknown).protocol
+    assert protocol is not None
+    whole = valid_part(study).protocol
+    assert whole is not None
+    assert len(protocol.questionnaires["liquid"].items) == len(whole.questionnaires["liquid"].items) - 1
 
 
 @pytest.mark.slow
 def test_something_can_be_measured_of_every_known_fault() -> None:
     whole = sum(valid_part(read(case.text.encode())).protocol is not None for case in CASES)
-    assert whole > 0.6 * len(CASES)
+    assert whole > 0.95 * len(CASES)

@@ -13,11 +13,14 @@ from study_app.app.designer.measures.page_fit import PageFit
 from study_app.app.designer.measures.slow_numbers import SlowNumbers
 from study_app.app.designer.measures.wanted import LAPSES, participants_of, precision_of, threshold_of, wanted_of
 from study_app.app.designer.repair_search import RepairSearch
+from study_app.authoring.edited_study import Study
 from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import Detectable, GroupPrecision
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study_facts import facts
 from study_app.gui.designer.view import DesignerPlace
+from study_app.protocol.model import Protocol
+from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.measures.level_plots import Simulated
 from study_app.viewmodels.designer.measures.level_words import LevelWords
 from study_app.viewmodels.designer.measures.measures_view import (
@@ -58,6 +61,7 @@ class MeasuresController(QObject):
         self._editing, self._place = editing, place
         self.slow = SlowNumbers(self)
         self.fit = PageFit(self)
+        self._sound: Study | None = None
         self._participants: int | None = None
         self._thresholds: dict[str, float] = {}
         self._lapses = LAPSES
@@ -91,21 +95,33 @@ class MeasuresController(QObject):
         if opened is None or not self._place.isVisible():
             self.slow.want(())
             return
-        study, path = opened.study, opened.history.selected
-        protocol = valid_part(study).protocol
+        path, problems = opened.history.selected, problem_rows(opened.study)
+        study = self._measured(opened.study, path)
+        valid = valid_part(study)
+        protocol = valid.protocol
         self._focus = focus = focus_of(protocol, path)
-        controls = self._controls(focus)
+        controls = self._controls(protocol, focus)
         wanted = () if protocol is None else wanted_of(protocol, focus, controls)
+        wanted = tuple(one for one in wanted if valid.forces or not isinstance(one, Detecting))
         self.slow.want(wanted if self._is_looked_at else tuple(one for one in wanted if isinstance(one, Advising)))
-        repairs = {row: self._repairs.get(row, ()) for row in problem_rows(study)}
+        repairs = {row: self._repairs.get(row, ()) for row in problems}
         parts = self.fit.parts(protocol, focus, path) if self._is_looked_at else None
         results = replace(self._results(wanted, focus, controls), parts=parts)
         view = measures_view(study, facts(study), path, controls, results, repairs)
+        view = replace(view, earlier=study is not opened.study)
         if results.warnings != self.warnings:
             self.warnings = results.warnings
             self.warned.emit()
         self._place.measures.show_measures(view)
         self._place.pane.facts.show_measures(view)
+
+    def _measured(self, study: Study, path: Path) -> Study:
+        """Return the study to measure: the last one without faults where what an element is measured by is broken."""
+        if study.formed is not None:
+            self._sound = study
+        now, before = (None if one is None else valid_part(one).protocol for one in (study, self._sound))
+        lost = now is None or (focus_of(now, path).block is None and focus_of(before, path).block is not None)
+        return study if self._sound is None or not lost else self._sound
 
     def leave(self) -> None:
         """End the process: a session that begins now must not share the processor with it."""
@@ -119,13 +135,11 @@ class MeasuresController(QObject):
         return pane.isVisible() and (pane.tab == "measures" or pane.facts.isVisible())
 
     def _forget(self) -> None:
-        self._participants, self._lapses = None, LAPSES
+        self._participants, self._lapses, self._sound = None, LAPSES, None
         self._thresholds, self._last, self._repairs = {}, {}, {}
         self._idle.start()
 
-    def _controls(self, focus: Focus) -> Controls:
-        opened = self._editing.opened
-        protocol = None if opened is None else valid_part(opened.study).protocol
+    def _controls(self, protocol: Protocol | None, focus: Focus) -> Controls:
         planned = participants_of(protocol)
         participants = planned if self._participants is None else self._participants
         if focus.plan is None or focus.block is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, Signal
@@ -14,7 +15,7 @@ from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.designer.measures.number_cards import ANEW, ForcesPlot, MeasuresView, NumberCard
+from study_app.viewmodels.designer.measures.number_cards import ANEW, EARLIER, ForcesPlot, MeasuresView, NumberCard
 
 if TYPE_CHECKING:
     from study_app.gui.designer.measures.block_plots import ForcesView, FunctionView, TrackView
@@ -176,8 +177,12 @@ class MeasuresPage(Themed, QWidget):
         self.area.setAccessibleName("Measures")
         self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.area.setWidget(inside)
+        inside.setObjectName("earlier")
+        self.earlier = label(EARLIER, "label", "warn", wraps=True)
+        self.earlier.hide()
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
+        whole.addWidget(self.earlier)
         whole.addWidget(self.area)
         self.setFocusProxy(self.area)
 
@@ -197,6 +202,8 @@ class MeasuresPage(Themed, QWidget):
         shown = self.shown
         if shown is None:
             return
+        self.earlier.setVisible(shown.earlier)
+        self.area.widget().setEnabled(not shown.earlier)
         self.numbers.show_numbers(shown.numbers)
         if (shown.numbers or shown.forces) and not self.cards:
             self._make_plots()
@@ -206,7 +213,7 @@ class MeasuresPage(Themed, QWidget):
         self.curves.setVisible(bool(shown.numbers))
         for name, view, plot in (("function", self.function, shown.function), ("track", self.track, shown.track)):
             if view is not None:
-                view.show_plot(plot)
+                view.show_plot(replace(plot, anew=True) if plot is not None and shown.earlier else plot)
                 anew = bool(shown.waiting) if plot is None else plot.anew
                 self._head(name, "" if plot is None else plot.heading, anew=anew)
         forces = self.cards.get("forces")

@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.designer.measures.measures_page import NumbersRow
 from study_app.gui.designer.measures.parts import CardGrid
-from study_app.viewmodels.designer.measures.number_cards import MeasuresView
+from study_app.gui.widgets.labels import label
+from study_app.viewmodels.designer.measures.number_cards import EARLIER, MeasuresView
 
 MOST, LEAST = 366, 190
 SHARE, HIGH_FROM = 0.3, 940
@@ -32,10 +33,14 @@ class FactsRow(QScrollArea):
         self.numbers.hide()
         self.grid = CardGrid()
         self.grid.open_asked.connect(self.open_asked)
+        self.earlier = label(EARLIER, "small", "warn", wraps=True)
+        self.earlier.hide()
         inside = QWidget()
+        inside.setObjectName("earlier")
         self._inside = column = QVBoxLayout(inside)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(8)
+        column.addWidget(self.earlier)
         column.addWidget(self.numbers)
         column.addWidget(self.grid, 1)
         self.setWidget(inside)
@@ -73,6 +78,9 @@ class FactsRow(QScrollArea):
 
     def _show(self) -> None:
         if self.shown is not None:
+            self.earlier.setVisible(self.shown.earlier)
+            for part in (self.numbers, self.grid):
+                part.setEnabled(not self.shown.earlier)
             self.numbers.show_numbers(self.shown.numbers)
             self.grid.show_cards(self.shown.below)
             self.make_room(self._window_px, self._left_px)

@@ -17,6 +17,7 @@ from study_app.protocol.orders.block_orders import BlockOrder
 from study_app.protocol.trials.tracks import design_of, stimulus_of
 from study_app.viewmodels.designer.measures.level_words import LevelWords, even_ticks, rounded
 from study_app.viewmodels.designer.measures.number_cards import (
+    NO_FORCES,
     UNKNOWN,
     ForceBar,
     ForcesPlot,
@@ -64,13 +65,14 @@ class Simulated:
 
 @dataclass(frozen=True, slots=True)
 class LevelBlock:
-    """A block with a stimulus, with what its levels are."""
+    """A block with a stimulus, with what its levels are, and whether their forces are known."""
 
     protocol: Protocol
     block: Block
     words: LevelWords
     levels: tuple[Level, ...]
     limits: LevelLimits | None
+    forces: bool = True
 
     @property
     def standard(self) -> float | None:
@@ -93,14 +95,15 @@ class LevelBlock:
         return self.words.at(level) if math.isfinite(level) and level > 0 else self.words.at(first.level)
 
 
-def level_block(protocol: Protocol, block: Block) -> LevelBlock | None:
-    """Return a block's levels; None where it varies nothing."""
+def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> LevelBlock | None:
+    """Return a block's levels; None where it varies nothing. Without ``forces`` its limits are not known."""
     if block.stimulus is None or block.design is None:
         return None
     found = levels(protocol, block.id)
     most = max((one.comparison for one in found), default=0.0)
     words = LevelWords(stimulus_of(protocol, block), design_of(protocol, block))
-    return LevelBlock(protocol, block, words, found, level_limits(protocol, block.id, most))
+    limits = level_limits(protocol, block.id, most) if forces else None
+    return LevelBlock(protocol, block, words, found, limits, forces)
 
 
 def number_cards(
@@ -252,6 +255,9 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
         The problems of the study, each with the words of its repairs as far as they were found.
     """
     shown = [one for one in of.shown if one.asked_n is not None]
+    if shown and not of.forces:
+        verdict: Verdict = ("neutral", "info", f"{UNKNOWN} of {len(of.levels)} as asked")
+        return ForcesPlot("", (), (), (), 0.0, None, (verdict,), NO_FORCES, None, NO_FORCES)
     if not shown or of.limits is None:
         return None
     bars = [ForceBar(one.asked_n or 0.0, one.sent_n or 0.0, one.clipped_by is not None) for one in shown]

@@ -143,11 +143,11 @@ def measures_view(
     problems : mapping
         The problems of the study, each with the words of its repairs as far as they were found.
     """
-    protocol = valid_part(study).protocol
-    focus = focus_of(protocol, path)
+    valid = valid_part(study)
+    protocol, focus = valid.protocol, focus_of(valid.protocol, path)
     block, values = focus.block, control_values(protocol, focus, controls)
     waiting = ANEW if slow.waits else ""
-    of = None if protocol is None or block is None else level_block(protocol, block)
+    of = None if protocol is None or block is None else level_block(protocol, block, forces=valid.forces)
     if protocol is not None and block is not None and of is not None and focus.plan is not None:
         numbers = number_cards(
             of, slow.simulated, controls.participants, facts.steps_s.get(block.id, 0.0),
@@ -170,7 +170,8 @@ def _others(study: Study, facts: Facts, path: Path, slow: SlowResults) -> list[C
 
 def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, slow: SlowResults) -> list[Card]:
     """Return the cards of an element without simulated tracks, those that concern it first."""
-    protocol, block = valid_part(study).protocol, focus.block
+    valid, block = valid_part(study), focus.block
+    protocol = valid.protocol
     asked = path[0] == "questionnaires" and protocol is not None and path[1:2] and path[1] in protocol.questionnaires
     found: list[Card] = [cards.session_card(study, facts, path, None if asked else slow.parts)]
     if protocol is None:
@@ -185,7 +186,7 @@ def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Contr
         )
         found.append(detectable)
     found.append(cards.force_card(study, facts, protocol, _liquids(protocol, path, block)))
-    if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids:
+    if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids and valid.forces:
         found.insert(0, cards.effects_card(study, protocol, str(path[1])))
     if block is not None and path[0] == "blocks":
         found.append(cards.block_card(study, facts, protocol, block))

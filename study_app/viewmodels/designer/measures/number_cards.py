@@ -10,6 +10,8 @@ from study_app.viewmodels.tones import Tone
 
 UNKNOWN: Final = "–"
 ANEW: Final = "simulating …"
+EARLIER: Final = "These numbers are of the last valid state: solve the problems to update them."
+NO_FORCES: Final = "Not known until the problems of device and scene are solved."
 Verdict: TypeAlias = tuple[Tone, str, str]
 """Tone, icon and words."""
 Ticks: TypeAlias = tuple[tuple[float, str], ...]
@@ -298,7 +300,10 @@ class ControlValues:
 
 @dataclass(frozen=True, slots=True)
 class MeasuresView:
-    """What the tab shows: numbers and plots of a block with a method, else cards; and the cards below other tabs."""
+    """What the tab shows: numbers and plots of a block with a method, else cards; and the cards below other tabs.
+
+    ``earlier`` ones are of the last study without faults.
+    """
 
     controls: ControlValues
     numbers: tuple[NumberCard, ...] = ()
@@ -308,3 +313,4 @@ class MeasuresView:
     cards: tuple[Card, ...] = ()
     below: tuple[Card, ...] = ()
     waiting: str = ""
+    earlier: bool = False

@@ -22,6 +22,7 @@ from study_app.protocol.orders.durations import answering_s
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import language_name
 from study_app.viewmodels.designer.measures.number_cards import (
+    NO_FORCES,
     UNKNOWN,
     BalanceCard,
     Line,
@@ -163,6 +164,9 @@ def balance_card(study: Study, protocol: Protocol, block: Block, participants: i
 
 def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[str]) -> LinesCard:
     """Return the force of some liquids against a hand at 0.1 m/s."""
+    if not valid_part(study).forces:
+        unknown = tuple(Line(_title(study, name, "liquids"), UNKNOWN, 0.0) for name in names)
+        return LinesCard("Force of each liquid", "", unknown, (("neutral", "minus", NO_FORCES),))
     limit_n, found = protocol.device.force_limit_n, forces(protocol)
     lines = []
     for name in names:
@@ -212,6 +216,8 @@ def detectable_card(
 ) -> LinesCard:
     """Return the smallest difference of each statement that studies of so many participants show."""
     title = f"What {participants if found is None else found.participants} people can show"
+    if not valid_part(study).forces:  # what is answered depends on them
+        return LinesCard(title, "", (), (("neutral", "minus", NO_FORCES),))
     if found is None:
         return LinesCard(title, "", (), (("neutral", "clock", "Studies are simulated."),), anew=True)
     items = study.document.get("questionnaires", {}).get(block.questionnaire, {}).get("items", ())

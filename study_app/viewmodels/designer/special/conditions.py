@@ -62,7 +62,8 @@ def _line(study: Study, name: Any) -> ConditionLine:
     delay_ms = table.get("delay_ms", 0)
     if isinstance(delay_ms, int | float):
         words.append(f"{delay_ms:g} ms late")
-    protocol = valid_part(study).protocol
+    valid = valid_part(study)
+    protocol = valid.protocol if valid.forces else None
     if protocol is None or liquid is None or name not in protocol.conditions:
         return ConditionLine(liquid, ", ".join(words), UNKNOWN)
     found = steady(protocol.scene_for(str(name)))
