@@ -21,6 +21,7 @@ from study_app.viewmodels.tones import Tone
 
 NEW, OPEN = "\0new", "\0open"
 WIDE_FROM = 1180
+NAME_MOST_PX, NAME_EDGES_PX = 320, 60
 
 
 class ChipButton(Themed, PressedByEnter):
@@ -155,14 +156,16 @@ class DesignerHeader(QWidget):
         self._make_room()
 
     def _make_room(self) -> None:
-        """Hide the title, the draft and the version, in this order, where the window is too narrow for them."""
+        """Hide the title, the draft and the version, in this order, where the name of the study has no room else."""
         state = self.state
+        named = min(NAME_MOST_PX, self.study.fontMetrics().horizontalAdvance(self.study.currentText()) + NAME_EDGES_PX)
+        more = max(0, named - self.study.minimumWidth())
         self.title.show()
         self.draft.setVisible(bool(state.chosen and state.draft))
         self.version.setVisible(bool(state.chosen and state.version.words))
         for part in (self.title, self.draft, self.version):
             self._row.invalidate()
-            part.setVisible(part.isVisibleTo(self) and self._row.minimumSize().width() <= self.width())
+            part.setVisible(part.isVisibleTo(self) and self._row.minimumSize().width() + more <= self.width())
 
     def _announce(self, before: HeaderState, state: HeaderState) -> None:
         """Have said once what changes by itself: the problems, and that a draft is kept."""

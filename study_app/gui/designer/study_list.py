@@ -49,6 +49,12 @@ class StudyList(Choice):
         if opened:
             self.setItemData(self.count() - 1, f"{words}, open", Qt.ItemDataRole.AccessibleTextRole)
 
+    def showPopup(self) -> None:  # noqa: N802 - Qt's name
+        """Open the list; where no study is open, at its first line."""
+        super().showPopup()
+        if self.currentIndex() < 0:
+            self.view().setCurrentIndex(self.model().index(0, self.modelColumn()))
+
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
         """Open the list at an arrow key and at Enter, as at Space, and at a letter."""
         shift_or_pad = Qt.KeyboardModifier.KeypadModifier | Qt.KeyboardModifier.ShiftModifier

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.designer_header import DesignerHeader
 from study_app.gui.widgets.cards import SHADOW
+from study_app.viewmodels.designer.designer_view import HeaderState, StudyChoice
 
 
 def test_the_list_of_studies_is_at_the_edge_where_the_title_has_no_room(qtbot: Any) -> None:
@@ -22,3 +23,18 @@ def test_the_list_of_studies_is_at_the_edge_where_the_title_has_no_room(qtbot: A
     header.layout().activate()
     QApplication.processEvents()
     assert header.study.x() == SHADOW
+
+
+def test_the_name_of_the_study_comes_before_the_title_of_the_place(qtbot: Any) -> None:
+    header = DesignerHeader()
+    qtbot.addWidget(header)
+    header.resize(1246, 60)
+    header.show()
+    study = StudyChoice("Honey in the kitchen", "honey.toml", "honey")
+    header.show_state(HeaderState((study,), "honey", draft="Saved"))
+    QApplication.processEvents()
+    assert not header.title.isVisible()
+    assert header.study.width() > header.study.fontMetrics().horizontalAdvance(study.title) + 60
+    header.resize(1600, 60)
+    QApplication.processEvents()
+    assert header.title.isVisible()

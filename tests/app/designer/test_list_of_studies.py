@@ -78,3 +78,13 @@ def test_keys_open_the_list_and_no_other_study(qtbot: Any, designer: Any) -> Non
     qtbot.keyClick(box.view(), Qt.Key.Key_Return)
     QApplication.processEvents()
     assert designer.editing.opened.name == "zeta"
+
+
+def test_the_first_line_is_marked_where_no_study_is_open(qtbot: Any, designer: Any) -> None:
+    box = designer.place.header.study
+    box.setFocus()
+    qtbot.keyClick(box, Qt.Key.Key_Down)
+    assert [index.row() for index in box.view().selectedIndexes()] == [0]
+    qtbot.keyClick(box.view(), Qt.Key.Key_Return)
+    QApplication.processEvents()
+    assert designer.editing.opened.name == "kitchen"
