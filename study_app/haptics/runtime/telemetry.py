@@ -75,7 +75,7 @@ class Reader:
         kept = following - first
         self.dropped += first - self._next
         self._next = following
-        return out[:kept]
+        return out if kept == waiting else out[:kept]
 
 
 @dataclass(frozen=True, slots=True)

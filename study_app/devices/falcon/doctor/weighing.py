@@ -72,6 +72,9 @@ class Grip:
         self._virtual = virtual
         self._now_ns = 0 if virtual else time.monotonic_ns()
         self._reading, self._command = new_reading(), new_command()
+        self._read_m = self._reading["position_m"][0]
+        self._asked_n, self._sent_n = self._command["force_n"][0], self._command["sent_n"][0]
+        self._addresses = int(self._reading.ctypes.data), int(self._command.ctypes.data)
         self._place_m = np.zeros(3)
         self._velocity_mps = np.zeros(3)
         self._target_m: Any = None
@@ -95,17 +98,18 @@ class Grip:
             before_ns, self._now_ns = self._now_ns, time.monotonic_ns()
             elapsed_s = (self._now_ns - before_ns) * 1e-9
         device = self._device
-        answer = device.read.ctypes(device.context, self._now_ns, int(self._reading.ctypes.data))
+        reading, command = self._addresses
+        answer = device.read.ctypes(device.context, self._now_ns, reading)
         if answer == READ_LOST:
             device.check()
             raise usb_failure(ERROR_NO_DEVICE, "weighing with it")
         if answer == READ_NEW:
             self._blind = 0
-            self._see(self._reading[0].position_m, elapsed_s)
+            self._see(self._read_m, elapsed_s)
         else:
             self._blind += 1
-        self._command[0].force_n = self._command[0].sent_n = self._force_n()
-        device.write.ctypes(device.context, int(self._command.ctypes.data))
+        self._asked_n[:] = self._sent_n[:] = self._force_n()
+        device.write.ctypes(device.context, command)
 
     def _see(self, place_m: Any, elapsed_s: float) -> None:
         moved = (place_m - self._place_m) / elapsed_s
