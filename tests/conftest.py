@@ -104,12 +104,13 @@ def rehearsal_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Pa
     return rehearsal_of
 
 
-@pytest.fixture
-def quick_pdf(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Embed the fonts of PDF figures as type 3: choosing their glyphs for type 42 takes a fifth of a report."""
-    from study_app import figure_style
+@pytest.fixture(scope="module")
+def quick_pdf() -> Iterator[None]:
+    """Embed the fonts of PDF figures as type 3 (`quick_pdfs`)."""
+    from tests.studies import quick_pdfs
 
-    monkeypatch.setitem(figure_style.SETTINGS, "pdf.fonttype", 3)
+    with quick_pdfs():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -24,6 +24,16 @@ def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], obje
         with suppress(OSError):  # another worker was first
             making.rename(folder)
     return folder
+
+
+@contextmanager
+def quick_pdfs() -> Iterator[None]:
+    """Embed the fonts of PDF figures as type 3: choosing their glyphs for type 42 takes a fifth of a report."""
+    from study_app import figure_style  # not installed wherever sessions run
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setitem(figure_style.SETTINGS, "pdf.fonttype", 3)
+        yield
 
 
 def made_up(name: str) -> ConditionFeatures:

@@ -17,7 +17,7 @@ from study_app.store.sessions.rebuild import rebuild
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 HELD = Path(__file__).parent / "releases" / "0.1"
 ENDED = "data/sub-P001/ses-01"

@@ -21,7 +21,7 @@ from study_app.store.journals import journal
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 RELEASES = Path(__file__).parent / "releases"
 ROOT = Path(__file__).parents[2]

@@ -21,7 +21,7 @@ from study_app.analysis.tables.study_tables import load_study
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
 from study_app.store.blinded.unblinding import unblind
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 TOY = Path(__file__).parent / "toy"
 KEY = "highest_answers"

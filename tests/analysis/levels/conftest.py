@@ -12,7 +12,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from tests.protocol.trials.level_studies import FIVE_POINTS, SHORT, text_of, text_of_damper
-from tests.studies import once
+from tests.studies import once, quick_pdfs
 
 MORE = """
 [stimuli.around]
@@ -116,7 +116,8 @@ def opened_adaptive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def reported_adaptive(opened_adaptive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return once(tmp_path_factory, "reported-adaptive", lambda to: report(opened_adaptive, to, failed=pytest.fail))
+    with quick_pdfs():
+        return once(tmp_path_factory, "reported-adaptive", lambda to: report(opened_adaptive, to, failed=pytest.fail))
 
 
 @pytest.fixture(scope="session")
@@ -149,4 +150,5 @@ def opened_levels(sealed_levels: Path, tmp_path_factory: pytest.TempPathFactory)
 
 @pytest.fixture(scope="session")
 def reported_levels(opened_levels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return once(tmp_path_factory, "reported-levels", lambda to: report(opened_levels, to, failed=pytest.fail))
+    with quick_pdfs():
+        return once(tmp_path_factory, "reported-levels", lambda to: report(opened_levels, to, failed=pytest.fail))

@@ -36,7 +36,7 @@ from study_app.workers.executors import Workers, open_executor
 from tests.analysis.conftest import SMALL
 from tests.protocol.groups.grouped import grouped
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 SIZES = (5, 9)
 

@@ -33,7 +33,7 @@ from study_app.store.verification.verify_study import verify
 from tests.gui.small import ManualClock
 from tests.session import small
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 
 @dataclass(frozen=True, slots=True)

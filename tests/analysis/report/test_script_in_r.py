@@ -13,7 +13,7 @@ from study_app.analysis.report.write_report import report
 from tests.analysis.conftest import Results
 from tests.analysis.report.read_report import numbers, run_in_r
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 
 def test_the_script_in_r_has_every_number_of_the_report(of_twelve: Path) -> None:

@@ -36,7 +36,7 @@ from tests.analysis.report.read_report import numbers, read, run_in_r
 from tests.protocol.trials.level_studies import text_of_damper
 from tests.studies import made_up
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 
 @pytest.fixture(scope="module")
