@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -14,10 +16,30 @@ from study_app.protocol.load import load
 from study_app.protocol.model import Explore, Reach
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
+from study_app.protocol.source import files
+from study_app.protocol.source.files import at_hand, shipped
+from study_app.viewmodels.home import is_shipped
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))
 REK = load("rek2024")
+
+
+def test_what_ships_is_listed():
+    tracked = subprocess.run(["git", "ls-files", "*.toml"], cwd=PROTOCOLS, capture_output=True, text=True, check=False)
+    assert shipped() == tuple(sorted(Path(name).stem for name in tracked.stdout.split()) or NAMES)
+
+
+def test_a_study_made_in_a_checkout_does_not_ship(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "study_app").mkdir()
+    shutil.copytree(PROTOCOLS, tmp_path / "protocols")
+    text = (PROTOCOLS / "demo.toml").read_text(encoding="utf-8")
+    (tmp_path / "protocols" / "mine.toml").write_text(text.replace('"demo"', '"mine"'), encoding="utf-8")
+    monkeypatch.setattr(files, "_PACKAGE", tmp_path / "study_app")
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    assert is_shipped("demo")
+    assert not is_shipped("mine")
+    assert [name for name in at_hand() if name == "mine"] == ["mine"]
 
 
 @pytest.mark.parametrize("name", NAMES)

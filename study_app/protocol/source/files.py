@@ -11,6 +11,19 @@ from study_app.protocol.source.problems import did_you_mean
 from study_app.workspace import workspace
 
 _PACKAGE = Path(__file__).resolve().parents[2]
+# A checkout is offered as the workspace: then the folder of these protocols also holds the studies made there.
+_SHIPPED = (
+    "delaydetect",
+    "delayjnd",
+    "demo",
+    "forcedelay",
+    "physical2",
+    "physical_liquids",
+    "rek2024",
+    "slime",
+    "thickness",
+    "viscosityjnd",
+)
 
 
 def _shipped_folder() -> Path:
@@ -21,7 +34,7 @@ def _shipped_folder() -> Path:
 
 def shipped() -> tuple[str, ...]:
     """Return the names of the protocols that ship with the program, sorted."""
-    return tuple(sorted(path.stem for path in _shipped_folder().glob("*.toml")))
+    return tuple(name for name in _SHIPPED if shipped_file(name).is_file())
 
 
 def shipped_file(name: str) -> Path:
