@@ -29,7 +29,7 @@ from study_app.authoring.versions.contents import keep_content
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.errors import SessionError, StoreError, StudyError
-from study_app.gui.display.screens import choose_screens, place, screen_shown
+from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.theme.theme import Theme
 from study_app.gui.widgets.dialogs import Notice
@@ -207,8 +207,8 @@ class LiveSession(QObject):
         """Show the operator what was found; the session begins when that is accepted."""
         from study_app.app.session.preflight_controller import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
-        screen = screen_shown(self.screens()[0])
-        asked = Preflight(self.chosen, self.chosen.read_protocol(), made, screen, self.chosen.who, self.theme)
+        study, who = self.chosen.read_protocol(), self.chosen.who
+        asked = Preflight(self.chosen, study, made, lambda: self.screens()[0], who, self.theme)
         asked.started.connect(self._open_windows)
         asked.failed.connect(self._open_windows)
         asked.cancelled.connect(self.cancel)
@@ -225,13 +225,12 @@ class LiveSession(QObject):
         chosen, rig = self.chosen, made.rig
         source = chosen.read_source()
         protocol = parse(source, chosen.source)
-        shown_on, operated_on = (
-            self.screens()
-        )  # for this step alone: PySide deletes the objects of screens with windows
-        rate_hz, shares_screen = shown_on.refreshRate(), shown_on is operated_on
+        shown_on, operated_on = self.screens()
+        shares_screen, rate_hz = shown_on is operated_on, shown_on.refreshRate()
+        text_scale = text_scale_on(self.settings, shown_on)
         found = checks(made.facts_with(rate_hz, shown_on.devicePixelRatio()), protocol)
         self._pass_checks(found)
-        screens, text_scale = described(self.settings, shown_on, operated_on), text_scale_on(self.settings, shown_on)
+        screens = described(self.settings, shown_on, operated_on)
         yield
         operator = session_windows.make_cockpit(chosen, protocol, rig, self.theme)
         self._windows.append(operator)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from datetime import datetime
 from typing import NamedTuple
 
 from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtGui import QScreen
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
 from study_app.evaluation.appraisal import Costs, Errors
 from study_app.evaluation.appraisal_worker import Question, start_appraisal_worker
-from study_app.gui.display.screens import ScreenShown, place
+from study_app.gui.display.screens import place
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.theme.theme import Theme
 from study_app.haptics.model.device_dynamics import Dynamics
@@ -97,7 +98,8 @@ class Appraisal:
 class Preflight(QObject):
     """Shows the window before a session, has things measured again, and tells what was decided, once.
 
-    The rig stays its opener's; the servo ticks at rest meanwhile, and ``failed`` comes when it stops itself.
+    The rig stays its opener's; the servo ticks at rest meanwhile, and ``failed`` comes when it stops itself or the
+    participant's screen is gone. ``screen`` returns that screen anew: see ``choose_screens``.
     """
 
     started = Signal(object)
@@ -106,7 +108,13 @@ class Preflight(QObject):
     _measured = Signal(object)
 
     def __init__(
-        self, chosen: NewSession, protocol: Protocol, ready: Ready, screen: ScreenShown, who: str, theme: Theme
+        self,
+        chosen: NewSession,
+        protocol: Protocol,
+        ready: Ready,
+        screen: Callable[[], QScreen],
+        who: str,
+        theme: Theme,
     ) -> None:
         super().__init__()
         self._chosen, self._protocol, self._ready, self._screen = chosen, protocol, ready, screen
@@ -147,9 +155,9 @@ class Preflight(QObject):
 
     @property
     def _facts(self) -> Facts:
-        found = self.appraisal
+        found, shown_on = self.appraisal, self._screen()
         return replace(
-            self._ready.facts_with(self._screen.refresh_hz, self._screen.scaling),
+            self._ready.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()),
             tick_s=found.tick_s,
             withheld=found.withheld,
         )
@@ -172,9 +180,10 @@ class Preflight(QObject):
         )
 
     def _look(self) -> None:
-        """Watch over the servo, which a device that is unplugged stops, and take what was said of the scenes."""
+        """Watch over the servo, which a device that is unplugged stops, and the screen; take what is said of scenes."""
         try:
             self._ready.rig.servo.check()
+            self._screen()
         except StudyError as error:
             self._timer.stop()
             self.failed.emit(error)

@@ -58,7 +58,8 @@ def screen_shown(screen: QScreen) -> ScreenShown:
 def choose_screens(number: int | None) -> tuple[QScreen, QScreen]:
     """Return the participant's and the operator's screen; the same one where there is only one.
 
-    ``number`` is the participant's, from 1; None: the last one, where a second monitor usually is.
+    ``number`` is the participant's, from 1; None: the last one, where a second monitor usually is. Do not keep them for
+    later: a screen can be removed, and PySide gives a screen up with the widget whose ``screen()`` returned it last.
 
     Raises
     ------

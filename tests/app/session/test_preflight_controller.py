@@ -10,14 +10,13 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from study_app.app.session import preflight_controller
 from study_app.app.session.preflight_controller import Appraisal, Preflight
-from study_app.errors import DeviceLost
+from study_app.errors import DeviceLost, DisplayError
 from study_app.evaluation.appraisal import Costs, Errors
 from study_app.evaluation.appraisal_worker import Question
-from study_app.gui.display.screens import screen_shown
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.clocks.grants import NO_THREAD
@@ -86,8 +85,9 @@ def machine(monkeypatch: Any) -> Machine:
 
 @pytest.fixture
 def asked(qapp: Any, machine: Any) -> Any:
-    screen = screen_shown(QGuiApplication.primaryScreen())
-    made = Preflight(CHOSEN, load("demo"), Ready(machine, FACTS), screen, "Participant P001", LIGHT)
+    made = Preflight(
+        CHOSEN, load("demo"), Ready(machine, FACTS), QGuiApplication.primaryScreen, "Participant P001", LIGHT
+    )
     made.open()
     yield made
     made.close()
@@ -122,6 +122,29 @@ def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, m
     assert waited == [True]
 
 
+def test_a_window_that_is_gone_takes_no_screen_from_what_is_measured_again(
+    asked: Preflight, monkeypatch: Any, qtbot: Any
+) -> None:
+    """PySide gives a screen up with the widget whose ``screen()`` returned it last."""
+    monkeypatch.setattr(preflight_controller, "measured", lambda *_words, **_named: FACTS)
+    other = QWidget()
+    other.screen()
+    other.deleteLater()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    asked.window.again.click()
+    qtbot.waitUntil(asked.window.start.isEnabled, timeout=3000)
+
+
+def test_a_screen_that_is_removed_meanwhile_ends_the_question(asked: Preflight, monkeypatch: Any, qtbot: Any) -> None:
+    def none_left() -> Any:
+        raise DisplayError("screen 2 cannot be used: there is 1 screen")
+
+    monkeypatch.setattr(asked, "_screen", none_left)
+    with qtbot.waitSignal(asked.failed, timeout=3000) as told:
+        pass
+    assert "cannot be used" in str(told.args[0])
+
+
 class ConnectedLater:
     """Outlets with one stream, to which a recording program is connected when a test says so."""
 
@@ -133,8 +156,9 @@ class ConnectedLater:
 
 def test_a_recording_program_that_is_connected_meanwhile_is_shown(qapp: Any, machine: Any, qtbot: Any) -> None:
     outlets: Any = ConnectedLater()
-    screen = screen_shown(QGuiApplication.primaryScreen())
-    made = Preflight(CHOSEN, load("demo"), Ready(machine, FACTS, outlets=outlets), screen, "P001", LIGHT)
+    made = Preflight(
+        CHOSEN, load("demo"), Ready(machine, FACTS, outlets=outlets), QGuiApplication.primaryScreen, "P001", LIGHT
+    )
     made.open()
 
     def shown() -> list[str]:
@@ -152,8 +176,9 @@ def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_c
     qapp: Any, machine: Any, monkeypatch: Any, qtbot: Any
 ) -> None:
     found = replace(FACTS, dynamics=Dynamics(0.0004, 20e-6, 0.3), delay_ticks=1)
-    screen = screen_shown(QGuiApplication.primaryScreen())
-    made = Preflight(CHOSEN, load("demo"), Ready(machine, found), screen, "Participant P001", LIGHT)
+    made = Preflight(
+        CHOSEN, load("demo"), Ready(machine, found), QGuiApplication.primaryScreen, "Participant P001", LIGHT
+    )
     first: Any = made.appraisal.appraiser
     assert first.devices == [Dynamics(0.001, 20e-6, 0.3)]
     slower = replace(found, delay_ticks=3)

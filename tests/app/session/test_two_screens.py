@@ -36,7 +36,7 @@ live, loop, found = LiveSession(chosen, LIGHT), QEventLoop(), []
 live.settings = live.settings.model_copy(update={"screen": "left", "screen_number": 1})
 
 def look():
-    if live.bridge is None or live.bridge.participant.page is None:
+    if live.bridge is None or not live.bridge.participant.isVisible():
         return
     timer.stop()
     windows = live.bridge.participant, live.bridge.operator
