@@ -6,7 +6,7 @@ Sizes are logical px, so that they grow with the screen's scaling and with nothi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from typing import Literal, TypeAlias
 
@@ -72,12 +72,19 @@ def font(role: TypeRole, *, scale: float = 1.0, weight: int | None = None, tabul
     weight, tabular : int, bool, optional
         In place of the role's own: 400, 500, 600, 700; figures of one width.
     """
-    load_fonts()
     step = TYPE[role]
+    chosen = step.weight if weight is None else weight
+    return QFont(_made(max(1, round(step.size * scale)), chosen, tabular=step.tabular if tabular is None else tabular))
+
+
+@lru_cache(maxsize=256)
+def _made(size_px: int, weight: int, *, tabular: bool) -> QFont:
+    """Return a font; whoever takes it must copy it."""
+    load_fonts()
     made = QFont(FAMILIES)
-    made.setPixelSize(max(1, round(step.size * scale)))
-    made.setWeight(QFont.Weight(weight if weight is not None else step.weight))
+    made.setPixelSize(size_px)
+    made.setWeight(QFont.Weight(weight))
     made.setHintingPreference(QFont.HintingPreference.PreferNoHinting)
-    if step.tabular if tabular is None else tabular:
+    if tabular:
         made.setFeature(QFont.Tag("tnum"), 1)
     return made

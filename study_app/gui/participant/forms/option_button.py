@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, ClassVar, Literal, TypeAlias
 
 from PySide6.QtCore import QEvent, QPoint, QRectF, QSize, Qt, Signal
@@ -20,6 +21,20 @@ ROOM = 14.0  # between edge and words
 NO_WORDS = "–"
 Look: TypeAlias = Literal["words", "point", "off scale"]
 """Words that can be chosen, a point of a scale, or an answer off it, with an edge of dashes."""
+
+
+@lru_cache(maxsize=1024)
+def widest_word(words: str, scale: float) -> float:
+    """Return the width of the widest word of an answer [px]; the points of all rows of a page are alike."""
+    metrics = QFontMetricsF(font("chosen", scale=scale))
+    return max((metrics.horizontalAdvance(word) for word in words.split()), default=0.0)
+
+
+@lru_cache(maxsize=1024)
+def height_of(words: str, scale: float, width_px: float) -> float:
+    """Return the height of an answer that is wrapped at a width [px]."""
+    room = QRectF(0, 0, width_px, 1e4)
+    return QFontMetricsF(font("chosen", scale=scale)).boundingRect(room, CENTRE, words).height()
 
 
 class OptionLook(Button):
@@ -61,10 +76,8 @@ class OptionLook(Button):
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Return a size that can be hit, as wide as the longest word."""
-        metrics = QFontMetricsF(font("chosen", scale=self._scale))
-        widest = max((metrics.horizontalAdvance(word) for word in self._words.split()), default=0.0)
         least = target_px(self._scale)
-        return QSize(round(max(least, widest + self._taken())), round(least))
+        return QSize(round(max(least, widest_word(self._words, self._scale) + self._taken())), round(least))
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802
         """Return the same."""
@@ -76,8 +89,7 @@ class OptionLook(Button):
 
     def heightForWidth(self, width: int) -> int:  # noqa: N802
         """Return the height [px] that the words need where they wrap."""
-        room = QRectF(0, 0, max(1.0, width - self._taken()), 1e4)
-        needed = QFontMetricsF(font("chosen", scale=self._scale)).boundingRect(room, CENTRE, self._words).height()
+        needed = height_of(self._words, self._scale, max(1.0, width - self._taken()))
         return round(max(target_px(self._scale), needed + 12 * self._scale))
 
     def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
