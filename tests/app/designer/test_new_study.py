@@ -34,6 +34,7 @@ def test_every_template_and_shipped_study_can_be_begun_from(designer: Any) -> No
         choice = one.choice
         assert bool(choice.session) == (not choice.copy)
         assert choice.description
+        assert ".." not in one.accessibleDescription()
         assert (choice.recovery is not None) == (
             choice.source in {"template:viscosity-jnd", "template:delay-detection"}
         )

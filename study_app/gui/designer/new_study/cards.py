@@ -25,7 +25,7 @@ class TemplateButton(Themed, QAbstractButton):
         self.setCheckable(True)
         self.setAccessibleName(f"{'Copy of' if choice.copy else 'Template'} {choice.title}")
         words = ", ".join(words for _, words in choice.figures)
-        self.setAccessibleDescription(". ".join(filter(None, (choice.description, choice.note, words))))
+        self.setAccessibleDescription(". ".join(filter(None, (choice.description.rstrip("."), choice.note, words))))
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
