@@ -139,7 +139,10 @@ class ExclusionsCard(Card):
         self.show_left_out(())
 
     def show_left_out(self, listed: Sequence[LeftOut]) -> None:
-        """Show what is left out, the last decision first."""
+        """Show what is left out, the last decision first; the keyboard does not leave with a line."""
+        at = self.window().focusWidget()
+        if at is not None and any(line.isAncestorOf(at) for line in self.lines):
+            self.leave_out.setFocus()
         for line in self.lines:
             remove_widget(line)
         self.lines = [self._line(one) for one in reversed(listed)]

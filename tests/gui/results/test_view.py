@@ -179,6 +179,9 @@ def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
     with qtbot.waitSignal(place.take_back_asked) as asked:
         click(qtbot, dialog.go_on)
     assert asked.args[0] == ("P003", 1, 4, "CD", "wrong trial")
+    back.setFocus()
+    place.show_view(view())
+    assert place.window().focusWidget() is place.exclusions.leave_out
 
 
 def test_choosing_a_study_asks_for_it_and_showing_one_does_not(place, qtbot):
