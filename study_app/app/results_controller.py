@@ -90,7 +90,6 @@ class ResultsController(QObject):
         self._going: Going | None = None
         self._redrawn: set[str] = set()
         self._blocks = 0
-        self._listed = False
         self._listening = QTimer(self)
         self._listening.setInterval(LISTEN_MS)
         self._listening.timeout.connect(self._listen)
@@ -222,17 +221,16 @@ class ResultsController(QObject):
             self.view = ResultsView(studies=self.view.studies, chosen=folder)
             self._blocks = 0
         self._redrawn = set()
-        self._listed = False
-        self._show(trouble=None, untested=False)
+        self._show(trouble=None, untested=False, listed=False)
         self._ask(ReadStudy(folder), f"reading {folder.name}")
 
     def _take_sessions(self, found: SessionsFound) -> None:
         facts = session_facts(found.folder, found.rows, found.exclusions, {})
-        self._listed = True
         facts.sort(key=lambda one: (not one.needs_care, one.participant, one.session))
         reveal = found.reveal
         self._show(
             sessions=tuple(facts),
+            listed=True,
             left_out=tuple(map(left_out, found.exclusions)),
             exclusions_file=exclusions_at(found.folder),
             sealed=reveal is None,
@@ -278,7 +276,7 @@ class ResultsController(QObject):
             trouble = Trouble("The results folder cannot be read", sentence, "Refresh", "again")
             self.view = ResultsView(trouble=trouble)
             self.place.show_view(self.view)
-        elif self._listed and not self.view.sessions:
+        elif self.view.listed and not self.view.sessions:
             sentence = "Results appear after the first session has started."
             trouble = Trouble("No sessions yet", sentence, "Go to Home", "home")
             self._show(trouble=trouble, figures=(), drawing=None, testing=None)

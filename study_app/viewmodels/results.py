@@ -96,13 +96,14 @@ class ResultsView:
 
     ``trials`` are the main trials of each session (participant, number), with the words for them. ``colours`` are the
     figures' colours in print, by the role in the theme that takes their place. ``sealed`` is None while it is not
-    known. ``drawing`` goes on where there are no figures yet, ``testing`` besides those there are; ``untested`` says
-    that this was stopped.
+    known; ``listed`` says whether the study's sessions are read. ``drawing`` goes on where there are no figures yet,
+    ``testing`` besides those there are; ``untested`` says that this was stopped.
     """
 
     studies: tuple[StudyChoice, ...] = ()
     chosen: Path | None = None
     sessions: tuple[SessionFacts, ...] = ()
+    listed: bool = False
     sealed: bool | None = None
     opened: Opened | None = None
     left_out: tuple[LeftOut, ...] = ()
@@ -120,6 +121,11 @@ class ResultsView:
     def kind(self) -> Literal["", "simulated", "pilot"]:
         """What the chosen study is where it holds no participants' data."""
         return next((study.kind for study in self.studies if study.folder == self.chosen), "")
+
+    @property
+    def reading(self) -> bool:
+        """Whether the sessions of the chosen study are not known yet."""
+        return not self.listed and self.trouble is None
 
     @property
     def can_be_written(self) -> bool:

@@ -25,6 +25,7 @@ COLUMNS = (
     Column("version", "Version", 60, 60),
 )
 EVERY = "All states"
+READING = "Reading the sessions …"
 
 
 class SessionsCard(Card):
@@ -42,7 +43,8 @@ class SessionsCard(Card):
         self.state.setAccessibleName("State")
         self.state.setFont(font("body"))
         self.state.addItem(EVERY, "")
-        self.rows = SessionsTable(COLUMNS, "No sessions.")
+        self._none = READING
+        self.rows = SessionsTable(COLUMNS, READING)
         self.head = label("", "label")
         self.head.setFont(font("label", weight=600, tabular=True))
         self.why = label("", "small", "text2", wraps=True)
@@ -77,8 +79,9 @@ class SessionsCard(Card):
         self.details.setEnabled(chosen is not None)
         self.version.setEnabled(chosen is not None and bool(chosen.version))
 
-    def show_sessions(self, found: Sequence[SessionFacts]) -> None:
-        """Show these sessions in place of those before; the filters stay."""
+    def show_sessions(self, found: Sequence[SessionFacts], *, reading: bool) -> None:
+        """Show these sessions in place of those before, or those known while others are read; the filters stay."""
+        self._none = READING if reading else "No sessions."
         self.rows.show_rows(found, datetime.now().astimezone())
         chosen = self.state.currentData()
         with QSignalBlocker(self.state):
@@ -87,7 +90,7 @@ class SessionsCard(Card):
             for state, words in states_of(found):
                 self.state.addItem(words, state)
             self.state.setCurrentIndex(max(0, self.state.findData(chosen)))
-        head, why = in_figures(found)
+        head, why = in_figures(found) if found or not reading else ("", "")
         self.head.setText(head)
         self.why.setText(why)
         self.why.setVisible(bool(why))
@@ -96,7 +99,7 @@ class SessionsCard(Card):
     def _filter(self) -> None:
         state = str(self.state.currentData() or "")
         filtered = bool(state or self.search.text().strip())
-        self.rows.none.setText("No session matches." if filtered else "No sessions.")
+        self.rows.none.setText("No session matches." if filtered else self._none)
         self.rows.show_matching(matching(self.search.text(), state))
 
 
