@@ -61,7 +61,7 @@ class OutlineCard(Card):
         self.add = ActionButton("plus", "Add", cap=key_cap("add"), height=40)
         self.add.setAccessibleName("Add an element (Insert)")
         self.add.setToolTip(tip("add"))
-        self.duplicate = ActionButton("copy", "Duplicate", cap=key_cap("duplicate"), height=40)
+        self.duplicate = ActionButton("copy", "Duplicate", height=40)  # there is no room for the cap of its key
         self.duplicate.setAccessibleName("Duplicate the selected element (Ctrl+D)")
         self.duplicate.setToolTip(tip("duplicate"))
         for button in (self.add, self.duplicate):

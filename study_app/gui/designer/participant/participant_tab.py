@@ -124,7 +124,7 @@ class ParticipantTab(Card):
         if len(view.moments) > MOST_IN_ROW:
             self._second.insertWidget(0, self.moments)
         else:
-            self._row.insertWidget(3, self.moments)
+            self._row.insertWidget(self._row.indexOf(self.after) + 1, self.moments)
         self.page.show_view(view)
         if (high := self.column.minimumSize().height()) != self._high:  # another note, or another row of pages
             self._high = high

@@ -74,6 +74,8 @@ def test_the_page_is_that_of_the_selected_element(designer: Any, live: Any) -> N
         assert liquid in found.shown.protocol.conditions[condition].liquid_ids
     tab.step_asked.emit(1)
     assert preview.position[:2] != ("", 0)
+    in_line = [tab.before, tab.step, tab.trial, tab.trials, tab.after, tab.moments, tab.zoom]
+    assert sorted(in_line, key=lambda part: part.x()) == in_line
     tab.moment_asked.emit(tab.view.moments[1][0])
     assert isinstance(live.page_window.page, QuestionnairePage)
 
