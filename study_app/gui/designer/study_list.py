@@ -44,7 +44,7 @@ class StudyList(Choice):
 
     def add_study(self, study: StudyChoice, *, opened: bool) -> None:
         """Add a study, by title and file."""
-        words = f"{study.words}  (ships with the program)" if study.shipped else study.words
+        words = f"{study.words}  (shipped)" if study.shipped else study.words
         self.addItem(words, study.source)
         if opened:
             self.setItemData(self.count() - 1, f"{words}, open", Qt.ItemDataRole.AccessibleTextRole)

@@ -30,11 +30,11 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
     for name, title in (("zeta", "apples"), ("beta", "Melons"), ("alpha", "Melons")):
         add_study(designer, name, title)
     designer.controller.open("kitchen")
-    own = [words for words in listed(designer) if "ships" not in words][:-2]
+    own = [words for words in listed(designer) if "(shipped)" not in words][:-2]
     assert own[:2] == ["A first look  ·  kitchen.toml", "apples  ·  zeta.toml"]
     assert [words for words in own if words.startswith("Melons")] == ["Melons  ·  alpha.toml", "Melons  ·  beta.toml"]
     assert own == sorted(own, key=str.casefold)
-    shipped_ones = [words for words in listed(designer) if "ships" in words]
+    shipped_ones = [words for words in listed(designer) if "(shipped)" in words]
     assert len(shipped_ones) == len(shipped())
     assert listed(designer)[len(own) : len(own) + len(shipped_ones)] == sorted(shipped_ones, key=str.casefold)
     before = listed(designer)
