@@ -248,4 +248,6 @@ def _title(study: Study, name: str, section: str = "") -> str:
 
 
 def _sentence(words: str) -> str:
-    return f"{words[:1].upper()}{words[1:]}."
+    """Return words as a sentence; a place in the file, such as "designs.pair.feedback:", stays as it is."""
+    place = "." in words.partition(":")[0].partition(" ")[0]
+    return f"{words if place else words[:1].upper() + words[1:]}."

@@ -1,0 +1,17 @@
+"""The card of warnings."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from study_app.viewmodels.designer.measures.session_cards import warnings_card
+
+
+def test_warnings_are_sentences_and_places_of_the_file_stay_as_they_are() -> None:
+    facts: Any = SimpleNamespace(warnings=('designs.pair.feedback: "always" shows the answer', "two liquids are alike"))
+    card = warnings_card(facts, ())
+    assert card is not None
+    said = [words for _, _, words in card.sentences]
+    assert said == ['designs.pair.feedback: "always" shows the answer.', "Two liquids are alike."]
+    assert warnings_card(SimpleNamespace(warnings=()), ()) is None  # type: ignore[arg-type]  # facts without any
