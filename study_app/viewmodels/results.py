@@ -123,9 +123,11 @@ class ResultsView:
         return next((study.kind for study in self.studies if study.folder == self.chosen), "")
 
     @property
-    def reading(self) -> bool:
-        """Whether the sessions of the chosen study are not known yet."""
-        return not self.listed and self.trouble is None
+    def without_sessions(self) -> str:
+        """What stands in place of sessions where none are shown."""
+        if self.listed:
+            return "No sessions."
+        return "" if self.trouble is not None else "Reading the sessions …"
 
     @property
     def can_be_written(self) -> bool:
@@ -134,11 +136,11 @@ class ResultsView:
 
 
 def in_figures(sessions: Sequence[SessionFacts]) -> tuple[str, str]:
-    """Return how many sessions are in the figures, and why the others are not."""
+    """Return how many sessions are in the figures, and why the others are not; empty without sessions."""
     inside = [one for one in sessions if one.counts]
     head = f"{len(inside)} of {counted(len(sessions), 'session')} in the figures"
     if not sessions:
-        return "No sessions yet", ""
+        return "", ""
     excluded = [one.name for one in sessions if one.excluded is not None]
     open_ones = [one.name for one in sessions if one.excluded is None and not one.counts]
     parts = [_are(open_ones, "not complete"), _are(excluded, "excluded")]

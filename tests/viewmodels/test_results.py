@@ -20,7 +20,7 @@ def test_who_is_in_the_figures_and_why_the_others_are_not():
     assert in_figures(held) == ("12 of 12 sessions in the figures", "")
     held += [facts("P013", status="unfinished"), facts("P014", excluded="asleep")]
     assert in_figures(held) == ("12 of 14 sessions in the figures", "P013 is not complete; P014 is excluded.")
-    assert in_figures([]) == ("No sessions yet", "")
+    assert in_figures([]) == ("", "")
     assert in_figures(held[:1])[0] == "1 of 1 session in the figures"
 
 

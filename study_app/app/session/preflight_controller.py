@@ -163,7 +163,12 @@ class Preflight(QObject):
         )
 
     def _show(self) -> None:
-        facts = self._facts
+        try:
+            facts = self._facts
+        except StudyError as error:  # the screen is gone
+            self._timer.stop()
+            self.failed.emit(error)
+            return
         self._outlets_shown = facts.outlets
         self.window.show_view(
             preflight_view(

@@ -9,6 +9,7 @@ from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.parts import Parts
 from study_app.devices.registry import descriptor_of
 from study_app.devices.simulated.hand_commands import HandOrders, hand_of
+from study_app.errors import DisplayError
 from study_app.gui.display.opengl import has_card
 from study_app.gui.display.screens import place
 from study_app.gui.operator import OperatorWindow
@@ -147,13 +148,21 @@ def show_windows(
     """Show both windows on their screens, one after the other; of a session that is played the participant's alone.
 
     ``screens`` returns the participant's and the operator's screen; it is called in each step.
+
+    Raises
+    ------
+    DisplayError
+        A screen was removed since the windows were made: the participant's would cover the force stop.
     """
     if not played:
         shown_on, operated_on = screens()
         place(bridge.operator, operated_on, corner=shown_on is operated_on)
         bridge.operator.show()
         yield
-    bridge.participant.open_on(screens()[0])
+    shown_on, operated_on = screens()
+    if shown_on is operated_on and bridge.strip is None:
+        raise DisplayError("a screen was removed while the session opened; begin it again")
+    bridge.participant.open_on(shown_on)
 
 
 def _reconnecting(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any]]:

@@ -25,7 +25,6 @@ COLUMNS = (
     Column("version", "Version", 60, 60),
 )
 EVERY = "All states"
-READING = "Reading the sessions …"
 
 
 class SessionsCard(Card):
@@ -43,8 +42,8 @@ class SessionsCard(Card):
         self.state.setAccessibleName("State")
         self.state.setFont(font("body"))
         self.state.addItem(EVERY, "")
-        self._none = READING
-        self.rows = SessionsTable(COLUMNS, READING)
+        self._none = ""
+        self.rows = SessionsTable(COLUMNS, "")
         self.head = label("", "label")
         self.head.setFont(font("label", weight=600, tabular=True))
         self.why = label("", "small", "text2", wraps=True)
@@ -79,9 +78,9 @@ class SessionsCard(Card):
         self.details.setEnabled(chosen is not None)
         self.version.setEnabled(chosen is not None and bool(chosen.version))
 
-    def show_sessions(self, found: Sequence[SessionFacts], *, reading: bool) -> None:
-        """Show these sessions in place of those before, or those known while others are read; the filters stay."""
-        self._none = READING if reading else "No sessions."
+    def show_sessions(self, found: Sequence[SessionFacts], none: str) -> None:
+        """Show these sessions in place of those before, or the words ``none`` in their place; the filters stay."""
+        self._none = none
         self.rows.show_rows(found, datetime.now().astimezone())
         chosen = self.state.currentData()
         with QSignalBlocker(self.state):
@@ -90,7 +89,7 @@ class SessionsCard(Card):
             for state, words in states_of(found):
                 self.state.addItem(words, state)
             self.state.setCurrentIndex(max(0, self.state.findData(chosen)))
-        head, why = in_figures(found) if found or not reading else ("", "")
+        head, why = in_figures(found)
         self.head.setText(head)
         self.why.setText(why)
         self.why.setVisible(bool(why))

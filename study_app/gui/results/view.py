@@ -153,8 +153,8 @@ class ResultsPlace(Place):
         before, self.view = self.view, view
         if view.studies != before.studies or view.chosen != before.chosen:
             self._show_studies()
-        if (view.sessions, view.reading) != (before.sessions, before.reading):
-            self.sessions.show_sessions(view.sessions, reading=view.reading)
+        if (view.sessions, view.without_sessions) != (before.sessions, before.without_sessions):
+            self.sessions.show_sessions(view.sessions, view.without_sessions)
         if view.left_out != before.left_out:
             self.exclusions.show_left_out(view.left_out)
         self._show_chips()

@@ -97,3 +97,26 @@ def test_windows_deleted_while_a_session_opens_take_no_screen_from_it(
     assert (session.code, session.error) == (0, None)
     session.end_by_signal(15)
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+class ScreenRemoved(LiveSession):
+    """A session whose windows were made for two screens, of which one is left before they are shown."""
+
+    def _step(self) -> None:
+        if self.bridge is not None:
+            self.bridge.strip = None
+        super()._step()
+
+
+def test_a_page_without_a_force_stop_does_not_cover_that_of_the_operator(
+    qtbot: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(live_session, "checks", lambda *_: ())
+    session = ScreenRemoved(replace(CHOSEN, results=tmp_path / "results"), LIGHT)
+    with qtbot.waitSignal(session.over, timeout=60_000):
+        session.open()
+    assert str(session.error) == "a screen was removed while the session opened; begin it again"
+    assert session.bridge is not None
+    assert not session.bridge.parts.servo.force_is_on
+    assert not session.bridge.participant.isVisible()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

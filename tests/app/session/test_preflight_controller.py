@@ -143,6 +143,8 @@ def test_a_screen_that_is_removed_meanwhile_ends_the_question(asked: Preflight, 
     with qtbot.waitSignal(asked.failed, timeout=3000) as told:
         pass
     assert "cannot be used" in str(told.args[0])
+    with qtbot.waitSignal(asked.failed, timeout=3000):
+        asked.window.again.click()
 
 
 class ConnectedLater:

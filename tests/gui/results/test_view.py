@@ -351,12 +351,14 @@ def test_what_comes_and_goes_in_one_turn_is_never_a_window_of_its_own(place, qtb
     assert {one for one in QApplication.topLevelWidgets() if one.isVisible()} <= before
 
 
-def test_sessions_that_are_being_read_are_not_said_to_be_none(place):
-    place.show_view(view(sessions=(), listed=False))
-    assert (place.sessions.rows.none.text(), place.sessions.head.text()) == ("Reading the sessions …", "")
-    place.show_view(
-        view(sessions=(), trouble=Trouble("The study cannot be read", "It is damaged.", "Refresh", "again"))
-    )
-    assert place.sessions.rows.none.text() == "No sessions."
-    place.show_view(view(sessions=(), listed=True))
-    assert (place.sessions.rows.none.text(), place.sessions.head.text()) == ("No sessions.", "No sessions yet")
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, "Reading the sessions …"),
+        ({"trouble": Trouble("The study cannot be read", "It is damaged.", "Refresh", "again")}, ""),
+        ({"listed": True}, "No sessions."),
+    ],
+)
+def test_sessions_are_said_to_be_none_only_where_they_were_read(place, changes, words):
+    place.show_view(view(sessions=(), **changes))
+    assert (place.sessions.rows.none.text(), place.sessions.head.text()) == (words, "")
