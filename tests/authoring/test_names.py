@@ -18,6 +18,7 @@ from study_app.authoring.names import (
     replaced,
     with_references,
 )
+from study_app.authoring.templates import FOLDER
 from study_app.authoring.writer.refused import Refused
 from study_app.haptics.model.liquid import MAX_ID
 from study_app.protocol.orders.schedule import build_schedule
@@ -85,6 +86,14 @@ def test_with_references_lists_what_goes_with_a_liquid() -> None:
         ("conditions", "thick"),
         ("liquids", "thick"),
     )
+
+
+def test_with_references_leaves_no_list_empty() -> None:
+    study = read((FOLDER / "compare-liquids.toml").read_bytes(), FOLDER)
+    gone = with_references(study.document, ("liquids", "syrup"), study.needs)
+    assert gone == (("sequence", 1), ("blocks", "practice"), ("conditions", "practice"), ("liquids", "syrup"))
+    changed, _ = study.edited(*deletions(gone))
+    assert not changed.faults
 
 
 def test_replaced_lets_everything_name_the_other() -> None:

@@ -244,10 +244,19 @@ def delete_prompt(study: Study, paths: Sequence[Path]) -> DeletePrompt:
     document, path = study.document, paths[0]
     places = [place for one in paths for place in references_to(document, one)]
     outside = [place for place in places if not any(place[: len(one)] == one for one in paths)]
-    references = (f"{title_of(document, element_of(study, place))}: {_field(study, place)}" for place in outside)
+    references = (f"{_kind_and_title(study, element_of(study, place))}: {_field(study, place)}" for place in outside)
+    gone = {one: None for each in paths for one in with_references(document, each, study.needs)}
+    together = tuple(_kind_and_title(study, one) for one in gone if one not in paths and isinstance(one[1], str))
     others = (name for name in names(document, str(path[0])) if name != path[-1] and len(path) == 2)
     titles = tuple((name, title_of(document, (path[0], name))) for name in others) if len(paths) == 1 else ()
-    return DeletePrompt(path, _titles(study, paths), tuple(dict.fromkeys(references)), titles, tuple(paths[1:]))
+    words = tuple(dict.fromkeys(references))
+    return DeletePrompt(path, _titles(study, paths), words, titles, tuple(paths[1:]), together)
+
+
+def _kind_and_title(study: Study, element: Path) -> str:
+    """Return "Condition Water"; of what is no element of a section its title alone."""
+    title = title_of(study.document, element)
+    return f"{singular(element[0]).capitalize()} {title}" if len(element) > 1 else title
 
 
 def _field(study: Study, place: Path) -> str:

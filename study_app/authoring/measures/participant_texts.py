@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
+from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import languages_of, texts_of
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import is_localised, label_of
+from study_app.authoring.names import ITEMS
 from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import alternatives
 from study_app.protocol.model import Protocol
@@ -19,6 +21,8 @@ from study_app.store.verification.leaks import Telltales
 
 SHORTEST: Final = 3
 """Letters of an id that does not stand in a text by chance."""
+NEW_QUESTION: Final = f"New {singular(ITEMS)}"
+"""What a question says that was added, in every language."""
 READ: Final = ("pages", "blocks", "tasks", "designs")
 """Sections whose texts are read before the last answer; statements may name what is compared, as all see the same."""
 
@@ -48,6 +52,19 @@ def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
 def missing_texts(study: Study) -> dict[str, int]:
     """Return how many texts each language lacks; none where it lacks none."""
     return {code: wanted - there for code, (there, wanted) in texts_by_language(study).items() if there < wanted}
+
+
+def copied_texts(study: Study) -> dict[str, int]:
+    """Return for each further language how many of its texts are those of the first one, or of a new question."""
+    first, *others = languages_of(study)
+    texts = [value for _, value in texts_of(study) if isinstance(value, Mapping)]
+    counted = {code: sum(is_copied(value, code, first) for value in texts) for code in others}
+    return {code: count for code, count in counted.items() if count}
+
+
+def is_copied(texts: Mapping[str, Any], code: str, first: str) -> bool:
+    """Return whether a text in a language is still that of the first language, or of a new question."""
+    return bool(texts.get(code)) and texts[code] in (texts.get(first), NEW_QUESTION)
 
 
 def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:

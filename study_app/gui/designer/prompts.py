@@ -64,6 +64,9 @@ class DeleteCard(Prompt):
         area.setWidget(inside)
         area.setMinimumHeight(min(200, 26 * count + 8))
         self.column.addWidget(area, 1)
+        if asked.together:
+            words = f"Delete them too deletes, besides: {', '.join(asked.together)}."
+            self.column.addWidget(label(words, "label", wraps=True))
         self.all = ActionButton("trash", "Delete them too", role="danger", height=40)
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(asked.path, "all", also=asked.also)))
         self.gaps = ActionButton("", "Leave the gaps", height=40)

@@ -78,7 +78,7 @@ class SessionsCard(Card):
         self.details.setEnabled(chosen is not None)
         self.version.setEnabled(chosen is not None and bool(chosen.version))
 
-    def show_sessions(self, found: Sequence[SessionFacts], none: str) -> None:
+    def show_sessions(self, found: Sequence[SessionFacts], none: str = "No sessions.") -> None:
         """Show these sessions in place of those before, or the words ``none`` in their place; the filters stay."""
         self._none = none
         self.rows.show_rows(found, datetime.now().astimezone())

@@ -10,7 +10,7 @@ from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.series import NUMBERS
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
-from study_app.authoring.measures.participant_texts import missing_texts
+from study_app.authoring.measures.participant_texts import is_copied, missing_texts
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.protocol.groups.group import sequences_in
@@ -35,12 +35,16 @@ WITH_LIQUIDS = ("liquids", "conditions", "blocks")
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One entry of a list, or one table of a section: where it is, what it is called, and how many faults it has."""
+    """One entry of a list, or one table of a section: where it is, what it is called, and how many faults it has.
+
+    ``target`` is the element that it opens: what a reference names, else itself.
+    """
 
     path: Path
     title: str
     note: str = ""
     faults: int = 0
+    target: Path = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +85,12 @@ class FormRow:
     number: int | None = None
     instead: tuple[tuple[str, str], ...] = ()
     facts: Any = None
+
+    @property
+    def copied(self) -> tuple[str, ...]:
+        """The languages in which a text is still that of the first language."""
+        texts = self.row.value if isinstance(self.row.value, Mapping) else {}
+        return tuple(name for code, name in self.languages[1:] if is_copied(texts, code, self.languages[0][0]))
 
     @property
     def removable(self) -> bool:
@@ -349,11 +359,11 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
             if row.kind == "references":
                 named = named_at(study.document, path)
                 title = str(row.value[key]) if named is None else title_of(study.document, named)
-                yield Entry(path, title, "" if named is None else str(named[-1]), faults)
+                yield Entry(path, title, "" if named is None else str(named[-1]), faults, named or ())
             else:
                 inner = value_at(study.document, path)
                 note = inner.get("id", "") if isinstance(inner, Mapping) else ""
-                yield Entry(path, title_of(study.document, path), str(note), faults)
+                yield Entry(path, title_of(study.document, path), str(note), faults, path)
 
 
 def _fits(row: Row, value: Any) -> bool:

@@ -30,6 +30,8 @@ class DeletePrompt:
         Id and title of what could be named in its place.
     also : tuple of path
         Others that are deleted with it.
+    together : tuple of str
+        Elements that cannot be without it, with kind and title.
     """
 
     path: Path
@@ -37,6 +39,7 @@ class DeletePrompt:
     references: tuple[str, ...]
     others: tuple[tuple[str, str], ...] = ()
     also: tuple[Path, ...] = ()
+    together: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton
 from shiboken6 import isValid
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
@@ -136,3 +136,25 @@ def test_a_difference_that_is_reverted_outlives_the_click(qtbot: Any, designer: 
     assert shown.lines == []
     assert after == [0]
     qtbot.waitUntil(lambda: gone == [True])
+
+
+def test_the_arrow_of_an_entry_opens_what_it_names(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("blocks", "liquids"))
+    field = designer.row("blocks", "liquids", "conditions").field
+    words = f"Open {field.row.entries[1].title}"
+    (arrow,) = (one for one in field.rows[1].findChildren(QPushButton) if one.accessibleName() == words)
+    qtbot.mouseClick(arrow, LEFT)
+    assert designer.editing.selected == ("conditions", field.row.row.value[1])
+
+
+def test_the_question_before_a_delete_says_what_goes(designer: Any) -> None:
+    designer.controller.begin("template:compare-liquids", "liquids")
+    designer.select(("liquids", "syrup"))
+    designer.place.form.head.delete.click()
+    said = [one.text() for one in designer.place.prompt.findChildren(QLabel)]
+    assert "Condition Practice: Liquid" in said
+    assert "Delete them too deletes, besides: Block Practice, Condition Practice." in said
+    designer.place.prompt.all.click()
+    assert "practice" not in designer.editing.opened.study.document["blocks"]
+    assert not designer.editing.opened.study.faults

@@ -8,7 +8,7 @@ from study_app.authoring.block_levels import levels, standard_of
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.forces import level_limits
-from study_app.authoring.measures.participant_texts import revealing, text_keys, texts_by_language
+from study_app.authoring.measures.participant_texts import copied_texts, revealing, text_keys, texts_by_language
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set, Unset
@@ -76,6 +76,17 @@ def test_texts_are_counted_by_language() -> None:
     assert texts_by_language(without) == {"en": (wanted, wanted), "nl": (labels - 2, wanted)}
     assert facts(without).missing == {"nl": 2}
     assert {"title", "body", "setting_label", "instruction"} <= text_keys()
+
+
+def test_texts_that_were_copied_or_are_those_of_a_new_question_are_not_translated() -> None:
+    study = study_of("rek2024")
+    before = copied_texts(study).get("nl", 0)
+    title = study.document["blocks"]["liquids"]["title"]["en"]
+    copied, _ = study.edited(Set(("blocks", "liquids", "title", "nl"), title))
+    assert copied_texts(copied)["nl"] == before + 1
+    new, _ = copied.edited(Set(("questionnaires", "liquid", "items", 0, "text", "nl"), "New question"))
+    assert copied_texts(new)["nl"] == before + 2
+    assert texts_by_language(new) == texts_by_language(study)
 
 
 @pytest.mark.parametrize(("text", "word"), [("Now comes Light Oil", "light oil"), ("Seen 50 ms late", "50 ms")])

@@ -64,9 +64,7 @@ class LanguagesField(Field):
     def show_value(self) -> None:
         """Show each text; a plain one stands for the first language. A text that is that of the first one is marked."""
         value = self.row.row.value
-        (first, named), *others = self.row.languages
-        texts = value if isinstance(value, dict) else {}
-        copies = [name for code, name in others if texts.get(code) and texts[code] == texts.get(first)]
+        named, copies = self.row.languages[0][1], self.row.copied
         if copies or "copied" in self.__dict__:
             self.copied.setText(f"As in {named}, not translated yet: {', '.join(copies)}")
             self.copied.setVisible(bool(copies))

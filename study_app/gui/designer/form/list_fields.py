@@ -58,7 +58,8 @@ class EntriesField(EntryList):
                     to = at - 1 if by < 0 else at + 2
                     button.clicked.connect(lambda _checked=False, at=at, to=to: self.move_entries((at,), to))
             opens = shown.button("arrow_right", f"Open {entry.title}")
-            opens.clicked.connect(lambda _checked=False, at=at: self.open_asked.emit(self.place(at)))
+            opens.setEnabled(bool(entry.target))
+            opens.clicked.connect(lambda _checked=False, at=at: self.open_asked.emit(self.row.entries[at].target))
             if kind != "tables":
                 away = shown.button("cross", f"Remove {entry.title} from {row.row.label}")
                 away.setToolTip(with_key(away.accessibleName(), "delete"))

@@ -9,7 +9,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.forces import forces
-from study_app.authoring.measures.participant_texts import revealing, texts_by_language
+from study_app.authoring.measures.participant_texts import copied_texts, revealing, texts_by_language
 from study_app.authoring.measures.planned import Detectable
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
@@ -32,6 +32,7 @@ from study_app.viewmodels.designer.measures.number_cards import (
     Verdict,
 )
 from study_app.viewmodels.number_words import minutes
+from study_app.viewmodels.sessions import counted
 
 MOST_CODES: Final = 8
 """Of more codes only how even they are is said."""
@@ -125,6 +126,10 @@ def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     found: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
     if not missing:
         found = [("ok", "check", f"Every text in {languages}")]
+        first = language_name(codes[0])
+        copied = copied_texts(study).items()
+        same = [f"{counted(number, 'text')} in {language_name(code)} as in {first}" for code, number in copied]
+        found = [("neutral", "info", ", ".join(same))] if same else found
     if (protocol := valid_part(study).protocol) is not None:
         revealed = revealing(study, protocol)
         named = f"{revealed[0].element}: “{revealed[0].word}” reveals a condition" if revealed else ""
@@ -202,9 +207,17 @@ def effects_card(study: Study, protocol: Protocol, name: str) -> LinesCard:
 def texts_card(study: Study) -> TextsCard:
     """Return how many texts each language has, and the texts that reveal a condition."""
     lines = []
-    for code, (there, wanted) in texts_by_language(study).items():
-        verdict: Verdict = ("ok", "check", "complete") if there == wanted else ("bad", "warning", "texts are missing")
-        lines.append(Line(language_name(code), f"{there} of {wanted}", there / max(1, wanted), verdict))
+    copied, counts = copied_texts(study), texts_by_language(study)
+    for code, (there, wanted) in counts.items():
+        own = there - copied.get(code, 0)
+        verdict: Verdict = ("ok", "check", "complete") if own == wanted else ("bad", "warning", "texts are missing")
+        if own < there == wanted:
+            verdict = (
+                "neutral",
+                "info",
+                f"{there - own} as in {language_name(next(iter(counts)))}, not translated yet",
+            )
+        lines.append(Line(language_name(code), f"{own} of {wanted}", own / max(1, wanted), verdict))
     protocol = valid_part(study).protocol
     found = () if protocol is None else revealing(study, protocol)
     revealed = tuple((f"{one.element}, {one.key.lower()}: “{one.word}”", one.path) for one in found)
