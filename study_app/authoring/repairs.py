@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from study_app.authoring.changes.initial_values import initial
-from study_app.authoring.changes.languages import filled_in, languages_of
+from study_app.authoring.changes.languages import filled_in
 from study_app.authoring.edited_study import Study
 from study_app.authoring.names import choices_at
 from study_app.authoring.writer.edits import Edit, Insert, Rename, Set, Unset
@@ -124,7 +124,8 @@ def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
     text = value_at(study.document, fault.path)
     if (lacking := fault.missing_language) and isinstance(text, Mapping) and text:
         first = next(iter(text))
-        yield Repair(f"Copy the {language_name(first)} text", (Set((*fault.path, lacking), text[first]),))
+        words = f"Copy {language_name(first)} to {language_name(lacking)}"
+        yield Repair(words, (Set((*fault.path, lacking), text[first]),))
     elif fault.in_one_language and isinstance(text, str) and languages:
         copies = dict.fromkeys(languages, text)
         yield Repair("Use this text in every language", (Set(fault.path, copies),))
@@ -132,9 +133,10 @@ def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
 
 def _every_text(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield copies of all texts in the first language that another one lacks; they are too many to be tried out."""
-    edits = filled_in(study, fault.missing_language) if fault.missing_language else ()
-    if len(edits) > 1 and any(edit.path[: len(fault.path)] == fault.path for edit in edits):
-        yield Repair(f"Copy all {len(edits)} from {language_name(languages_of(study)[0])}", edits)
+    lacking = fault.missing_language
+    edits = filled_in(study, lacking) if lacking else ()
+    if lacking and len(edits) > 1 and any(edit.path[: len(fault.path)] == fault.path for edit in edits):
+        yield Repair(f"Copy all {len(edits)} to {language_name(lacking)}", edits)
 
 
 def _steps(study: Study, fault: Fault) -> Iterator[Repair]:

@@ -52,7 +52,7 @@ def _repaired(case: Case) -> int:
         (
             "rek2024",
             ('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'),
-            "Copy the English text",
+            "Copy English to Dutch",
         ),
         ("rek2024", ('title = { en = "Welcome", nl = "Welkom" }', 'title = "Hi"'), "Use this text in every language"),
     ],
@@ -119,10 +119,11 @@ def test_every_text_that_a_language_lacks_is_copied_in_one_step() -> None:
         for repair in repairs(study, fault)
         if repair.words.startswith("Copy all")
     }.values()
-    assert every.words == f"Copy all {len(missing)} from English"
+    assert every.words == f"Copy all {len(missing)} to Dutch"
     assert study.edited(*every.edits)[0].faults == ()
 
 
 def test_a_single_text_that_is_missing_is_copied_alone() -> None:
     study = study_of("rek2024", ('title = { en = "Welcome", nl = "Welkom" }', 'title = { en = "Welcome" }'))
-    assert [repair.words for fault in study.faults for repair in repairs(study, fault)] == ["Copy the English text"]
+    (fault,) = study.faults
+    assert [repair.words for repair in repairs(study, fault)] == ["Copy English to Dutch"]

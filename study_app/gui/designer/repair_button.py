@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QFocusEvent
+from PySide6.QtGui import QFocusEvent, QMouseEvent
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.theme import font
@@ -29,6 +29,11 @@ class RepairButton(ActionButton):
         """Note what led here."""
         super().focusInEvent(event)
         self.by_keys = event.reason() != Qt.FocusReason.MouseFocusReason
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        """Note that a click leads here, also where a key did before."""
+        self.by_keys = False
+        super().mousePressEvent(event)
 
 
 def lead_by_tab(first: QWidget, repairs: Sequence[RepairButton]) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
+from study_app.viewmodels.designer.requests import SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -81,3 +82,13 @@ def test_ctrl_e_goes_to_the_file_and_back_to_the_same_field(qtbot: Any, designer
     field.setFocus()
     assert press(qtbot, KEY.Key_E, CONTROL) is designer.place.file.editor
     assert press(qtbot, KEY.Key_E, CONTROL) is field
+
+
+def test_the_first_row_has_the_keyboard_where_undo_removes_the_row_that_had_it(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("tasks", "explore"))
+    designer.editing.ask(SetValue(("tasks", "explore", "kind"), "reach"))
+    designer.row("tasks", "explore", "dwell_s").field.line.setFocus()
+    keyboard = press(qtbot, KEY.Key_Z, CONTROL)
+    assert designer.editing.opened.study.document["tasks"]["explore"]["kind"] == "explore"
+    assert first_row(designer).isAncestorOf(keyboard)

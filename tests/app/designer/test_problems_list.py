@@ -87,10 +87,10 @@ def test_every_text_of_a_second_language_is_copied_from_the_list_or_a_field_in_o
     designer.editing.ask(ChangeLanguage("add", "nl"))
     before, count = designer.text, len(designer.place.view.problems)
     designer.place.header.problems.click()
-    words = f"Copy all {count} from English"
+    words = f"Copy all {count} to Dutch"
     line = designer.place.problems.lines[0]
     qtbot.waitUntil(lambda: len(line.repairs) == 2)
-    assert [button.text() for button in line.repairs] == ["Copy the English text", words]
+    assert [button.text() for button in line.repairs] == ["Copy English to Dutch", words]
     qtbot.mouseClick(line.repairs[1], Qt.MouseButton.LeftButton)
     assert designer.place.view.problems == ()
     assert designer.editing.opened.study.faults == ()

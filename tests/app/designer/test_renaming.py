@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
 
 pytestmark = pytest.mark.slow
 
@@ -32,3 +33,17 @@ def test_after_a_rename_comments_that_mention_the_old_name_are_listed_and_left(d
     assert designer.text.endswith("# The pages `thanks` and `thanks_2` are short.\n")
     designer.editing.select(("pages", "welcome"))
     assert not head.comments.isVisible()
+
+
+def test_after_a_rename_the_button_of_an_absent_key_is_found_at_its_new_path(designer: Any, qtbot: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("conditions", "thick"))
+    form = designer.place.form
+    path, button = next(iter(form.adds.items()))
+    form.head.edit_id()
+    qtbot.keyClicks(form.head.id, "thicker")
+    qtbot.keyClick(form.head.id, Qt.Key.Key_Return)
+    assert designer.editing.selected == ("conditions", "thicker")
+    assert form.focus(("conditions", "thicker", path[-1]))
+    assert QApplication.focusWidget() is button
+    assert not form.focus(path), "there is no element of the old id"

@@ -8,7 +8,9 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
+from study_app.authoring.repairs import repairs
 from study_app.gui.designer.repair_button import RepairButton
+from study_app.viewmodels.designer.requests import ChangeLanguage
 
 pytestmark = pytest.mark.slow
 
@@ -106,3 +108,49 @@ def test_a_repair_that_is_pressed_right_after_an_edit_is_made(qtbot: Any, broken
     broken.editing.type_text("Add a comment", broken.text + "# a comment\n")
     broken.place.problems.repair_asked.emit(second, words)
     assert [problem.fault.path for problem in broken.place.view.problems] == [first.fault.path]
+
+
+def test_a_repair_that_is_clicked_after_tab_led_to_it_shows_what_was_repaired(qtbot: Any, broken: Any) -> None:
+    first, _second = broken.place.view.problems
+    press(qtbot, KEY.Key_F8)
+    repair = press(qtbot, KEY.Key_Tab)
+    qtbot.mouseClick(repair, Qt.MouseButton.LeftButton)
+    assert len(broken.place.view.problems) == 1
+    assert broken.editing.selected == first.element
+
+
+def test_repairs_that_are_found_later_leave_the_keyboard_at_the_repairs(
+    qtbot: Any, designer: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("study_app.app.designer.repair_search.REST_MS", 1_000_000)  # only what the test finds
+    designer.controller.open("kitchen")
+    for language in ("nl", "ar"):
+        designer.editing.ask(ChangeLanguage("add", language))
+    path = ("pages", "welcome", "title")
+    designer.select(path[:2])
+    title, study = designer.row(*path), designer.editing.opened.study
+    found = {
+        row: tuple(repair.words for repair in repairs(study, row.fault))
+        for row in designer.place.view.problems
+        if row.fault.path == path
+    }
+    dutch, arabic = found
+    designer.place.show_repairs(arabic, found[arabic])
+    title.repairs[0].setFocus(Qt.FocusReason.TabFocusReason)
+    designer.place.show_repairs(dutch, found[dutch])
+    words = ["Copy English to Dutch", "Copy English to Arabic"]
+    assert sorted(button.text() for button in title.repairs) == sorted(words)
+    repair = QApplication.focusWidget()
+    assert repair in title.repairs
+    assert repair.text() == words[1]
+    designer.place.show_repairs(arabic, ())
+    repair = QApplication.focusWidget()
+    assert repair in title.repairs
+    assert repair.text() == words[0]
+    designer.place.show_repairs(dutch, ())
+    assert not title.repairs
+    assert title.field.isAncestorOf(QApplication.focusWidget())
+    designer.place.show_repairs(dutch, found[dutch])
+    title.repairs[0].click()
+    document = designer.editing.opened.study.document["pages"]["welcome"]["title"]
+    assert document == {"en": document["en"], "nl": document["en"]}

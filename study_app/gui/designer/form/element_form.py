@@ -142,9 +142,7 @@ class FormCard(Card):
         self._replace(inside)
         self.area.verticalScrollBar().setValue(down_px)
         QTimer.singleShot(0, self.area, lambda: self._settle(down_px, other=before is None))
-        if focused is not None:
-            self.focus(focused, caret)
-        elif inside_form:
+        if (focused is None or not self.focus(focused, caret)) and inside_form:
             self.focus_first()
 
     def _settle(self, down_px: int, *, other: bool) -> None:
@@ -316,7 +314,7 @@ class FormCard(Card):
         inner = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
         found = max(inner, key=lambda row: len(row.row.row.path), default=None)
         if found is None:
-            if (button := self.adds.get(path)) is not None:
+            if (button := {self._now(key): made for key, made in self.adds.items()}.get(path)) is not None:
                 button.setFocus(Qt.FocusReason.OtherFocusReason)
                 self.area.ensureWidgetVisible(button)
             return button is not None

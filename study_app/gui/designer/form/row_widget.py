@@ -155,9 +155,8 @@ class RowWidget(Themed, QWidget):
         if offered == self._offered:
             return
         self._offered = offered
-        for button in self.repairs:
-            remove_widget(button)
-        self.repairs = []
+        before, self.repairs = self.repairs, []
+        held = next((button.text() for button in before if button.hasFocus()), None)
         several = len(offered) > 1
         asked = [(one, word) for one, words in offered.items() for word in words[: 1 if several else 2]]
         times = Counter(word for _problem, word in asked)
@@ -173,6 +172,12 @@ class RowWidget(Themed, QWidget):
             if part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.window() is self.window():
                 last = part
         lead_by_tab(last, self.repairs)
+        if held is not None and not self.repairs:
+            self.field.take_keyboard()
+        elif held is not None:  # the same words again, where they are still offered
+            min(self.repairs, key=lambda one: one.text() != held).setFocus(Qt.FocusReason.OtherFocusReason)
+        for button in before:
+            remove_widget(button)
 
     @property
     def help(self) -> str:
