@@ -57,3 +57,26 @@ def test_tab_marks_a_sentence_so_that_what_is_typed_replaces_it(qtbot: Any, reas
     field.show_text("New question")
     QApplication.sendEvent(field, QFocusEvent(QEvent.Type.FocusIn, Qt.FocusReason[reason]))
     assert field.textCursor().selectedText() == marked
+
+
+def test_numbers_are_counted_by_keys_and_taken_ids_refused_while_typing(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.select(("blocks", "liquids"))
+    path = ("blocks", "liquids", "repetitions")
+    line = designer.row(*path).field.line
+    before = designer.editing.opened.study.document["blocks"]["liquids"]["repetitions"]
+    line.setFocus()
+    qtbot.keyClick(line, Qt.Key.Key_Up)
+    qtbot.keyClick(line, Qt.Key.Key_Up)
+    assert designer.editing.opened.study.document["blocks"]["liquids"]["repetitions"] == before + 2
+    qtbot.keyClick(line, Qt.Key.Key_Down)
+    assert line.text() == str(before + 1)
+    designer.editing.undo()
+    assert designer.editing.opened.study.document["blocks"]["liquids"]["repetitions"] == before
+    head = designer.place.form.head
+    head.id.setFocus()
+    head.id.selectAll()
+    qtbot.keyClicks(head.id, "delays")
+    assert "is taken" in head.refusal.text()
+    qtbot.keyClicks(head.id, "2")
+    assert not head.refusal.text()
