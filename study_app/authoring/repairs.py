@@ -24,6 +24,7 @@ from study_app.protocol.wording.languages import language_name
 _MEANT: Final = re.compile(r'did you mean "([^"]+)"\?')
 _BOUND: Final = re.compile(r"must be (?:at least |at most )?([\d.e+-]+)(?: |$)")
 _ORDER: Final = re.compile(r'belongs to order = "([a-z]+)"')
+_NUMBER: Final = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 _OUTSIDE: Final = re.compile(r"([xyz]) = [-\d.e+]+ mm with radius ([\d.e+-]+) mm leaves the tank")
 _HALVINGS: Final = 12
 
@@ -111,11 +112,22 @@ def _targets(study: Study, fault: Fault) -> Iterator[Repair]:
 
 
 def _within_bounds(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the nearest permitted number."""
+    """Yield the nearest permitted number; of one with a wrong sign that without it."""
     if found := _BOUND.search(fault.message):
-        number = float(found[1])
+        now, number = value_at(study.document, fault.path), float(found[1])
+        if isinstance(now, int | float) and now < 0 < number:
+            yield Repair(f"Use {shown(-now)}", (Set(fault.path, -now),))
+            return
         value = int(number) if number.is_integer() else number
         yield Repair(f"Use {found[1]}", (Set(fault.path, value),))
+
+
+def _quoted_numbers(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the number that a text holds where a number must be."""
+    text = value_at(study.document, fault.path)
+    if isinstance(text, str) and "number" in fault.message and _NUMBER.fullmatch(text.strip()):
+        value = float(text) if {*text} & {*".eE"} else int(text)
+        yield Repair(f"Use {text.strip()} as a number", (Set(fault.path, value),))
 
 
 def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
@@ -188,5 +200,6 @@ def _exponent(value: float, digits: int) -> int:
 
 
 _KINDS: Final[tuple[Callable[[Study, Fault], Iterator[Repair]], ...]] = (
-    _meant, _named, _within_bounds, _levels, _targets, _texts, _steps, _constrained, _missing, _surplus,
+    _meant, _named, _within_bounds, _quoted_numbers, _levels, _targets, _texts, _steps, _constrained, _missing,
+    _surplus,
 )  # fmt: skip

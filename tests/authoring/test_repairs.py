@@ -40,6 +40,8 @@ def _repaired(case: Case) -> int:
     [
         ("demo", ('liquid = "thick"', 'liquid = "thik"'), 'Use "thick"'),
         ("demo", ("force_limit_n = 6", "force_limit_n = 60"), "Use 8"),
+        ("demo", ("force_limit_n = 6", "force_limit_n = -6"), "Use 6"),
+        ("demo", ("force_limit_n = 6", 'force_limit_n = "6"'), "Use 6 as a number"),
         ("demo", ("targets_mm = [[-30, 0, 0], [30, 0, 0]]", "targets_mm = [[-30, 0, 0], [48, 0, 0]]"), "Move to 44 mm"),
         (
             "demo",
