@@ -11,7 +11,10 @@ from study_app.gui.widgets.controls import Choice
 from study_app.viewmodels.designer.designer_view import StudyChoice
 
 MARK_PX = 28
-OPENS = {Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Return, Qt.Key.Key_Enter}
+OPENS = {
+    Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Home, Qt.Key.Key_End,
+    Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space, Qt.Key.Key_F4,
+}  # fmt: skip
 Index = QModelIndex | QPersistentModelIndex
 
 
@@ -36,7 +39,7 @@ class StudyLine(QStyledItemDelegate):
 
 
 class StudyList(Choice):
-    """The studies that can be opened; an arrow key opens the list, it does not open another study."""
+    """The studies that can be opened; keys open the list, none of them opens another study."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -56,7 +59,7 @@ class StudyList(Choice):
             self.view().setCurrentIndex(self.model().index(0, self.modelColumn()))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Open the list at an arrow key and at Enter, as at Space, and at a letter."""
+        """Open the list at the keys of `OPENS` and at a letter; Qt would open another study at some of them."""
         shift_or_pad = Qt.KeyboardModifier.KeypadModifier | Qt.KeyboardModifier.ShiftModifier
         letter = event.text().strip() if event.text().isprintable() else ""
         if (event.key() in OPENS or letter) and not event.modifiers() & ~shift_or_pad:
@@ -64,4 +67,4 @@ class StudyList(Choice):
             if letter:
                 self.view().keyboardSearch(letter)
         else:
-            super().keyPressEvent(event)
+            event.ignore()

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.protocol.source.files import shipped
@@ -67,7 +68,13 @@ def test_keys_open_the_list_and_no_other_study(qtbot: Any, designer: Any) -> Non
     box, opened = designer.place.header.study, designer.editing.opened
     qtbot.keyClick(box, Qt.Key.Key_Escape)
     assert not box.view().isVisible()
-    for key in (Qt.Key.Key_Down, Qt.Key.Key_Return, Qt.Key.Key_Z):
+    altgr = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier
+    QApplication.sendEvent(box, QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Z, altgr, "z"))
+    assert designer.editing.opened is opened
+    qtbot.keyClick(box, Qt.Key.Key_Home, Qt.KeyboardModifier.ControlModifier)
+    assert designer.editing.opened is opened
+    moves = (Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Up, Qt.Key.Key_Down)
+    for key in (*moves, Qt.Key.Key_Return, Qt.Key.Key_Space, Qt.Key.Key_F4, Qt.Key.Key_Z):
         box.setFocus()
         qtbot.keyClick(box, key)
         assert box.view().isVisible(), key
