@@ -71,7 +71,7 @@ class ProblemSteps(QObject):
         """Make a repair; one that was made by keys leads to the next problem, and the last one to its field."""
         here = self._card.window().focusWidget()
         by_keys = isinstance(here, RepairButton) and here.by_keys and here.problem == row
-        self._card.note(row)
+        self._card.set_current(row)
         self.repair_asked.emit(row, words)
         if by_keys and self._problems and row not in self._problems:
             self._card.open_next()

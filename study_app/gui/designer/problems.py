@@ -194,13 +194,13 @@ class ProblemsCard(Card):
         """Return the buttons that repair a problem."""
         return [button for line in self.lines for button in line.repairs if line.row == problem]
 
-    def note(self, row: ProblemRow) -> None:
-        """Note at which problem one is."""
+    def set_current(self, row: ProblemRow) -> None:
+        """Take a problem as the one that one is at; `open_next` goes on from there."""
         if row in self.rows:
             self.at, self._number = row, self.rows.index(row)
 
     def _open(self, row: ProblemRow) -> None:
-        self.note(row)
+        self.set_current(row)
         for line in self.lines:
             line.here = line.row == row
             line.update()
