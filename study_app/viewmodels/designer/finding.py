@@ -40,12 +40,17 @@ class FoundField:
     rank: int = LABEL
 
 
+def words_sought(words: str) -> list[str]:
+    """Return the words that are looked for, each without the "s" of a plural."""
+    return [part.removesuffix("s") if len(part) > SHORTEST else part for part in words.casefold().split()]
+
+
 def found_fields(study: Study, words: str) -> tuple[FoundField, ...]:
     """Return the fields whose labels or choices have words that begin so, labels first.
 
     Choices that are not chosen count where no label and nothing that is chosen has the words; sentences count last.
     """
-    parts = [part.removesuffix("s") if len(part) > SHORTEST else part for part in words.casefold().split()]
+    parts = words_sought(words)
     if not parts or len(words.strip()) < SHORTEST:
         return ()
     found = [one for field in _fields(study) for one in _found_in(field, parts)]

@@ -11,6 +11,7 @@ from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.addable import Addable
+from study_app.viewmodels.designer.finding import words_sought
 
 WIDTH, HIGHEST, ROW_PX, HELP_PX = 360, 520, 34, 78
 MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
@@ -81,7 +82,7 @@ class AddList(Themed, QFrame):
     def _type(self, words: str) -> None:
         self._fields = ()
         self.typed.emit(words)
-        wanted = [part.removesuffix("s") for part in words.casefold().split()]
+        wanted = words_sought(words)
         self.list.clear()
         fitting = (one for one in self._every if all(part in f"{one.words} {one.help}".casefold() for part in wanted))
         for one in (*fitting, *self._fields):
