@@ -11,6 +11,7 @@ from study_app.gui.designer.arrangement import Arrangement
 from study_app.gui.designer.designer_header import DesignerHeader
 from study_app.gui.designer.pane.file_editor import FileCard
 from study_app.gui.designer.problems import ProblemsCard
+from study_app.gui.widgets.main_view import last_focused
 from study_app.viewmodels.designer.outline_rows import ElementPath
 
 SHORTCUT = Qt.FocusReason.ShortcutFocusReason
@@ -62,14 +63,14 @@ class FocusAreas:
 
     def switch_to_file(self) -> None:
         """Go to the file, and from there back to where the keyboard was in the form."""
-        last: QWidget | None = self._parts.form.focusWidget()
         if not self._file.editor.hasFocus():
             self.show_tab("file")
-        elif last is None:
-            self.focus_form()
-        else:
-            self._parts.show_side("form")
+            return
+        self._parts.show_side("form")
+        if (last := last_focused(self._parts.form)) is not None:
             last.setFocus(SHORTCUT)
+        else:
+            self._parts.form.focus_first()
 
     def cycle(self, by: int) -> None:
         """Go to the next part, or to the one before."""

@@ -15,7 +15,7 @@ from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme, apply_theme_within
 from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.main_view import Place
+from study_app.gui.widgets.main_view import Place, last_focused
 
 FULL = QSize(1440, 900)
 LEAST = QSize(1024, 640)
@@ -167,8 +167,7 @@ class MainWindow(QMainWindow):
         """Give a place the keyboard of its button in the rail: to the part that had it last, else to the first."""
         if self.focusWidget() is not button:
             return
-        last = place.focusWidget()
-        if last not in {None, place} and last.isVisible() and last.isEnabled():
+        if (last := last_focused(place)) is not None:
             last.setFocus(Qt.FocusReason.OtherFocusReason)
             return
         place.setFocus()

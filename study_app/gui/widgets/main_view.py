@@ -26,3 +26,9 @@ class Place(Themed, QWidget):
     def wants_narrow_rail(self) -> bool:
         """Return whether the place needs the width that a wide rail takes."""
         return False
+
+
+def last_focused(part: QWidget) -> QWidget | None:
+    """Return what in a part had the keyboard last, if it is shown and enabled."""
+    last = part.focusWidget()
+    return last if last not in {None, part} and last.isVisible() and last.isEnabled() else None

@@ -75,13 +75,18 @@ def test_a_field_that_is_added_has_the_keyboard(qtbot: Any, designer: Any) -> No
     assert added.isAncestorOf(keyboard)
 
 
-def test_ctrl_e_goes_to_the_file_and_back_to_the_same_field(qtbot: Any, designer: Any) -> None:
+@pytest.mark.parametrize("width", [1600, 1024])
+def test_ctrl_e_goes_to_the_file_and_back_to_the_same_field(qtbot: Any, designer: Any, width: int) -> None:
+    designer.window.resize(width, 640)
     designer.controller.open("kitchen")
     designer.select(("blocks", "liquids"))
     field = designer.row("blocks", "liquids", "repetitions").field.line
     field.setFocus()
     assert press(qtbot, KEY.Key_E, CONTROL) is designer.place.file.editor
     assert press(qtbot, KEY.Key_E, CONTROL) is field
+    assert press(qtbot, KEY.Key_E, CONTROL) is designer.place.file.editor
+    field.setEnabled(False)
+    assert first_row(designer).isAncestorOf(press(qtbot, KEY.Key_E, CONTROL)), "the field cannot take the keyboard"
 
 
 def test_the_first_row_has_the_keyboard_where_undo_removes_the_row_that_had_it(qtbot: Any, designer: Any) -> None:
