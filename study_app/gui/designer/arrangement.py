@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QRect, QSize, Qt, Signal
+from PySide6.QtCore import QRect, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
@@ -21,7 +21,6 @@ from study_app.viewmodels.designer.keys import key_cap, tip
 OUTLINE_PX, DRAWER_PX = 284, 320
 DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
 GAP = 14 - 2 * SHADOW
-ENTER = {Qt.Key.Key_Return, Qt.Key.Key_Enter}
 FORM_SHARE = 44
 """Percent of the width that the form takes beside the views."""
 
@@ -139,9 +138,6 @@ class Arrangement(QWidget):
         self._whole.addWidget(outline)
         self._whole.addLayout(right, 1)
         outline.setFixedWidth(OUTLINE_PX)
-        outline.settled.connect(lambda: self._go_to_form() if self.drawer else None)
-        for part in (outline.tree, outline.words):
-            part.installEventFilter(self)
         application = QApplication.instance()
         assert isinstance(application, QApplication)  # noqa: S101 - a window has one
         application.focusChanged.connect(self._follow_focus)
@@ -201,22 +197,19 @@ class Arrangement(QWidget):
         """Close the drawer, where there is one; the button that opens it takes the keyboard that it had."""
         if self.drawer and self.outline.isVisible():
             had = self.outline.isAncestorOf(self.window().focusWidget() or self)
-            self.outline.hide()
+            self._hide_drawer()
             if had:
                 self.path.outline.setFocus(Qt.FocusReason.OtherFocusReason)
-
-    def _go_to_form(self) -> None:
-        """Go from the chosen element to its form; a drawer closes, and lists every element when it opens again."""
-        self.close_drawer()
-        if self.drawer:
-            self.outline.words.clear()
-        self.show_side("form")
-        self.form.focus_first()
 
     def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
         """Close the drawer when another part of the place takes the keyboard."""
         if self.drawer and now is not None and self.isAncestorOf(now) and not self.outline.isAncestorOf(now):
-            self.outline.hide()
+            self._hide_drawer()
+
+    def _hide_drawer(self) -> None:
+        """Hide the drawer; it lists every element when it opens again."""
+        self.outline.hide()
+        self.outline.words.clear()
 
     def _place_drawer(self) -> None:
         self.outline.setGeometry(QRect(0, 46, DRAWER_PX, max(200, self.height() - 46)))
@@ -227,17 +220,9 @@ class Arrangement(QWidget):
         if self.drawer:
             self._place_drawer()
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Close the drawer at Esc; go from the outline to the form at Enter."""
-        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
-            tree = self.outline.tree
-            if self.drawer and event.key() == Qt.Key.Key_Escape and not tree.dragged:
-                self.close_drawer()
-                return True
-            if watched is tree and event.key() in ENTER:
-                if self.outline.open_current():
-                    self.close_drawer()
-                else:
-                    self._go_to_form()
-                return True
-        return super().eventFilter(watched, event)
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Close the drawer at Esc."""
+        if self.drawer and self.outline.isVisible() and event.key() == Qt.Key.Key_Escape:
+            self.close_drawer()
+        else:
+            super().keyPressEvent(event)

@@ -33,9 +33,15 @@ class FocusAreas:
         self._parts.form.focus_first()
 
     def focus_field(self, path: ElementPath) -> None:
-        """Go to a field of the form."""
+        """Go to a field of the form; where it has no row, to the first row."""
         self._parts.show_side("form")
-        self._parts.form.focus(path)
+        if not self._parts.form.focus(path):
+            self._parts.form.focus_first()
+
+    def leave_drawer(self) -> None:
+        """Go to the form where the outline is a drawer."""
+        if self._parts.drawer:
+            self.focus_form()
 
     def focus_element(self) -> None:
         """Go to the selected element: to its row, or to its form where the outline is a drawer."""

@@ -125,6 +125,8 @@ class DesignerPlace(Place):
         outline.chosen.connect(self._select)
         outline.find_changed.connect(self.find_changed)
         outline.field_asked.connect(self.areas.focus_field)
+        outline.form_asked.connect(self.areas.focus_form)
+        outline.element_clicked.connect(self.areas.leave_drawer)
         outline.add_asked.connect(self.ask_to_add)
         outline.duplicate_asked.connect(self._duplicate)
         outline.delete_asked.connect(self._delete)

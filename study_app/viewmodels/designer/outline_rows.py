@@ -53,6 +53,8 @@ class OutlineRow:
         Its entry in the list that orders it; () where it cannot be moved.
     field : tuple of str or int
         The field of it that was found, () where none was looked for.
+    named : bool
+        Whether what was looked for is in its title or id.
     """
 
     path: Path
@@ -64,6 +66,7 @@ class OutlineRow:
     name: str = ""
     step: Path = ()
     field: Path = ()
+    named: bool = False
 
 
 def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
@@ -97,8 +100,8 @@ def _found(study: Study, row: OutlineRow, words: str, field: FoundField | None) 
     named = found(study.document, row.path, words, named=True)
     if field is not None and (field.rank == LABEL or not named):
         title, name = f"{row.title} · {field.label}", f"{row.name}, field {field.label}"
-        return replace(row, title=title, name=name, field=field.field)
-    return row if named or found(study.document, row.path, words) else None
+        return replace(row, title=title, name=name, field=field.field, named=named)
+    return replace(row, named=named) if named or found(study.document, row.path, words) else None
 
 
 def icon_of(path: Path, document: Mapping[str, Any]) -> str:

@@ -84,6 +84,15 @@ def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: 
     assert ("blocks", "liquids") not in expanded(small)
 
 
+@pytest.mark.parametrize("part", ["words", "tree"])
+def test_esc_closes_the_drawer(qtbot: Any, small: Any, part: str) -> None:
+    open_drawer(qtbot, small)
+    getattr(small.place.outline, part).setFocus()
+    qtbot.keyClick(QApplication.focusWidget(), KEY.Key_Escape)
+    assert not small.place.outline.isVisible()
+    assert small.place.parts.path.outline.hasFocus()
+
+
 def test_what_was_found_is_gone_to_by_enter_and_the_drawer_lists_all_again(qtbot: Any, small: Any) -> None:
     outline, tree = small.place.outline, small.place.outline.tree
     open_drawer(qtbot, small)

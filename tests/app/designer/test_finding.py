@@ -72,6 +72,15 @@ def test_down_leads_into_the_tree_and_enter_or_a_click_there_to_the_field(qtbot:
     assert has_keyboard(designer, "conditions", "thick", "delay_ms")
 
 
+def test_down_without_words_leads_to_the_selected_element(qtbot: Any, designer: Any, find: Any) -> None:
+    find("")
+    designer.select(("conditions", "thin"))
+    designer.place.parts.focus_find()
+    qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Down)
+    assert designer.place.outline.tree.hasFocus()
+    assert designer.editing.selected == ("conditions", "thin")
+
+
 def test_a_key_that_the_file_does_not_have_leads_to_the_button_that_adds_it(
     qtbot: Any, designer: Any, find: Any
 ) -> None:
@@ -90,6 +99,14 @@ def test_a_title_that_has_the_words_comes_without_a_field(qtbot: Any, designer: 
     assert designer.place.outline.tree.hasFocus()
 
 
+def test_a_title_that_has_the_words_comes_before_a_field(qtbot: Any, designer: Any, find: Any) -> None:
+    designer.controller.open("rek2024")
+    assert find("break")[0] == "Practice · Break every"
+    qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Return)
+    assert designer.editing.selected[0] == "pages"
+    assert designer.place.outline.tree.hasFocus()
+
+
 def test_the_words_are_cleared_when_another_study_opens(designer: Any, find: Any) -> None:
     find("williams")
     designer.controller.open("rek2024")
@@ -104,6 +121,27 @@ def test_enter_in_the_drawer_closes_it_and_goes_to_the_field(qtbot: Any, designe
     qtbot.keyClick(designer.place.outline.words, Qt.Key.Key_Return)
     assert has_keyboard(designer, "device", "force_limit_n")
     assert not designer.place.outline.isVisible()
+    assert designer.place.outline.words.text() == ""
+
+
+@pytest.mark.parametrize("way", ["click", "Enter"])
+def test_a_found_field_in_the_drawer_leads_to_that_field(qtbot: Any, designer: Any, find: Any, way: str) -> None:
+    outline, tree = designer.place.outline, designer.place.outline.tree
+    designer.window.resize(1024, 640)
+    QApplication.processEvents()
+    find("delay")
+    at = next(one for one in outline.indexes() if one.data(ROW_ROLE).path == ("conditions", "thin"))
+    tree.scrollTo(at)
+    if way == "click":
+        qtbot.mouseClick(tree.viewport(), LEFT, pos=tree.visualRect(at).center())
+    else:
+        tree.setCurrentIndex(at)
+        qtbot.keyClick(tree, Qt.Key.Key_Return)
+    assert designer.editing.selected == ("conditions", "thin")
+    assert has_keyboard(designer, "conditions", "thin", "delay_ms")
+    assert not outline.isVisible()
+    assert outline.words.text() == ""
+    assert ("pages", "welcome") in [row.path for row in outline.rows], "it lists every element when it opens again"
 
 
 def test_the_list_of_what_can_be_added_offers_fields_to_go_to(qtbot: Any, designer: Any) -> None:

@@ -12,17 +12,17 @@ from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
-from study_app.viewmodels.designer.keys import key_cap, key_words, keys_of, tip
+from study_app.viewmodels.designer.keys import key_cap, key_words, keys_of, tip, with_key
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 
 
 class OutlineCard(Card):
     """Draws outline rows.
 
-    Signals: ``chosen`` (path), ``settled`` (an element was clicked), ``find_changed`` (words), ``add_asked``,
+    Signals: ``chosen`` (path), ``element_clicked``, ``form_asked`` (Enter), ``find_changed`` (words), ``add_asked``,
     ``duplicate_asked``, ``delete_asked``, ``copy_asked``, ``paste_asked``, ``rename_asked``, ``move_asked`` (by how
-    many places), ``field_asked`` (path of a field that was found), ``dropped`` (entries of a list, and the index of the
-    one that they come before), ``several_changed`` (what else is selected).
+    many places), ``field_asked`` (path of a field that was found, instead of the first two), ``dropped`` (entries of a
+    list, and the index of the one that they come before), ``several_changed`` (what else is selected).
     """
 
     chosen = Signal(object)
@@ -30,7 +30,8 @@ class OutlineCard(Card):
     add_asked = Signal()
     duplicate_asked = Signal()
     delete_asked = Signal()
-    settled = Signal()
+    element_clicked = Signal()
+    form_asked = Signal()
     copy_asked = Signal()
     paste_asked = Signal()
     rename_asked = Signal()
@@ -59,10 +60,10 @@ class OutlineCard(Card):
         self.items = QStandardItemModel(self.tree)
         self.tree.setModel(self.items)
         self.add = ActionButton("plus", "Add", cap=key_cap("add"), height=40)
-        self.add.setAccessibleName("Add an element (Insert)")
+        self.add.setAccessibleName(f"Add an element ({keys_of('add')[0]})")
         self.add.setToolTip(tip("add"))
         self.duplicate = ActionButton("copy", "Duplicate", height=40)  # there is no room for the cap of its key
-        self.duplicate.setAccessibleName("Duplicate the selected element (Ctrl+D)")
+        self.duplicate.setAccessibleName(with_key("Duplicate the selected element", "duplicate"))
         self.duplicate.setToolTip(tip("duplicate"))
         for button in (self.add, self.duplicate):
             button.setFont(font("label", weight=600))
@@ -82,7 +83,7 @@ class OutlineCard(Card):
         self.tree.expanded.connect(lambda index: None if self._finding else self._opened.add(self._key(index)))
         self.tree.collapsed.connect(lambda index: self._opened.discard(self._key(index)))
         self.tree.key_pressed.connect(self._key_pressed)
-        self.tree.entered_row.connect(self.open_current)
+        self.tree.entered_row.connect(self._enter_row)
         self.tree.copy_asked.connect(self.copy_asked)
         self.tree.paste_asked.connect(self.paste_asked)
         self.tree.dropped.connect(self.dropped)
@@ -209,16 +210,20 @@ class OutlineCard(Card):
             self.chosen.emit(index.data(ROW_ROLE).path)
 
     def _click(self, index: QModelIndex) -> None:
-        """Open or close the heading of several, or what its sign is clicked of; else settle on the element."""
+        """Open or close the heading of several, or what its arrow is clicked of; else go to what was found."""
         heading = self.items.hasChildren(index) and len(index.data(ROW_ROLE).path) == 1
-        if heading or self.tree.pressed_sign:
+        if heading or self.tree.arrow_pressed:
             self.tree.setExpanded(index, not self.tree.isExpanded(index))
         else:
             self.tree.expand(index)
-            self.settled.emit()
-        self.open_current()
+            if not self._open_field():
+                self.element_clicked.emit()
 
-    def open_current(self) -> bool:
+    def _enter_row(self) -> None:
+        if not self._open_field():
+            self.form_asked.emit()
+
+    def _open_field(self) -> bool:
         """Go to the field of the current row that was found; return whether there is one."""
         current = self.tree.currentIndex()
         field: ElementPath = current.data(ROW_ROLE).field if current.isValid() else ()
@@ -228,9 +233,8 @@ class OutlineCard(Card):
 
     def _go_to_first(self) -> bool:
         """Select the first element that is called so, else the first with a field that is; return whether one is."""
-        words = self.words.text().strip().casefold()
         rows = [(index, index.data(ROW_ROLE)) for index in self.indexes() if index.data(ROW_ROLE).path]
-        called = [index for index, row in rows if words in row.title.casefold()]
+        called = [index for index, row in rows if row.named]
         with_field = [index for index, row in rows if row.field]
         first = next(iter((*called, *with_field, *(index for index, _ in rows))), None)
         if first is not None:
@@ -239,13 +243,13 @@ class OutlineCard(Card):
 
     def _open_first(self) -> None:
         """Select the first element that was found, and go to its field."""
-        if self.words.text().strip() and self._go_to_first() and not self.open_current():
+        if self.words.text().strip() and self._go_to_first() and not self._open_field():
             self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Go from the words that find into the tree by Down."""
+        """Go from the words that find into the tree by Down, to the first element that was found."""
         down = event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Down
-        if down and self._go_to_first():
+        if down and (not self.words.text().strip() or self._go_to_first()):
             self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
             return True
         return super().eventFilter(watched, event)

@@ -46,7 +46,7 @@ class Tree(Themed, QTreeView):
         self.setStyleSheet("QTreeView { background: transparent; border: none; outline: none; }")
         self.dragged: tuple[ElementPath, ...] = ()
         self.target: tuple[int, float] | None = None
-        self.pressed_sign = False
+        self.arrow_pressed = False
         self._pressed: tuple[QPoint, tuple[ElementPath, ...]] | None = None
 
     def apply_theme(self, theme: Theme) -> None:
@@ -92,8 +92,8 @@ class Tree(Themed, QTreeView):
         index = self.indexAt(event.position().toPoint())
         row = index.data(ROW_ROLE) if index.isValid() else None
         self._pressed = None
-        sign = row is not None and self.model().hasChildren(index) and event.position().x() < sign_right(row)
-        self.pressed_sign = sign
+        arrow = row is not None and self.model().hasChildren(index) and event.position().x() < sign_right(row)
+        self.arrow_pressed = arrow
         plain = event.button() == Qt.MouseButton.LeftButton and not event.modifiers()
         if plain and row is not None and row.step and self.rows.movable:
             selected = [one.step for one in self.selected_rows() if one.step[:-1] == row.step[:-1]]
