@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import math
-
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QLineEdit
 
 from study_app.gui.theme.theme import font
+from study_app.number_text import MINUS, number_of
 
-MINUS = "\u2212"
-SPACES = str.maketrans({" ": None, "\u00a0": None, "\u2009": None, "\u202f": None, MINUS: "-", ",": "."})
 NUMERALS = set("0123456789.,+-eE \u00a0\u2009\u202f" + MINUS)
 
 
 def read_number(text: str) -> float | None:
     """Return the number that a text says, with comma or point, real minus or hyphen; None where it says none."""
-    try:
-        found = float(text.translate(SPACES))
-    except ValueError:
-        return None
-    return found if math.isfinite(found) else None
+    found = number_of(text)
+    return None if found is None else float(found)
 
 
 def write_number(value: float, decimals: int) -> str:

@@ -22,13 +22,13 @@ from study_app.gui.designer.form.row_fields import (
     SwitchField,
     UnknownField,
     add_button,
-    read_number,
     written,
 )
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import Choice
+from study_app.number_text import number_of
 from study_app.viewmodels.designer.form_rows import STUDY_LANGUAGES, Entry, FormRow, new_words
 from study_app.viewmodels.designer.keys import with_key
 from study_app.viewmodels.designer.requests import AddElement, AddEntry, AddNamed, SetValue, Several
@@ -148,7 +148,7 @@ class LinesField(EntryList):
         """Return the value that a line says, None where it is not a point."""
         if self.row.row.kind == "texts":
             return text
-        numbers = [read_number(part) for part in NUMBERS_APART.split(text.strip())]
+        numbers = [number_of(part) for part in NUMBERS_APART.split(text.strip())]
         return None if None in numbers else numbers
 
     def _take(self, at: int, text: str) -> None:

@@ -13,6 +13,7 @@ from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label
+from study_app.number_text import number_of
 from study_app.viewmodels.designer.form_rows import FormRow, choice_words, new_words
 from study_app.viewmodels.designer.keys import with_key
 from study_app.viewmodels.designer.requests import AddNamed, RemoveKey, SetValue, SwitchKind
@@ -99,7 +100,7 @@ class LineField(Field):
     def _step(self, by: int) -> None:
         """Count up or down, in the last digit that is shown."""
         shown = self.line.text().strip() or str(self.row.row.default or 0)
-        number = read_number(shown)
+        number = number_of(shown)
         if number is None or self.line.isReadOnly():
             return
         digits = len(shown.replace(",", ".").partition(".")[2]) if isinstance(number, float) else 0
@@ -121,12 +122,12 @@ class LineField(Field):
         if not text.strip() and row.value is not None and not row.required and row.kind != "text":
             self.asked.emit(RemoveKey(row.path))
         elif row.kind in {"number", "whole number"}:
-            value = read_number(text)
+            value = number_of(text)
             if value is None or (row.kind == "whole number" and isinstance(value, float)):
                 wanted = "a whole number" if row.kind == "whole number" else "a number"
                 self.refusal = f"“{text}” is not {wanted}: the study keeps the last value."
         elif row.kind in {"numbers", "vector"}:
-            parts = [read_number(part) for part in NUMBERS_APART.split(text.strip())]
+            parts = [number_of(part) for part in NUMBERS_APART.split(text.strip())]
             value = parts
             if None in parts:
                 self.refusal = f"“{text}” is not a list of numbers: write them with spaces between."
@@ -293,20 +294,6 @@ def add_button(name: str, words: str = "") -> ActionButton:
     made.setFont(font("label"))
     made.setAccessibleName(name)
     return made
-
-
-def read_number(text: str) -> int | float | None:
-    """Return the number that a text says, whole where it is written so; None where it says none."""
-    plain = text.strip().replace("\u2212", "-").replace(",", ".")
-    try:
-        return int(plain)
-    except ValueError:
-        pass
-    try:
-        value = float(plain)
-    except ValueError:
-        return None
-    return value if abs(value) != float("inf") and value == value else None  # noqa: PLR0124 - NaN
 
 
 def written(value: Any) -> str:

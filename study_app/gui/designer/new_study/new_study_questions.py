@@ -8,11 +8,11 @@ from typing import Any, Final
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QWidget
 
-from study_app.gui.designer.form.row_fields import read_number
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.controls import Check
 from study_app.gui.widgets.labels import label
+from study_app.number_text import number_of
 from study_app.viewmodels.designer.new_study import (
     Answers,
     OwnQuestion,
@@ -122,7 +122,7 @@ class Questions(Themed, QWidget):
             text = field.text().strip()
             if not text or text == question.value:
                 continue
-            numbers = [read_number(part) for part in _PARTS.split(text)]
+            numbers = [number_of(part) for part in _PARTS.split(text)]
             if None in numbers or (len(numbers) > 1 and not question.several):
                 return f"{question.words}: “{text}” is not {'numbers' if question.several else 'a number'}"
             values.append((question.path, numbers if question.several else numbers[0]))

@@ -7,12 +7,13 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout
 
-from study_app.gui.designer.form.row_fields import Field, add_button, read_number
+from study_app.gui.designer.form.row_fields import Field, add_button
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.tank_view import TankView
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import figures, label
+from study_app.number_text import number_of
 from study_app.viewmodels.designer.form_rows import FormRow
 from study_app.viewmodels.designer.requests import AddEntry, RemoveKey, SetValue
 from study_app.viewmodels.designer.special.targets import Point
@@ -92,7 +93,7 @@ class TargetsField(Field):
         self.asked.emit(SetValue((*self.row.row.path, number), value, by_keys))
 
     def _take(self, number: int, axis: int, text: str) -> None:
-        value = read_number(text)
+        value = number_of(text)
         self.refusal = "" if value is not None else f"“{text}” is not a number: the study keeps the last value."
         self.lines[number][axis].show_refused(value is None)
         self.came.emit()
