@@ -14,6 +14,7 @@ from study_app.authoring.names import references_to, renamed
 from study_app.authoring.writer.edits import Edit, Insert, Set
 from study_app.authoring.writer.refused import Refused
 from study_app.haptics.model.liquid import MAX_ID
+from study_app.number_text import MINUS, exact_text, number_of
 from study_app.protocol.source.document import Path, names, value_at
 
 MOST: Final = 24
@@ -21,8 +22,8 @@ MOST: Final = 24
 NUMBERS: Final = frozenset({"number", "whole number"})
 """Kinds of rows that hold one number."""
 _DEEPEST: Final = 2
-_NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_LAST_OF_ID: Final = re.compile(r"_(?:minus_)?\d+(?:_\d+)?$")
+_APART: Final = re.compile(r"[\s;]+|,(?!\d)|(?<!\d),")
+"""What separates values; a comma between two digits may also be a decimal comma."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,23 +82,25 @@ def members(study: Study, path: Path, row: Row, text: str) -> tuple[Member, ...]
     row : Row
         The number that differs, one of `number_rows`.
     text : str
-        The values, separated by spaces, commas or lines; each may be followed by the unit.
+        The values, separated by spaces, semicolons, lines, or commas with spaces; each may be followed by the unit.
 
     Raises
     ------
     Refused
-        A value is not a number that is permitted there, or is given twice, or there are fewer than two or too many.
+        A value is not a number that is permitted there, or is given twice, there are fewer than two or too many, or
+        a title is that of another element.
     """
     document, name = study.document, str(path[1])
     values = _values(document, row, text)
     taken = {*names(document, str(path[0]))} - {name}
-    numbered = _LAST_OF_ID.search(name)
-    own = numbered is not None and row.value is not None and numbered[0] == f"_{_word(row.value)}"
+    ending = "" if row.value is None else f"_{_word(row.value)}"
+    own = bool(ending) and name.endswith(ending)
     found: list[Member] = []
     for at, value in enumerate(values):
-        chosen = name if at == 0 and not own else _free(taken, _LAST_OF_ID.sub("", name), _word(value))
+        chosen = _free(taken, name.removesuffix(ending), _word(value)) if at or own else name
         taken.add(chosen)
         found.append(Member(value, chosen, tuple(_titles(document, path, value, row, first=at == 0))))
+    _refuse_known_titles(document, path, found)
     return tuple(found)
 
 
@@ -141,12 +144,14 @@ def _numbers(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[
 
 
 def _values(document: Mapping[str, Any], row: Row, text: str) -> tuple[int | float, ...]:
-    words = (word.removesuffix(row.unit) if row.unit else word for word in re.split(r"[\s,;]+", text))
+    words = [word for part in _APART.split(text) if (word := part.removesuffix(row.unit))]
+    commas = len(words) == 1 or any("," in apart for apart in _APART.findall(text.strip(" ,;\n")))
     found: list[int | float] = []
-    for word in filter(None, words):
-        if _NUMBER.fullmatch(word) is None:
+    for word in words:
+        if word.count(",") > (0 if commas else 1):
+            raise Refused(f'"{word}" may be one number or several: separate the values by spaces')
+        if (value := number_of(word)) is None:
             raise Refused(f'"{word}" is not a number')
-        value = int(word) if word.lstrip("+-").isdecimal() else float(word)
         if why := why_not(document, row, value):
             raise Refused(f"{word} is not permitted: {row.label} is {why}")
         if value in found:
@@ -161,7 +166,7 @@ def _values(document: Mapping[str, Any], row: Row, text: str) -> tuple[int | flo
 
 def _word(value: float) -> str:
     """Return a number as a part of an id: "0_5", "minus_60"."""
-    return f"{value:g}".replace("-", "minus_").replace("+", "").replace(".", "_")
+    return exact_text(value).replace("-", "minus_").replace(".", "_")[: MAX_ID // 2]
 
 
 def _free(taken: set[str], stem: str, word: str) -> str:
@@ -177,15 +182,28 @@ def _free(taken: set[str], stem: str, word: str) -> str:
 def _titles(
     document: Mapping[str, Any], path: Path, value: float, row: Row, *, first: bool
 ) -> Iterator[tuple[Path, str]]:
-    """Yield the titles of an element with a number; those of the first one only where they said its number before."""
-    title = value_at(document, (*path, "title"))
-    number = re.compile(rf"-?\d+(?:\.\d+)?(?=\s*(?:{re.escape(row.unit)})?\s*$)")
-    for language, text in title.items() if isinstance(title, Mapping) else (("", title),):
-        if not isinstance(text, str) or not text.strip():
-            continue
+    """Yield an element's titles with a number: in place of the one before, else at the end of all but the first."""
+    number = re.compile(rf"(?:(?<!\w)[-{MINUS}])?\d+(?:[.,]\d+)?(?=\s*(?:{re.escape(row.unit)})?\s*$)")
+    for place, text in _texts(document, path):
         last = number.search(text)
-        said = last is not None and row.value is not None and last[0] == f"{row.value:g}"
-        if said or (last is not None and not first):
-            yield ("title", *filter(None, [language])), number.sub(f"{value:g}", text)
+        if last is not None and number_of(last[0]) == row.value:
+            yield place, f"{text[: last.start()]}{exact_text(value)}{text[last.end() :]}"
         elif not first:
-            yield ("title", *filter(None, [language])), f"{text}, {value:g} {row.unit}".rstrip()
+            yield place, f"{text}, {exact_text(value)} {row.unit}".rstrip()
+
+
+def _texts(document: Mapping[str, Any], path: Path) -> Iterator[tuple[Path, str]]:
+    """Yield the titles of an element as they are, each with its place below the element."""
+    title = value_at(document, (*path, "title"))
+    for language, text in title.items() if isinstance(title, Mapping) else (("", title),):
+        if isinstance(text, str) and text.strip():
+            yield ("title", *filter(None, [language])), text
+
+
+def _refuse_known_titles(document: Mapping[str, Any], path: Path, made: list[Member]) -> None:
+    """Refuse a title that another element of the section has."""
+    others = (one for one in names(document, str(path[0])) if one != path[1])
+    known = {text: name for name in others for text in _texts(document, (path[0], name))}
+    for text in (text for one in made for text in one.titles):
+        if text in known:
+            raise Refused(f'"{known[text]}" has the title "{text[1]}" already')

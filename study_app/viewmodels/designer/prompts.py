@@ -10,6 +10,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row, label_of
 from study_app.authoring.outline import title_of
 from study_app.authoring.writer.refused import Refused
+from study_app.number_text import exact_text
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.sessions import counted
 
@@ -97,7 +98,7 @@ def series_plan(study: Study, path: Path, field: Path, values: str) -> SeriesPla
         return SeriesPlan(refusal=f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.")
     first = made[0].title if made[0].titles or made[0].name != path[1] else title_of(study.document, path)
     lines = (
-        f"{first if at == 0 else one.title}: {one.value:g} {row.unit}".rstrip() + f"  ·  {one.name}"
+        f"{first if at == 0 else one.title}: {exact_text(one.value)} {row.unit}".rstrip() + f"  ·  {one.name}"
         for at, one in enumerate(made)
     )
     return SeriesPlan(tuple(lines), make=f"Make {counted(len(made), singular(path[0]))}")

@@ -11,6 +11,8 @@ from study_app.authoring.writer.refused import Refused
 from study_app.protocol.source.document import Path
 from tests.authoring.grown import PROTOCOLS
 
+REK = (PROTOCOLS / "rek2024.toml").read_text(encoding="utf-8")
+TITLE = 'title = { en = "Baseline settings", nl = "Basisinstellingen" }'
 WATER = ("conditions", "water")
 DELAY = (*WATER, "delay_ms")
 
@@ -25,9 +27,14 @@ def made(study: Study, field: Path, text: str) -> list[tuple[str, str]]:
     return [(one.name, one.title) for one in members(study, field[:2], row, text)]
 
 
-@pytest.mark.parametrize("text", ["0 60 120", "0, 60,120", "0\n60\n 120 ms", " 0; 60ms; 120 "])
+@pytest.mark.parametrize("text", ["0 60 120", "0, 60, 120,", "0\n60\n 120 ms", " 0; 60ms; 120 ", "0ms,60ms,120ms"])
 def test_values_are_typed_with_spaces_commas_or_lines(study: Study, text: str) -> None:
     assert [name for name, _ in made(study, DELAY, text)] == ["water", "water_60", "water_120"]
+
+
+@pytest.mark.parametrize("text", ["0,5 1 1,5 ms", "0.5, 1, 1.5", "0,5;1;1,5", "0,5\n1\n1,5"])
+def test_decimal_commas_are_read(study: Study, text: str) -> None:
+    assert [name for name, _ in made(study, DELAY, text)[1:]] == ["water_1", "water_1_5"]
 
 
 @pytest.mark.parametrize(
@@ -38,7 +45,11 @@ def test_values_are_typed_with_spaces_commas_or_lines(study: Study, text: str) -
         ("0 1_0", '"1_0" is not a number'),
         ("0 2000", "2000 is not permitted: Delay is at most 1000"),
         ("-5 0", "-5 is not permitted: Delay is at least 0"),
+        ("\u22120,5 0", "\u22120,5 is not permitted: Delay is at least 0"),
         ("0 60 60.0", "60.0 is there twice"),
+        ("60,120", '"60,120" may be one number or several: separate the values by spaces'),
+        ("0, 60,120", '"60,120" may be one number or several: separate the values by spaces'),
+        ("0,60,120 240", '"0,60,120" may be one number or several: separate the values by spaces'),
         ("60", "a series has two values or more"),
         (" ".join(map(str, range(25))), "a series has at most 24 values"),
     ],
@@ -64,17 +75,49 @@ def test_ids_are_free_and_replace_the_number_that_they_end_in() -> None:
 
 
 def test_titles_say_the_number_in_each_language() -> None:
-    text = (PROTOCOLS / "rek2024.toml").read_text(encoding="utf-8")
-    old = 'title = { en = "Baseline settings", nl = "Basisinstellingen" }'
-    assert old in text
+    assert TITLE in REK
     field = ("blocks", "liquids", "repetitions")
-    found = members(*_of(text, field), "1 2")
+    found = members(*_of(REK, field), "1 2")
     assert [dict(one.titles) for one in found] == [
         {}, {("title", "en"): "Baseline settings, 2", ("title", "nl"): "Basisinstellingen, 2"},
     ]  # fmt: skip
-    numbered = text.replace(old, 'title = { en = "Times 1", nl = "Keer 1" }')
+    numbered = REK.replace(TITLE, 'title = { en = "Times 1", nl = "Keer 1" }')
     found = members(*_of(numbered, field), "3 2")
     assert [dict(one.titles)["title", "nl"] for one in found] == ["Keer 3", "Keer 2"]
+
+
+@pytest.mark.parametrize(
+    ("title", "titles"),
+    [
+        ("Liquids 2", ["Liquids 2", "Liquids 2, 2", "Liquids 2, 3"]),
+        ("Pilot 2026", ["Pilot 2026", "Pilot 2026, 2", "Pilot 2026, 3"]),
+        ("Level A-1", ["Level A-1", "Level A-2", "Level A-3"]),
+        ("Level A1", ["Level A1", "Level A2", "Level A3"]),
+        ("Level -1", ["Level -1", "Level -1, 2", "Level -1, 3"]),
+        ("Times 1.0", ["Times 1", "Times 2", "Times 3"]),
+    ],
+)
+def test_only_the_number_of_the_element_is_replaced_in_its_title(title: str, titles: list[str]) -> None:
+    field = ("blocks", "liquids", "repetitions")
+    study, path, row = _of(REK.replace(TITLE, f'title = "{title}"'), field)
+    assert [dict(one.titles).get(("title",), title) for one in members(study, path, row, "1 2 3")] == titles
+
+
+def test_a_title_of_another_element_is_refused() -> None:
+    field = ("blocks", "liquids", "repetitions")
+    named = REK.replace(TITLE, 'title = "Liquids 1"')
+    named = named.replace('title = { en = "Baseline", nl = "Nulmeting" }', 'title = "Liquids 3"')
+    study, path, row = _of(named, field)
+    assert [one.name for one in members(study, path, row, "1 2")] == ["liquids", "liquids_2"]
+    with pytest.raises(Refused, match=r'^"baseline" has the title "Liquids 3" already$'):
+        members(study, path, row, "1 2 3")
+
+
+def test_ids_have_every_digit_and_no_exponent(study: Study) -> None:
+    assert made(study, ("liquids", "water", "density_kg_m3"), "1000 1000.0001 1000,0002")[1:] == [
+        ("water_1000_0001", "Water 1000 0001"), ("water_1000_0002", "Water 1000 0002"),
+    ]  # fmt: skip
+    assert made(study, DELAY, "0 0.00002")[1][0] == "water_0_00002"
 
 
 def _of(text: str, field: Path) -> tuple[Study, Path, object]:
