@@ -20,11 +20,14 @@ class SeriesPrompts(QObject):
         place.series_asked.connect(self.ask)
 
     def ask(self, path: Path) -> None:
-        """Ask for the values of a series of an element."""
+        """Ask for the values of a series of an element, or say why there can be none."""
         self.editing.select(path)
-        opened = self.editing.writable
-        prompt = None if opened is None else series_prompt(opened.study, path)
-        if prompt is None:
+        if (opened := self.editing.opened) is None:
+            return
+        prompt = series_prompt(opened.study, path)
+        if prompt is None or opened.read_only:
+            why = opened.read_only or "It has no number in which copies could differ."
+            self.place.message.emit("There can be no series of this element", why)
             return
         card = SeriesCard(prompt)
         card.typed.connect(lambda field, values: self._plan(card, field, values))

@@ -8,6 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from study_app.gui.designer.prompts import SeriesCard
+from study_app.viewmodels.designer.prompts import series_plan
 from study_app.viewmodels.designer.requests import MakeSeries
 
 pytestmark = pytest.mark.slow
@@ -110,6 +111,32 @@ def test_a_series_is_found_in_the_list_of_what_can_be_added(
     qtbot.keyClick(adding.words, Qt.Key.Key_Return)
     assert card(water).asked.path == CONDITION
     assert card(water).values.hasFocus()
+
+
+@pytest.mark.parametrize(
+    ("name", "selected", "why"),
+    [
+        ("kitchen", ("study",), "It has no number in which copies could differ."),
+        ("rek2024", ("conditions", "water"), "This study ships with the program. Make a copy to change it."),
+    ],
+)
+def test_ctrl_shift_d_says_why_there_can_be_no_series(
+    qtbot: Any, designer: Any, name: str, selected: tuple[str, ...], why: str
+) -> None:
+    designer.controller.open(name)
+    designer.select(selected)
+    both = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
+    qtbot.keyClick(designer.window, Qt.Key.Key_D, both)
+    assert designer.messages == [("There can be no series of this element", why)]
+    assert designer.place.prompt is None
+
+
+def test_the_plan_shows_every_digit(water: Any) -> None:
+    density = ("liquids", "thin", "density_kg_m3")
+    plan = series_plan(water.editing.opened.study, density[:2], density, "1000 1000.0001")
+    assert [line.partition(": ")[2] for line in plan.lines] == [
+        "1000 kg/m³  ·  thin", "1000.0001 kg/m³  ·  thin_1000_0001",
+    ]  # fmt: skip
 
 
 def test_blocks_of_a_series_get_letters_titles_and_places_in_the_session(designer: Any) -> None:
