@@ -163,10 +163,9 @@ def _people(simulated: Simulated, participants: int, precision: float) -> Number
     title = f"{found.participants} people in ± {100 * found.precision:g} %"
     enough = found.share >= ENOUGH
     note: Verdict = ("ok", "check", "Enough") if enough else ("warn", "warning", "Not enough")
-    needed = f"{100 * ENOUGH:g} % needed" if enough else f"{100 * ENOUGH:g} % take more than {found.most} people"
-    if not enough and found.enough is not None:
-        needed = f"{100 * ENOUGH:g} % take about {found.enough} people"
-    more = f"{needed}; {found.more_trials} trials give {100 * found.more_share:.0f} %"
+    many = f"More than {found.most}" if found.enough is None else f"About {found.enough}"
+    needed = f"{100 * ENOUGH:g} % needed" if enough else f"{many} participants are needed for {100 * ENOUGH:g} %"
+    more = f"{needed}; with {found.more_trials} trials: {100 * found.more_share:.0f} %"
     return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, "group" in simulated.anew, more)
 
 

@@ -111,9 +111,19 @@ def test_a_verdict_says_whether_the_participants_are_enough(qtbot: Any, designer
     jnd(designer)
     people = designer.place.measures.numbers.parts[2]
     for participants, number, verdict, more in (
-        (20, "93", ("ok", "check", "Enough"), "80 % needed; 107 trials give 98 %"),
-        (12, "13", ("warn", "warning", "Not enough"), "80 % take about 22 people; 107 trials give 22 %"),
-        (8, "13", ("warn", "warning", "Not enough"), "80 % take more than 60 people; 107 trials give 22 %"),
+        (20, "93", ("ok", "check", "Enough"), "80 % needed; with 107 trials: 98 %"),
+        (
+            12,
+            "13",
+            ("warn", "warning", "Not enough"),
+            "About 22 participants are needed for 80 %; with 107 trials: 22 %",
+        ),
+        (
+            8,
+            "13",
+            ("warn", "warning", "Not enough"),
+            "More than 60 participants are needed for 80 %; with 107 trials: 22 %",
+        ),
     ):
         designer.place.measures.controls.participants.entered.emit(participants)
         qtbot.waitUntil(lambda n=participants: worker.sizes[-1:] == [n])
