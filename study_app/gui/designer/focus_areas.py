@@ -51,7 +51,14 @@ class FocusAreas:
             self._parts.focus_outline()
 
     def focus_pane(self) -> None:
-        """Go to the page of the right pane."""
+        """Go to the page of the right pane, and from within the pane to its tabs."""
+        pane = self._parts.pane
+        if pane.isAncestorOf(pane.window().focusWidget() or self._header):
+            pane.tabs.setFocus(SHORTCUT)
+        else:
+            self._focus_page()
+
+    def _focus_page(self) -> None:
         self._parts.show_side("pane")
         pane = self._parts.pane
         page = next(one for one in pane.pages if one.name == pane.tab)
@@ -60,7 +67,7 @@ class FocusAreas:
     def show_tab(self, name: str) -> None:
         """Show a page of the right pane, and go to it."""
         self._parts.pane.show_tab(name)
-        self.focus_pane()
+        self._focus_page()
 
     def focus_problems(self) -> None:
         """Go to the list of problems."""

@@ -91,10 +91,12 @@ class Segments(Themed, QWidget):
             self.setFocusProxy(current or self.buttons[0])
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Choose the neighbour by the arrow keys."""
+        """Choose the neighbour by the arrow keys, and by Enter, as by Space, the one that has the keyboard."""
         step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()), 0)
         at = next((number for number, button in enumerate(self.buttons) if button.hasFocus()), None)
-        if step and at is not None and 0 <= at + step < len(self.buttons):
+        if at is not None and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.buttons[at].click()
+        elif step and at is not None and 0 <= at + step < len(self.buttons):
             self.buttons[at + step].setFocus(Qt.FocusReason.TabFocusReason)
             self.chosen.emit(self._values[at + step])
         else:

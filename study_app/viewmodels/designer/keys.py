@@ -37,7 +37,7 @@ LISTS: Final = "outline, lists"
 KEYS: Final = (
     Keys("outline", "Outline", ("Ctrl+1",), 0),
     Keys("form", "Form", ("Ctrl+2",), 0),
-    Keys("views", "Views", ("Ctrl+3",), 0),
+    Keys("views", "Views, then their tabs", ("Ctrl+3",), 0),
     Keys("problems", "Problems", ("Ctrl+4",), 0),
     Keys("header", "Header", ("Ctrl+5",), 0),
     Keys("next part", "Next of these parts", ("F6",), 0),

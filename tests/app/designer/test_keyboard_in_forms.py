@@ -97,3 +97,14 @@ def test_the_first_row_has_the_keyboard_where_undo_removes_the_row_that_had_it(q
     keyboard = press(qtbot, KEY.Key_Z, CONTROL)
     assert designer.editing.opened.study.document["tasks"]["explore"]["kind"] == "explore"
     assert first_row(designer).isAncestorOf(keyboard)
+
+
+def test_ctrl_3_goes_to_the_page_and_then_to_the_tabs_where_enter_chooses(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    pane = designer.place.pane
+    first_row(designer).setFocus()
+    assert press(qtbot, KEY.Key_3, CONTROL) not in pane.tabs.buttons
+    assert press(qtbot, KEY.Key_3, CONTROL) in pane.tabs.buttons
+    pane.tabs.buttons[1].setFocus()
+    press(qtbot, KEY.Key_Return)
+    assert pane.tab == "measures"
