@@ -6,7 +6,7 @@ import pytest
 
 from study_app.authoring.edited_study import Study, read
 from study_app.protocol.source.problems import Fault
-from study_app.viewmodels.designer.form_rows import Form, form
+from study_app.viewmodels.designer.form.form_rows import Form, form
 from study_app.viewmodels.designer.problem_rows import element_of
 from tests.protocol.faulty_protocols import CASES, Case
 

@@ -38,7 +38,7 @@ from study_app.protocol.source.files import find
 from study_app.viewmodels.designer.addable import addable, fields_to_go_to
 from study_app.viewmodels.designer.designer_view import DesignerView, HeaderState, StudyChoice
 from study_app.viewmodels.designer.file_text import file_text
-from study_app.viewmodels.designer.form_rows import form
+from study_app.viewmodels.designer.form.form_rows import form
 from study_app.viewmodels.designer.outline_rows import outline_rows
 from study_app.viewmodels.designer.problem_rows import ProblemRow, problem_rows
 from study_app.viewmodels.designer.requests import DeleteElement, RenameElement, Request

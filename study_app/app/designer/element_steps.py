@@ -21,7 +21,7 @@ from study_app.authoring.writer.refused import Refused
 from study_app.protocol.instruments.instrument import instrument
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import language_name
-from study_app.viewmodels.designer.form_rows import step_of
+from study_app.viewmodels.designer.form.form_rows import step_of
 from study_app.viewmodels.designer.problem_rows import element_of
 from study_app.viewmodels.designer.prompts import DeletePrompt
 from study_app.viewmodels.designer.requests import (

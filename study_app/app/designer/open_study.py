@@ -25,7 +25,7 @@ from study_app.protocol.source.liquid_files import file_hash, hashes_in, unbundl
 from study_app.store.atomic import cannot_write
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import is_open
-from study_app.viewmodels.designer.form_rows import first_element
+from study_app.viewmodels.designer.form.form_rows import first_element
 from study_app.viewmodels.designer.outline_rows import FIRST
 from study_app.workspace import workspace
 

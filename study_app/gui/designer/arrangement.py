@@ -15,7 +15,7 @@ from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Icon
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
-from study_app.viewmodels.designer.form_rows import Form
+from study_app.viewmodels.designer.form.form_rows import Form
 from study_app.viewmodels.designer.keys import key_cap, tip
 
 OUTLINE_PX, DRAWER_PX = 284, 320

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
 from study_app.viewmodels.designer.file_text import FileText
-from study_app.viewmodels.designer.form_rows import Form
+from study_app.viewmodels.designer.form.form_rows import Form
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.versions.standing import VersionChip
 from study_app.viewmodels.tones import Tone

@@ -12,7 +12,7 @@ from PySide6.QtCore import Qt
 from study_app.authoring.drafts import draft_of
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.viewmodels.designer.addable import addable
-from study_app.viewmodels.designer.form_rows import position_of
+from study_app.viewmodels.designer.form.form_rows import position_of
 from study_app.viewmodels.designer.requests import (
     AddElement,
     AddKey,

@@ -9,7 +9,7 @@ import pytest
 from study_app.authoring.edited_study import read
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.element_facts import brief
-from study_app.viewmodels.designer.form_rows import form
+from study_app.viewmodels.designer.form.form_rows import form
 from study_app.viewmodels.designer.outline_rows import outline_rows
 
 REACH = {"kind": "reach", "count": 12}

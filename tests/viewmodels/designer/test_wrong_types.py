@@ -15,7 +15,7 @@ from study_app.authoring.study_facts import facts
 from study_app.authoring.versions.changes import changes
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.protocol.source.document import Path, value_at
-from study_app.viewmodels.designer.form_rows import form
+from study_app.viewmodels.designer.form.form_rows import form
 from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
 from study_app.viewmodels.designer.outline_rows import outline_rows
 from study_app.viewmodels.designer.problem_rows import problem_rows

@@ -23,8 +23,8 @@ from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.form_changes import added_row, shape_of
-from study_app.viewmodels.designer.form_rows import Form, FormRow, Section
+from study_app.viewmodels.designer.form.form_changes import added_row, shape_of
+from study_app.viewmodels.designer.form.form_rows import Form, FormRow, Section
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.requests import AddKey, RemoveKey, RenameElement
 from study_app.viewmodels.designer.special.questions import QuestionLine

@@ -14,7 +14,7 @@ from study_app.gui.theme.theme import RADIUS_CONTROL
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import Elided
-from study_app.viewmodels.designer.form_rows import Entry
+from study_app.viewmodels.designer.form.form_rows import Entry
 
 KEYS: Final = "Alt+Up and Alt+Down move it, Delete removes it, Shift and the arrows select several"
 

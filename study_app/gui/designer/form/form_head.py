@@ -13,7 +13,7 @@ from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.designer.form_rows import Form
+from study_app.viewmodels.designer.form.form_rows import Form
 from study_app.viewmodels.designer.keys import tip
 from study_app.viewmodels.designer.requests import RenameElement, SetValue
 

@@ -10,7 +10,7 @@ from study_app.gui.designer.form.row_fields import Field
 from study_app.gui.designer.form.typed_fields import FIELD_PX
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton, Choice
-from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.form.form_rows import FormRow
 from study_app.viewmodels.designer.requests import ChangeLanguage
 
 

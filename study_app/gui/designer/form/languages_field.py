@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QVBoxLayout
 from study_app.gui.designer.form.row_fields import Field
 from study_app.gui.designer.form.typed_fields import TypedLine, TypedText
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.form_rows import FormRow, is_right_to_left
+from study_app.viewmodels.designer.form.form_rows import FormRow, is_right_to_left
 from study_app.viewmodels.designer.requests import SetText
 
 

@@ -21,7 +21,7 @@ from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.form.form_rows import FormRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.requests import RemoveKey, SwitchKey
 

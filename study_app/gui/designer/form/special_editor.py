@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from study_app.gui.designer.form.row_fields import Field
-from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.form.form_rows import FormRow
 
 
 def _same(_row: FormRow) -> object:

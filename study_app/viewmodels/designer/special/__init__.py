@@ -6,7 +6,7 @@ import sys
 from typing import Final
 
 from study_app.discovery import modules_of
-from study_app.viewmodels.designer.row_facts import RowFacts
+from study_app.viewmodels.designer.form.row_facts import RowFacts
 
 FACTS: Final[dict[tuple[str, str], RowFacts]] = {
     key: module.FACTS for module in modules_of(sys.modules[__name__]) for key in module.FACTS.keys

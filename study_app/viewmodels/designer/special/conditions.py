@@ -12,8 +12,8 @@ from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
 from study_app.haptics.model.steady_state import HAND_MPS, steady
 from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.form.row_facts import RowFacts
 from study_app.viewmodels.designer.measures.number_cards import UNKNOWN
-from study_app.viewmodels.designer.row_facts import RowFacts
 
 CAPTION: Final = f"force at {HAND_MPS:g} m/s of the hand"
 

@@ -13,11 +13,11 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row
 from study_app.protocol.trials.kinds import default_design
 from study_app.protocol.trials.stimuli import Stimulus
+from study_app.viewmodels.designer.form.row_facts import RowFacts
 from study_app.viewmodels.designer.measures.level_plots import level_block
 from study_app.viewmodels.designer.measures.level_words import LevelWords, even_ticks, log_ticks, rounded
 from study_app.viewmodels.designer.measures.measures_view import focus_of
 from study_app.viewmodels.designer.measures.number_cards import Ticks
-from study_app.viewmodels.designer.row_facts import RowFacts
 
 FARTHEST: Final = 3.0
 """A limit is drawn up to so many times the highest level, or spans above it."""

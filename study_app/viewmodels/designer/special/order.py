@@ -10,7 +10,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row
 from study_app.protocol.orders.latin_squares import borders_even, row_count
 from study_app.protocol.source.document import value_at
-from study_app.viewmodels.designer.row_facts import RowFacts
+from study_app.viewmodels.designer.form.row_facts import RowFacts
 from study_app.viewmodels.tones import Tone
 
 ROUNDS: Final = 3

@@ -10,7 +10,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row
 from study_app.protocol.source.document import entries
 from study_app.protocol.wording.languages import language_name
-from study_app.viewmodels.designer.row_facts import RowFacts
+from study_app.viewmodels.designer.form.row_facts import RowFacts
 
 
 @dataclass(frozen=True, slots=True)

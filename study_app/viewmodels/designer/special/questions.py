@@ -10,7 +10,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row, label_of
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.wording.languages import language_name
-from study_app.viewmodels.designer.row_facts import RowFacts
+from study_app.viewmodels.designer.form.row_facts import RowFacts
 
 ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}
 STATEMENT: Final = "statement"

@@ -8,7 +8,7 @@ from typing import Any, Final, TypeAlias
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row, row_at
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.row_facts import RowFacts
+from study_app.viewmodels.designer.form.row_facts import RowFacts
 
 Point: TypeAlias = tuple[float, float, float]
 TANK_MM: Final = (100.0, 60.0, 60.0)

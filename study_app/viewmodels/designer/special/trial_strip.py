@@ -11,7 +11,7 @@ from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
 from study_app.protocol.trials.design import ORDINALS
 from study_app.protocol.trials.methods.adjustment import Adjustment
 from study_app.protocol.trials.tracks import design_of, method_of
-from study_app.viewmodels.designer.row_facts import RowFacts
+from study_app.viewmodels.designer.form.row_facts import RowFacts
 
 PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]
 

@@ -11,7 +11,7 @@ from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.list_fields import EntriesField
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.widgets.labels import Elided, figures
-from study_app.viewmodels.designer.form_rows import Entry
+from study_app.viewmodels.designer.form.form_rows import Entry
 from study_app.viewmodels.designer.special.conditions import CAPTION, ConditionLine
 
 FORCE_PX = 52

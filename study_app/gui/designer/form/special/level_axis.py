@@ -13,7 +13,7 @@ from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.sliders import Range
-from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.form.form_rows import FormRow
 from study_app.viewmodels.designer.special.level_axis import LevelAxis
 
 HEIGHT, TRACK_Y, TRACK_PX = 104, 46.0, 12.0

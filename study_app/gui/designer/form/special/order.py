@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QBoxLayout
 from study_app.gui.designer.form.row_fields import ChoiceField
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.widgets.cards import Chip
-from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.form.form_rows import FormRow
 from study_app.viewmodels.designer.special.order import OrderBalance
 
 LETTERS, NARROWEST = 8, 124

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QBoxLayout
 from study_app.gui.designer.form.question_rows import QuestionRows
 from study_app.gui.designer.form.row_fields import Field, add_button
 from study_app.gui.designer.form.special_editor import SpecialEditor
-from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.form.form_rows import FormRow
 from study_app.viewmodels.designer.requests import AddElement
 
 

@@ -14,7 +14,7 @@ from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import figures, label
 from study_app.number_text import number_of
-from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.form.form_rows import FormRow
 from study_app.viewmodels.designer.requests import AddEntry, RemoveKey, SetValue
 from study_app.viewmodels.designer.special.targets import Point
 

@@ -13,7 +13,7 @@ from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.viewmodels.designer.form_rows import FormRow
+from study_app.viewmodels.designer.form.form_rows import FormRow
 from study_app.viewmodels.designer.special.trial_strip import Phase, TrialStrip
 
 HEIGHT, PICTURE_PX, GAP = 104, 52, 6

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.form_rows import Form
+from study_app.viewmodels.designer.form.form_rows import Form
 
 BELOW: Final = 2
 """Where the keys of an element begin in a path, after its section and its id."""

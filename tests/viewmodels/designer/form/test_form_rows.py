@@ -14,7 +14,7 @@ from study_app.authoring.templates import FOLDER, templates
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import shipped, shipped_file
-from study_app.viewmodels.designer.form_rows import first_element, form, position_of
+from study_app.viewmodels.designer.form.form_rows import first_element, form, position_of
 
 FILES = [*(shipped_file(name) for name in shipped()), *(FOLDER / f"{name}.toml" for name in templates())]
 
