@@ -53,7 +53,7 @@ def besides(*names: str) -> list[Any]:
     return [name if name in names else pytest.param(name, marks=pytest.mark.nightly) for name in FIXED]
 
 
-@pytest.fixture(params=FIXED)
+@pytest.fixture(params=besides("demo", "rek2024"))
 def rehearsed(request: pytest.FixtureRequest, rehearsal_of: Callable[[str], Path]) -> tuple[str, StudyFolder]:
     """Return each shipped protocol of fixed conditions with its rehearsed results."""
     return request.param, StudyFolder(rehearsal_of(request.param))
