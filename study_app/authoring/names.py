@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import count
 from typing import Any
 
@@ -99,10 +99,13 @@ def with_references(document: Document, thing: Path, needs: Callable[[Path], boo
             touched = any(_within(target, inner) for target in targets)
             if not touched or _covered(place, gone) or not all(_covered(target, gone) for target in targets):
                 continue
-            gone.append(place if isinstance(place[-1], int) or not needs(place) else place[:2])
             array = place[:-1]
-            entries_left = [at for at, _ in enumerate(_array(document, place)) if not _covered((*array, at), gone)]
-            if isinstance(place[-1], int) and not entries_left and len(array) > 2:
+            if not isinstance(place[-1], int):
+                gone.append(place[:2] if needs(place) else place)
+                continue
+            gone.append(place)
+            empty = all(_covered((*array, at), gone) for at in range(len(value_at(document, array))))
+            if empty and len(array) > 2:
                 gone.append(array[:2] if needs(array) else array)
     outermost = [one for one in gone[1:] if not _covered(one, (other for other in gone if other != one))]
     return (*outermost[::-1], thing)
@@ -137,11 +140,6 @@ def check_id(name: str) -> None:
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
         rule = f"at most {MAX_ID} small letters, digits and underscores, a letter first"
         raise Refused(f'"{name}" is not an id: write {rule}')
-
-
-def _array(document: Document, place: Path) -> Sequence[Any]:
-    """Return the array that a place is an entry of; empty where it is a key."""
-    return value_at(document, place[:-1]) if isinstance(place[-1], int) else ()
 
 
 def _within(path: Path, outer: Path) -> bool:

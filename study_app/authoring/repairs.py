@@ -16,6 +16,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.names import choices_at
 from study_app.authoring.writer.edits import Edit, Insert, Rename, Set, Unset
 from study_app.authoring.writer.refused import Refused
+from study_app.number_text import number_of
 from study_app.protocol.checks.pace import paced
 from study_app.protocol.source.document import value_at
 from study_app.protocol.source.problems import Fault, shown
@@ -24,7 +25,6 @@ from study_app.protocol.wording.languages import language_name
 _MEANT: Final = re.compile(r'did you mean "([^"]+)"\?')
 _BOUND: Final = re.compile(r"must be (?:at least |at most )?([\d.e+-]+)(?: |$)")
 _ORDER: Final = re.compile(r'belongs to order = "([a-z]+)"')
-_NUMBER: Final = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 _OUTSIDE: Final = re.compile(r"([xyz]) = [-\d.e+]+ mm with radius ([\d.e+-]+) mm leaves the tank")
 _HALVINGS: Final = 12
 
@@ -125,9 +125,9 @@ def _within_bounds(study: Study, fault: Fault) -> Iterator[Repair]:
 def _quoted_numbers(study: Study, fault: Fault) -> Iterator[Repair]:
     """Yield the number that a text holds where a number must be."""
     text = value_at(study.document, fault.path)
-    if isinstance(text, str) and "number" in fault.message and _NUMBER.fullmatch(text.strip()):
-        value = float(text) if {*text} & {*".eE"} else int(text)
-        yield Repair(f"Use {text.strip()} as a number", (Set(fault.path, value),))
+    number = number_of(text) if isinstance(text, str) and "number" in fault.message else None
+    if number is not None:
+        yield Repair(f"Use {shown(number)} as a number", (Set(fault.path, number),))
 
 
 def _texts(study: Study, fault: Fault) -> Iterator[Repair]:

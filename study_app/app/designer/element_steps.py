@@ -246,7 +246,8 @@ def delete_prompt(study: Study, paths: Sequence[Path]) -> DeletePrompt:
     outside = [place for place in places if not any(place[: len(one)] == one for one in paths)]
     references = (f"{_kind_and_title(study, element_of(study, place))}: {_field(study, place)}" for place in outside)
     gone = {one: None for each in paths for one in with_references(document, each, study.needs)}
-    together = tuple(_kind_and_title(study, one) for one in gone if one not in paths and isinstance(one[1], str))
+    elements = (one for one in gone if one not in paths and len(one) == 2 and isinstance(one[1], str))
+    together = tuple(_kind_and_title(study, one) for one in elements)
     others = (name for name in names(document, str(path[0])) if name != path[-1] and len(path) == 2)
     titles = tuple((name, title_of(document, (path[0], name))) for name in others) if len(paths) == 1 else ()
     words = tuple(dict.fromkeys(references))

@@ -26,7 +26,7 @@ class SeriesPrompts(QObject):
             return
         prompt = series_prompt(opened.study, path)
         if prompt is None or opened.read_only:
-            why = opened.read_only or "It has no number in which copies could differ."
+            why = opened.read_only or "This element has no number field."
             self.place.message.emit("There can be no series of this element", why)
             return
         card = SeriesCard(prompt)

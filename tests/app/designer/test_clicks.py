@@ -158,3 +158,12 @@ def test_the_question_before_a_delete_says_what_goes(designer: Any) -> None:
     designer.place.prompt.all.click()
     assert "practice" not in designer.editing.opened.study.document["blocks"]
     assert not designer.editing.opened.study.faults
+
+
+def test_the_question_before_a_delete_names_elements_and_no_places_of_lists(designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("liquids", "thick"))
+    designer.place.form.head.delete.click()
+    said = [one.text() for one in designer.place.prompt.findChildren(QLabel)]
+    (besides,) = (words for words in said if words.startswith("Delete them too deletes"))
+    assert besides == "Delete them too deletes, besides: Condition Thick."

@@ -116,7 +116,7 @@ def test_a_series_is_found_in_the_list_of_what_can_be_added(
 @pytest.mark.parametrize(
     ("name", "selected", "why"),
     [
-        ("kitchen", ("study",), "It has no number in which copies could differ."),
+        ("kitchen", ("study",), "This element has no number field."),
         ("rek2024", ("conditions", "water"), "This study ships with the program. Make a copy to change it."),
     ],
 )
