@@ -23,6 +23,11 @@ def singular(section: str | int) -> str:
     return SINGULAR.get(str(section), str(section).removesuffix("s"))
 
 
+def new_text(section: str | int) -> str:
+    """Return the text that an element of a list begins with: "New question" of ``items``."""
+    return f"New {singular(section)}"
+
+
 def initial(document: Mapping[str, Any], path: Path) -> Any:
     """Return a valid value for a key that is not in the study.
 
@@ -92,7 +97,7 @@ def _text(document: Mapping[str, Any], path: Path, node: Node, *, localised: boo
         used = {letter for _, letter in entries(document, f"{path[0]}.*.{path[-1]}")}
         return next((letter for letter in string.ascii_uppercase if letter not in used), "Z")
     name = around.get("id", path[-2]) if isinstance(around, Mapping) else path[-2]
-    words = f"New {singular(path[-3]) if isinstance(name, int) else label_of(str(name)).lower()}"
+    words = new_text(path[-3]) if isinstance(name, int) else f"New {label_of(str(name)).lower()}"
     return _in_languages(document, words) if localised else words
 
 

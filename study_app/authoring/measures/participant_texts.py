@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
-from study_app.authoring.changes.initial_values import singular
+from study_app.authoring.changes.initial_values import new_text
 from study_app.authoring.changes.languages import languages_of, texts_of
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import is_localised, label_of
@@ -21,8 +21,6 @@ from study_app.store.verification.leaks import Telltales
 
 SHORTEST: Final = 3
 """Letters of an id that does not stand in a text by chance."""
-NEW_QUESTION: Final = f"New {singular(ITEMS)}"
-"""What a question says that was added, in every language."""
 READ: Final = ("pages", "blocks", "tasks", "designs")
 """Sections whose texts are read before the last answer; statements may name what is compared, as all see the same."""
 
@@ -64,7 +62,7 @@ def copied_texts(study: Study) -> dict[str, int]:
 
 def is_copied(texts: Mapping[str, Any], code: str, first: str) -> bool:
     """Return whether a text in a language is still that of the first language, or of a new question."""
-    return bool(texts.get(code)) and texts[code] in (texts.get(first), NEW_QUESTION)
+    return bool(texts.get(code)) and texts[code] in (texts.get(first), new_text(ITEMS))
 
 
 def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
