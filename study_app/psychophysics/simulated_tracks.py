@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -166,28 +166,21 @@ def search_tracks(
     levels, running = np.full(draws.shape, np.nan), np.ones(tracks, bool)
     successes = np.zeros(draws.shape, bool)
     at = np.asarray(search.levels, float)
-    log_success, log_failure = (one.reshape(len(at), len(search.grid.thresholds), -1) for one in search.logarithms)
-    log_likelihood = np.zeros((tracks, *log_success.shape[1:]))
+    psi = search.psi.reshape(len(at), len(search.grid.thresholds), -1)
+    posterior = np.tile(search.grid.prior.reshape(1, *psi.shape[1:]), (tracks, 1, 1))
     if noise is not None:
         yes = (noise < observers.guess).sum(axis=1)[:, None, None]
-        log_likelihood += yes * log_success[0] + (noise.shape[1] - yes) * log_failure[0]
-    rows = np.arange(tracks)
+        posterior *= psi[0] ** yes * (1.0 - psi[0]) ** (noise.shape[1] - yes)
     for trial in range(trials):
-        posterior = _posterior(search, log_likelihood)
+        posterior /= posterior.sum(axis=(1, 2), keepdims=True)
         if stop is not None and trial >= stop[1]:
             running &= _interval_widths(search, posterior) > stop[0]
         place = _next(search, posterior) if trial or begin is None else np.full(tracks, begin)
         right = draws[:, trial] < observers.probability(at[place])
         levels[running, trial], successes[:, trial] = at[place[running]], right & running
-        log_likelihood += np.where(right[rows, None, None], log_success[place], log_failure[place])
+        answered = psi[place]
+        posterior *= np.where(right[:, None, None], answered, 1.0 - answered)
     return Answers(levels, successes)
-
-
-def _posterior(search: Search, log_likelihood: Floats) -> Floats:
-    """Return the posterior of each track, (tracks, thresholds, other cells)."""
-    prior = search.grid.prior.reshape(log_likelihood.shape[1:])
-    weights = prior * np.exp(log_likelihood - log_likelihood.max(axis=(1, 2), keepdims=True))
-    return np.asarray(weights / weights.sum(axis=(1, 2), keepdims=True), float)
 
 
 def _next(search: Search, posterior: Floats) -> NDArray[np.int64]:
@@ -195,19 +188,20 @@ def _next(search: Search, posterior: Floats) -> NDArray[np.int64]:
     first = int(search.noise)
     psi = search.psi.reshape(len(search.levels), *posterior.shape[1:])[first:]
     if search.learn == "threshold":
-        succeeded = np.einsum("kac,tac->tka", psi, posterior)
-        before = posterior.sum(axis=2)[:, None, :]
+        succeeded = np.matmul(posterior.transpose(1, 0, 2), psi.transpose(1, 2, 0))  # (thresholds, tracks, levels)
+        before, axis = posterior.sum(axis=2).T[:, :, None], 0
     else:
         succeeded = (psi[None] * posterior[:, None]).reshape(len(posterior), len(psi), -1)
-        before = posterior.reshape(len(posterior), 1, -1)
-    entropy = _weighted_entropy(succeeded) + _weighted_entropy(before - succeeded)
+        before, axis = posterior.reshape(len(posterior), 1, -1), -1
+    entropy = _weighted_entropy(succeeded, axis) + _weighted_entropy(before - succeeded, axis)
     return first + np.asarray((entropy <= entropy.min(axis=1, keepdims=True) + TIE_NATS).argmax(axis=1), np.int64)
 
 
-def _weighted_entropy(joint: Floats) -> Any:
-    """Return p × the entropy of joint/p, for the sum p over the last axis of ``joint``."""
-    total, kept = joint.sum(axis=-1), np.maximum(joint, 1e-300)
-    return total * np.log(total) - np.einsum("tkc,tkc->tk", joint, np.log(kept))
+def _weighted_entropy(joint: Floats, axis: int) -> Floats:
+    """Return p × the entropy of joint/p, for the sum p over an axis of ``joint``."""
+    total, terms = joint.sum(axis=axis), np.log(np.maximum(joint, 1e-300))
+    terms *= joint
+    return np.asarray(total * np.log(total) - terms.sum(axis=axis), float)
 
 
 def _interval_widths(search: Search, posterior: Floats) -> Floats:
