@@ -108,7 +108,14 @@ def test_posterior_and_levels_are_those_of_the_questplus_package():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("trials", "bias", "spread", "covered"), [(40, 0, 35, 96), (60, 1, 26, 98), (100, -2, 21, 97)])
+@pytest.mark.parametrize(
+    ("trials", "bias", "spread", "covered"),
+    [
+        (40, 0, 35, 96),
+        pytest.param(60, 1, 26, 98, marks=pytest.mark.nightly),
+        pytest.param(100, -2, 21, 97, marks=pytest.mark.nightly),
+    ],
+)
 def test_a_linear_observer_is_recovered_as_the_prototype_measured(trials, bias, spread, covered):
     """Percent, ± 3 points and what 400 observers leave to chance (two standard errors)."""
     observers, w75 = 400, 0.2

@@ -19,7 +19,7 @@ from tests.analysis.conftest import Results, make_results, twelve
 pytestmark = pytest.mark.slow
 
 TESTS = {
-    "tables.study.Study.aggregate": ("liquids", "measures of settings"),
+    "tables.study_tables.Study.aggregate": ("liquids", "measures of settings"),
     "designs.block_tests.presented": ("delays", "counts of answers"),
     "designs.block_tests.session_numbers": ("delays", "numbers of sessions"),
     "findings.settings_differ.friedman": ("liquids", "test of settings"),
