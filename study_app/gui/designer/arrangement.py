@@ -100,12 +100,13 @@ class PathBar(QWidget):
 
 
 class Arrangement(QWidget):
-    """Places outline, form, pane and problems."""
+    """Places outline, form, pane and problems; ``used`` is that of the first three that had the keyboard last."""
 
     def __init__(self, outline: OutlineCard, form: FormCard, pane: RightPane, problems: ProblemsCard) -> None:
         super().__init__()
         self.outline, self.form, self.pane, self.problems = outline, form, pane, problems
         self.side = "form"
+        self.used: QWidget = form
         self.drawer = False
         self._width = DRAWER_BELOW
         self.path = PathBar()
@@ -202,7 +203,9 @@ class Arrangement(QWidget):
                 self.path.outline.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
-        """Close the drawer when another part of the place takes the keyboard."""
+        """Note which part has the keyboard; close the drawer when another part of the place takes it."""
+        parts = (self.outline, self.form, self.pane)
+        self.used = next((part for part in parts if now is not None and part.isAncestorOf(now)), self.used)
         if self.drawer and now is not None and self.isAncestorOf(now) and not self.outline.isAncestorOf(now):
             self._hide_drawer()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtGui import QColor, QFocusEvent, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.designer.play.play_controls import PlayControls
@@ -69,7 +69,11 @@ class ChipButton(Themed, PressedByEnter):
 
 
 class DesignerHeader(QWidget):
-    """Signals: ``study_asked`` (source), ``new_asked``, ``file_asked``, ``problems_asked``, undo, redo, save, keys."""
+    """Signals: ``study_asked`` (source), ``new_asked``, ``file_asked``, ``problems_asked``, undo, redo, save, keys.
+
+    ``keyboard_left`` is emitted when a button that has the keyboard is about to be disabled, and after a click between
+    the buttons or on one that is disabled.
+    """
 
     study_asked = Signal(str)
     new_asked = Signal()
@@ -79,10 +83,12 @@ class DesignerHeader(QWidget):
     redo_asked = Signal()
     save_asked = Signal()
     keys_asked = Signal()
+    keyboard_left = Signal()
 
     def __init__(self) -> None:
         super().__init__()
         self.setAccessibleName("Header")
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.state = HeaderState()
         self.study = StudyList()
         self.study.setAccessibleName("Study")
@@ -148,12 +154,18 @@ class DesignerHeader(QWidget):
         self.version.setToolTip(state.version.tip)
         for button, action, what in ((self.undo, "undo", state.undo), (self.redo, "redo", state.redo)):
             words = ": ".join(filter(None, (action.capitalize(), what)))
-            button.setEnabled(bool(what) and not state.read_only)
+            self._enable(button, on=bool(what) and not state.read_only)
             button.setAccessibleName(words)
             button.setToolTip(with_key(words, action))
         self.save.show_action("save", state.version.save)
-        self.save.setEnabled(state.can_save)
+        self._enable(self.save, on=state.can_save)
         self._make_room()
+
+    def _enable(self, button: QWidget, *, on: bool) -> None:
+        """Enable a button or not; Qt would give its keyboard to whatever is next."""
+        if not on and self.window().focusWidget() is button:
+            self.keyboard_left.emit()
+        button.setEnabled(on)
 
     def _make_room(self) -> None:
         """Hide the title, the draft and the version, in this order, where the name of the study has no room else."""
@@ -175,6 +187,10 @@ class DesignerHeader(QWidget):
             say(self, state.problems[2])
         if state.draft.startswith("Draft") and not before.draft.startswith("Draft"):
             say(self, state.draft)
+
+    def focusInEvent(self, _event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Keep no keyboard."""
+        self.keyboard_left.emit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Say fewer words where there is little room."""

@@ -22,6 +22,7 @@ class FocusAreas:
 
     def __init__(self, header: DesignerHeader, parts: Arrangement, file: FileCard, problems: ProblemsCard) -> None:
         self._header, self._parts, self._file, self._problems = header, parts, file, problems
+        header.keyboard_left.connect(self.return_keyboard)
 
     def focus_header(self) -> None:
         """Go to the list of studies."""
@@ -49,6 +50,13 @@ class FocusAreas:
             self.focus_form()
         else:
             self._parts.focus_outline()
+
+    def return_keyboard(self) -> None:
+        """Go back to where the keyboard was last in outline, form or pane."""
+        if (last := last_focused(self._parts.used)) is not None:
+            last.setFocus(Qt.FocusReason.OtherFocusReason)
+        else:
+            self.focus_element()
 
     def focus_pane(self) -> None:
         """Go to the page of the right pane, and from within the pane to its tabs."""

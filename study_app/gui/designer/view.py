@@ -186,7 +186,7 @@ class DesignerPlace(Place):
             return
         elsewhere = before.form is None or before.form.path != view.form.path
         if elsewhere:
-            self.close_prompt()
+            self.close_prompt(elsewhere=True)
         self.parts.path.show_form(view.form)  # before the form: Tab goes on from what was made first
         self.form.show_form(view.form, read_only=view.header.read_only)
         self.file.show_file(view.file, scroll=elsewhere, read_only=view.header.read_only)
@@ -249,14 +249,14 @@ class DesignerPlace(Place):
         self.parts.prompts.addWidget(prompt)
         first.setFocus()
 
-    def close_prompt(self) -> None:
-        """Close a question that is open."""
+    def close_prompt(self, *, elsewhere: bool = False) -> None:
+        """Close a question that is open; ``elsewhere`` says that another element is selected from now on."""
         if self.prompt is not None:
             closing, self.prompt = self.prompt, None
             held = closing.isAncestorOf(self.focusWidget())
             remove_widget(closing)
             if held:  # else Qt hands the keyboard to the rail
-                self.areas.focus_element()
+                self.areas.focus_element() if elsewhere else self.areas.return_keyboard()
 
     def flush(self) -> None:
         """Hand on what is being typed."""
