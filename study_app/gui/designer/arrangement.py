@@ -11,6 +11,7 @@ from study_app.gui.designer.outline.card import OutlineCard
 from study_app.gui.designer.pane.right_pane import RightPane
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.segments import Segments
+from study_app.gui.designer.tab_order import beyond, lead_by_tab
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Icon
@@ -97,6 +98,7 @@ class PathBar(QWidget):
                 apply_theme_within(part, self.outline.theme)
             self.steps.append(made)
             self._parts += [sign, made]
+        lead_by_tab(self.outline, self.steps)
 
 
 class Arrangement(QWidget):
@@ -216,6 +218,15 @@ class Arrangement(QWidget):
 
     def _place_drawer(self) -> None:
         self.outline.setGeometry(QRect(0, 46, DRAWER_PX, max(200, self.height() - 46)))
+
+    def focusNextPrevChild(self, forward: bool) -> bool:  # noqa: N802 - Qt's name
+        """Go on by Tab from path, form, views and problems as they are seen, however late each was made."""
+        parts = [self.top, self.form.head, self.form.inside, *self.pane.in_order, self.problems]
+        to = beyond(self.window().focusWidget(), parts, forward=forward)
+        if to is None:
+            return super().focusNextPrevChild(forward)
+        to.setFocus(Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason)
+        return True
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Keep the drawer as high as the place."""

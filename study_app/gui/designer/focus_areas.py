@@ -66,6 +66,11 @@ class FocusAreas:
         else:
             self._focus_page()
 
+    def _focus_tabs(self) -> None:
+        """Go to the tabs of the right pane; from there Tab goes to what is beside them, then to the page."""
+        self._parts.show_side("pane")
+        self._parts.pane.tabs.setFocus(SHORTCUT)
+
     def _focus_page(self) -> None:
         self._parts.show_side("pane")
         pane = self._parts.pane
@@ -87,8 +92,9 @@ class FocusAreas:
         if not self._file.editor.hasFocus():
             self.show_tab("file")
             return
+        last = self._parts.form.focusWidget()  # where the file was over the form, the form gets its keyboard from Qt
         self._parts.show_side("form")
-        if (last := last_focused(self._parts.form)) is not None:
+        if last is not None and last.isVisible() and last.isEnabled():
             last.setFocus(SHORTCUT)
         else:
             self._parts.form.focus_first()
@@ -99,7 +105,7 @@ class FocusAreas:
             (self._header, self.focus_header),
             (self._parts.outline, self._parts.focus_outline),
             (self._parts.form, self.focus_form),
-            (self._parts.pane, self.focus_pane),
+            (self._parts.pane, self._focus_tabs),
         ]
         if self._problems.isVisible():
             stops.append((self._problems, self.focus_problems))

@@ -9,7 +9,8 @@ from study_app.gui.designer.focus_areas import FocusAreas
 from study_app.gui.designer.form.element_form import FormCard
 from study_app.gui.designer.pane.file_editor import FileCard
 from study_app.gui.designer.problems import ProblemsCard
-from study_app.gui.designer.repair_button import RepairButton, lead_by_tab
+from study_app.gui.designer.repair_button import RepairButton
+from study_app.gui.designer.tab_order import lead_by_tab
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 

@@ -8,8 +8,9 @@ from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QMouseEvent, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.gui.designer.repair_button import RepairButton, lead_by_tab
+from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.designer.segments import Segments
+from study_app.gui.designer.tab_order import lead_by_tab
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground

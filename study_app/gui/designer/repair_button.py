@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
-
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFocusEvent, QMouseEvent
-from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton
@@ -34,9 +30,3 @@ class RepairButton(ActionButton):
         """Note that a click leads here, also where a key did before."""
         self.by_keys = False
         super().mousePressEvent(event)
-
-
-def lead_by_tab(first: QWidget, repairs: Sequence[RepairButton]) -> None:
-    """Let Tab go from a part to repairs; made later than what follows the part, they would come last."""
-    for before, after in pairwise((first, *repairs)):
-        QWidget.setTabOrder(before, after)

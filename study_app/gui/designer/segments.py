@@ -15,15 +15,19 @@ INSIDE = 3
 
 
 class _Segment(Themed, QAbstractButton):
-    def __init__(self, words: str, height: int) -> None:
+    def __init__(self, height: int) -> None:
         super().__init__()
-        self.setText(words)
         self.setCheckable(True)
-        self.setAccessibleName(words)
         self._height = height - 2 * INSIDE
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
+
+    def show_words(self, words: str) -> None:
+        """Say other words."""
+        if words != self.text():
+            self.setText(words)
+            self.setAccessibleName(words)
 
     def nextCheckState(self) -> None:  # noqa: N802 - Qt's name
         """Leave it to `Segments` which is chosen."""
@@ -66,29 +70,32 @@ class Segments(Themed, QWidget):
         self._row.setContentsMargins(INSIDE, INSIDE, INSIDE, INSIDE)
         self._row.setSpacing(2)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self._add_button()
 
     def show_values(self, values: Sequence[tuple[object, str]], chosen: object) -> None:
         """Offer values with their words, of which one is chosen."""
-        words = [word for _, word in values]
-        if words != [button.text() for button in self.buttons]:
-            for button in self.buttons:
-                remove_widget(button)
-            self.buttons = []
-            for number, word in enumerate(words):
-                made = _Segment(word, self._height)
-                made.setAccessibleDescription(self._name)
-                made.clicked.connect(lambda _checked=False, at=number: self.chosen.emit(self._values[at]))
-                apply_theme_within(made, self.theme)
-                self._row.addWidget(made)
-                self.buttons.append(made)
+        while len(self.buttons) > max(1, len(values)):
+            remove_widget(self.buttons.pop())
+        while len(self.buttons) < len(values):
+            self._add_button()
         self._values = tuple(value for value, _ in values)
-        for button, value in zip(self.buttons, self._values, strict=True):
+        for button, (value, words) in zip(self.buttons, values, strict=False):
+            button.show_words(words)
             button.setChecked(value == chosen)
             button.setToolTip(self.tips.get(value, ""))
             button.update()
-        current = next((button for button in self.buttons if button.isChecked()), None)
+        self.setFocusProxy(next((button for button in self.buttons if button.isChecked()), self.buttons[0]))
+
+    def _add_button(self) -> None:
+        """Add a button; Tab goes to it from the one before, and to the first where it went when all was made."""
+        made, at = _Segment(self._height), len(self.buttons)
+        made.setAccessibleDescription(self._name)
+        made.clicked.connect(lambda: self.chosen.emit(self._values[at]))
+        apply_theme_within(made, self.theme)
+        self._row.addWidget(made)
         if self.buttons:
-            self.setFocusProxy(current or self.buttons[0])
+            QWidget.setTabOrder(self.buttons[-1], made)
+        self.buttons.append(made)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
         """Choose the neighbour by the arrow keys, and by Enter, as by Space, the one that has the keyboard."""

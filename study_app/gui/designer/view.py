@@ -187,7 +187,7 @@ class DesignerPlace(Place):
         elsewhere = before.form is None or before.form.path != view.form.path
         if elsewhere:
             self.close_prompt(elsewhere=True)
-        self.parts.path.show_form(view.form)  # before the form: Tab goes on from what was made first
+        self.parts.path.show_form(view.form)
         self.form.show_form(view.form, read_only=view.header.read_only)
         self.file.show_file(view.file, scroll=elsewhere, read_only=view.header.read_only)
         self.problem_steps.show_problems(view.problems, view.form.path)

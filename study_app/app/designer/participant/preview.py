@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from PySide6.QtCore import QObject, Qt, QTimer
-from PySide6.QtGui import QKeySequence, QShortcut
 
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.participant.shown_step import (
@@ -25,6 +24,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.outline import title_of
 from study_app.gui.designer.pane.right_pane import PanePage
 from study_app.gui.designer.participant.participant_tab import ParticipantTab
+from study_app.gui.designer.shortcuts import make_shortcuts
 from study_app.gui.designer.view import DesignerPlace
 from study_app.gui.display.screens import choose_screens
 from study_app.protocol.forms.show_if import Value
@@ -36,7 +36,7 @@ from study_app.session.simulated.preview import preview
 from study_app.session.simulated.programmed_ball import ProgrammedBall
 from study_app.session.transitions.events import Chosen, Continue, LanguageChosen, Retracted, Submitted
 from study_app.session.transitions.previewed_pages import Moment, moments, previewed_page, tested_condition
-from study_app.viewmodels.designer.keys import keys_of, tip
+from study_app.viewmodels.designer.keys import tip
 from study_app.viewmodels.designer.participant_page import (
     SIZES,
     ParticipantView,
@@ -92,8 +92,7 @@ class ParticipantPreview(QObject):
         tab.moment_asked.connect(self.show_moment)
         tab.happened.connect(self._hear)
         tab.frame_due.connect(self._move_ball)
-        keys = QShortcut(QKeySequence(keys_of("page")[0]), place)
-        keys.activated.connect(self.enter_page)
+        make_shortcuts(place, {"page": self.enter_page, "language": self.show_next_language})
         self._look_at_screen()
 
     @property
@@ -112,9 +111,23 @@ class ParticipantPreview(QObject):
 
     def enter_page(self) -> None:
         """Give the keyboard to the page."""
+        self._come_forward()
+        self.tab.page.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def _come_forward(self) -> None:
         self.place.sides.chosen.emit("pane")
         self.place.pane.show_tab("participant")
-        self.tab.page.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def show_next_language(self) -> None:
+        """Show the pages in the next language; the keyboard stays where it is, if that is not hidden now."""
+        form = self.place.form
+        hides = form.isVisible()
+        self._come_forward()
+        if hides and not form.isVisible():
+            self.place.pane.tabs.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        languages = self.tab.view.languages
+        if len(languages) > 1:
+            self.show_language(languages[(languages.index(self.tab.view.language) + 1) % len(languages)])
 
     def show_language(self, language: str) -> None:
         """Show the pages in another language."""

@@ -15,8 +15,9 @@ from study_app.gui.designer.form.list_fields import field, structure
 from study_app.gui.designer.form.special import EDITORS
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.gui.designer.repair_button import RepairButton, lead_by_tab
+from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.designer.segments import Segments
+from study_app.gui.designer.tab_order import lead_by_tab, stops
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import IconButton
@@ -167,11 +168,7 @@ class RowWidget(Themed, QWidget):
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
             made.show()  # at once: Tab passes what a layout is still to show
             self.repairs.append(made)
-        last: QWidget = self.field
-        for part in self.field.findChildren(QWidget):  # lists that drop down are windows of their own
-            if part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.window() is self.window():
-                last = part
-        lead_by_tab(last, self.repairs)
+        lead_by_tab([self.field, *stops(self.field)][-1], self.repairs)
         if held is not None and not self.repairs:
             self.field.take_keyboard()
         elif held is not None:  # the same words again, where they are still offered

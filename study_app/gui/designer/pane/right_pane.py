@@ -102,6 +102,12 @@ class RightPane(QWidget):
         if changed:
             self.tab_shown.emit(name)
 
+    @property
+    def in_order(self) -> list[QWidget]:
+        """Its parts in the order in which Tab goes through them."""
+        page = next(one for one in self.pages if one.name == self.tab)
+        return [self.tabs, *([] if page.aside is None else [page.aside]), page.body, self.facts]
+
     def _place_aside(self) -> None:
         """Put the controls of the page at the right of the tabs, or below them where there is no room."""
         aside = next((one.aside for one in self.pages if one.name == self.tab), None)

@@ -10,12 +10,14 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from study_app.gui.designer.participant.live_page import QWIDGETSIZE_MAX, LivePage
 from study_app.gui.designer.segments import Segments
+from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.number_field import NumberField
 from study_app.session.trial import TankView
+from study_app.viewmodels.designer.keys import tip
 from study_app.viewmodels.designer.participant_page import ParticipantView, ScreenSize
 
 MOST_IN_ROW: Final = 2
@@ -110,8 +112,11 @@ class ParticipantTab(Card):
 
     def show_view(self, view: ParticipantView) -> None:
         """Show another page."""
-        self.view = view
+        before, self.view = self.view, view
         self.setAccessibleName(view.name)
+        if before.language and view.language != before.language:
+            say(self.languages, view.name)
+        self.languages.tips = dict.fromkeys(view.languages, tip("language"))
         self.languages.setVisible(len(view.languages) > 1)
         self.languages.show_values([(code, code.upper()) for code in view.languages], view.language)
         self.note.setText(view.note)

@@ -1,0 +1,101 @@
+"""Tab through the place: header, outline, form, tabs of the views, what is beside them, the page; then the rail."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QWidget
+
+from study_app.viewmodels.designer.requests import ChangeLanguage
+
+pytestmark = pytest.mark.slow
+
+KEY, CONTROL = Qt.Key, Qt.KeyboardModifier.ControlModifier
+MOST = 120
+
+
+@pytest.fixture
+def dutch(qtbot: Any, designer: Any) -> Any:
+    """The study in two languages, with a block selected."""
+    designer.controller.open("kitchen")
+    for how in ("add", "copy"):
+        designer.editing.ask(ChangeLanguage(how, "nl"))
+    designer.select(("blocks", "liquids"))
+    qtbot.waitUntil(lambda: len(designer.controller.preview.tab.languages.buttons) == 2)
+    return designer
+
+
+def press(qtbot: Any, key: KEY, held: Any = Qt.KeyboardModifier.NoModifier) -> Any:
+    """Press a key in the part with the keyboard, and return the part that has it then."""
+    qtbot.keyClick(QApplication.focusWidget(), key, held)
+    return QApplication.focusWidget()
+
+
+def passed(qtbot: Any, until: Callable[[QWidget], bool]) -> list[Any]:
+    """Press Tab until the keyboard is at a part; return all that it was at."""
+    seen = [QApplication.focusWidget()]
+    while not until(seen[-1]):
+        assert len(seen) < MOST, [one.accessibleName() for one in seen]
+        seen.append(press(qtbot, KEY.Key_Tab))
+    return seen
+
+
+@pytest.mark.parametrize("width", [1600, 1366])
+def test_tab_goes_through_the_parts_as_they_are_seen(qtbot: Any, dutch: Any, width: int) -> None:
+    dutch.window.resize(width, 800)
+    QApplication.processEvents()
+    place, rail = dutch.place, dutch.window.rail
+    place.areas.focus_header()
+    seen = passed(qtbot, lambda part: part is place.pane.tabs.buttons[0])
+    parts = [place.header, place.parts.path if width < 1400 else place.outline, place.form.head, place.form.inside]
+    areas = [next((at for at, part in enumerate(parts) if part.isAncestorOf(one)), len(parts)) for one in seen]
+    assert areas == sorted(areas)
+    assert set(areas) == set(range(len(parts) + 1))
+    assert place.form.rows[0].isAncestorOf(seen[areas.index(3)])
+    for crumb in place.parts.path.steps:
+        assert (crumb in seen) == (width < 1400)
+    tab = dutch.controller.preview.tab
+    seen = passed(qtbot, lambda part: part is tab.page)
+    assert seen == [*place.pane.tabs.buttons, *tab.languages.buttons, tab.screens, tab.page]
+    tab.page.left.emit()
+    assert rail.isAncestorOf(passed(qtbot, lambda part: not place.isAncestorOf(part))[-1])
+
+
+def test_shift_tab_goes_from_the_page_to_the_form_and_its_head(qtbot: Any, dutch: Any) -> None:
+    tab, form = dutch.controller.preview.tab, dutch.place.form
+    tab.screens.setFocus()
+    back = [press(qtbot, KEY.Key_Backtab, Qt.KeyboardModifier.ShiftModifier) for _ in range(7)]
+    assert back[:2] == tab.languages.buttons[::-1]
+    assert back[2:6] == dutch.place.pane.tabs.buttons[::-1]
+    assert form.inside.isAncestorOf(back[6])
+    form.focus_first()
+    assert press(qtbot, KEY.Key_Backtab, Qt.KeyboardModifier.ShiftModifier) is form.head.id
+
+
+def test_f6_goes_to_the_tabs_and_enter_on_a_language_shows_its_page(qtbot: Any, dutch: Any) -> None:
+    pane, tab = dutch.place.pane, dutch.controller.preview.tab
+    dutch.place.areas.focus_form()
+    assert press(qtbot, KEY.Key_F6) is pane.tabs.buttons[0]
+    passed(qtbot, lambda part: part is tab.languages.buttons[1])
+    press(qtbot, KEY.Key_Return)
+    assert tab.view.language == "nl"
+    assert tab.languages.buttons[1].hasFocus()
+
+
+@pytest.mark.parametrize("width", [1600, 1100])
+def test_ctrl_l_shows_the_page_in_the_next_language(qtbot: Any, dutch: Any, width: int) -> None:
+    dutch.window.resize(width, 768)
+    place, tab = dutch.place, dutch.controller.preview.tab
+    place.show_tab("measures")
+    place.areas.focus_form()
+    field = QApplication.focusWidget()
+    keyboard = press(qtbot, KEY.Key_L, CONTROL)
+    assert keyboard is field if width == 1600 else place.pane.isAncestorOf(keyboard)
+    assert tab.isVisible()
+    assert tab.view.language == "nl"
+    assert "(Ctrl+L)" in tab.languages.buttons[0].toolTip()
+    press(qtbot, KEY.Key_L, CONTROL)
+    assert tab.view.language == "en"
