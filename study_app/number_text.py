@@ -9,6 +9,8 @@ from typing import Final
 
 MINUS: Final = "\u2212"
 _NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_APART: Final = re.compile(r"[\s;]+|,(?!\d)|(?<!\d),")
+"""What separates numbers; a comma between two digits may also be a decimal comma."""
 _PLAIN: Final = str.maketrans({" ": None, "\u00a0": None, "\u2009": None, "\u202f": None, MINUS: "-", ",": "."})
 
 
@@ -18,6 +20,28 @@ def number_of(text: str) -> int | float | None:
     if _NUMBER.fullmatch(plain) is None or not math.isfinite(found := float(plain)):
         return None
     return int(plain) if plain.lstrip("+-").isdecimal() else found
+
+
+def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
+    """Return the numbers of a list as they are typed, with their values.
+
+    They are separated by spaces, semicolons, lines, or commas with spaces; each may be followed by its unit.
+
+    Raises
+    ------
+    ValueError
+        A word is not a number, or has a comma that may be decimal or separate two numbers.
+    """
+    words = [word for part in _APART.split(text) if (word := part.removesuffix(unit))] or [""]
+    commas = len(words) == 1 or any("," in apart for apart in _APART.findall(text.strip(" ,;\n")))
+    found: list[tuple[str, int | float]] = []
+    for word in words:
+        if word.count(",") > (0 if commas else 1):
+            raise ValueError(f"“{word}” may be one number or several: separate numbers by spaces or semicolons")
+        if (value := number_of(word)) is None:
+            raise ValueError(f"“{word}” is not a number")
+        found.append((word, value))
+    return found
 
 
 def exact_text(value: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.number_text import exact_text, number_of
+from study_app.number_text import exact_text, number_of, typed_numbers
 
 
 @pytest.mark.parametrize(
@@ -31,3 +31,30 @@ def test_a_number_is_whole_where_it_is_written_so(text: str, number: float | Non
 )
 def test_an_exact_text_has_every_digit_and_no_exponent(value: float, text: str) -> None:
     assert exact_text(value) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "numbers"),
+    [
+        ("0, 60, 120", [0, 60, 120]),
+        ("0 60;120", [0, 60, 120]),
+        ("0,5 1,5", [0.5, 1.5]),
+        ("0,5; 1", [0.5, 1]),
+        ("7", [7]),
+        ("\u22120.5 1e3", [-0.5, 1000.0]),
+    ],
+)
+def test_a_list_of_numbers_is_read_where_its_commas_are_clear(text: str, numbers: list[float]) -> None:
+    assert [number for _, number in typed_numbers(text)] == numbers
+
+
+@pytest.mark.parametrize("text", ["0,5", "0,60,120", "0, 0,5"])
+def test_a_comma_between_digits_that_may_separate_them_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="may be one number or several: separate numbers by spaces or semicolons"):
+        typed_numbers(text)
+
+
+@pytest.mark.parametrize("text", ["", " , ", "4 thick"])
+def test_a_list_without_a_number_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="is not a number"):
+        typed_numbers(text)

@@ -14,7 +14,7 @@ from study_app.authoring.names import references_to, renamed
 from study_app.authoring.writer.edits import Edit, Insert, Set
 from study_app.authoring.writer.refused import Refused
 from study_app.haptics.model.liquid import MAX_ID
-from study_app.number_text import MINUS, exact_text, number_of
+from study_app.number_text import MINUS, exact_text, number_of, typed_numbers
 from study_app.protocol.source.document import Path, names, value_at
 
 MOST: Final = 24
@@ -22,8 +22,6 @@ MOST: Final = 24
 NUMBERS: Final = frozenset({"number", "whole number"})
 """Kinds of rows that hold one number."""
 _DEEPEST: Final = 2
-_APART: Final = re.compile(r"[\s;]+|,(?!\d)|(?<!\d),")
-"""What separates values; a comma between two digits may also be a decimal comma."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,14 +142,12 @@ def _numbers(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[
 
 
 def _values(document: Mapping[str, Any], row: Row, text: str) -> tuple[int | float, ...]:
-    words = [word for part in _APART.split(text) if (word := part.removesuffix(row.unit))]
-    commas = len(words) == 1 or any("," in apart for apart in _APART.findall(text.strip(" ,;\n")))
+    try:
+        typed = typed_numbers(text, row.unit)
+    except ValueError as unclear:
+        raise Refused(str(unclear)) from unclear
     found: list[int | float] = []
-    for word in words:
-        if word.count(",") > (0 if commas else 1):
-            raise Refused(f'"{word}" may be one number or several: separate the values by spaces')
-        if (value := number_of(word)) is None:
-            raise Refused(f'"{word}" is not a number')
+    for word, value in typed:
         if why := why_not(document, row, value):
             raise Refused(f"{word} is not permitted: {row.label} is {why}")
         if value in found:

@@ -65,7 +65,8 @@ def test_a_study_begins_with_the_answers_and_nothing_is_on_disk(qtbot: Any, desi
 @pytest.mark.parametrize(
     ("field", "text", "words"),
     [
-        ("References", "thick", "is not numbers"),
+        ("References", "thick", "“thick” is not a number."),
+        ("References", "0,5", "“0,5” may be one number or several: separate numbers by spaces or semicolons."),
         ("Trials for each", "0", "at least"),
         ("Trials for each", "1 2", "is not"),
     ],

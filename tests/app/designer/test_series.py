@@ -68,7 +68,7 @@ def test_values_are_refused_in_the_card_and_enter_then_makes_nothing(qtbot: Any,
     qtbot.keyClick(values, Qt.Key.Key_Return)
     assert card(water).refusal.text() == "Type the values, such as 0 60 120 240."
     for typed, why in (
-        ("0 sixty", '"sixty" is not a number.'),
+        ("0 sixty", "“sixty” is not a number."),
         ("0 5000", "5000 is not permitted: Delay is at most 1000."),
         ("0 60 60", "60 is there twice."),
     ):

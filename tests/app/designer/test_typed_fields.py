@@ -80,3 +80,22 @@ def test_numbers_are_counted_by_keys_and_taken_ids_refused_while_typing(qtbot: A
     assert "is taken" in head.refusal.text()
     qtbot.keyClicks(head.id, "2")
     assert not head.refusal.text()
+
+
+def test_a_comma_that_may_separate_numbers_is_refused_in_a_list_of_them(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    path = ("device", "workspace_mm")
+    designer.editing.select(path[:1])
+    field = designer.row(*path).field
+
+    def size_after(text: str) -> object:
+        field.line.setFocus()
+        field.line.selectAll()
+        qtbot.keyClicks(field.line, text)
+        designer.place.flush()
+        return designer.editing.opened.study.document["device"]["workspace_mm"]
+
+    assert size_after("90,5 60; 60") == (90.5, 60, 60)
+    assert size_after("100, 60, 60") == (100, 60, 60)
+    assert size_after("90,5") == (100, 60, 60)
+    assert field.refusal.startswith("“90,5” may be one number or several: separate numbers by spaces or semicolons.")

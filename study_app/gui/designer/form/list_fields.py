@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +15,6 @@ from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.language_list import LanguageListField
 from study_app.gui.designer.form.languages_field import LanguagesField
 from study_app.gui.designer.form.row_fields import (
-    NUMBERS_APART,
     ChecksField,
     ChoiceField,
     Field,
@@ -28,7 +28,7 @@ from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import Choice
-from study_app.number_text import number_of
+from study_app.number_text import typed_numbers
 from study_app.viewmodels.designer.form.form_rows import STUDY_LANGUAGES, Entry, FormRow, new_words
 from study_app.viewmodels.designer.keys import with_key
 from study_app.viewmodels.designer.requests import AddElement, AddEntry, AddNamed, SetValue, Several
@@ -139,24 +139,26 @@ class LinesField(EntryList):
     def paste(self, at: int, text: str) -> None:
         """Ask to add each line of a text after an entry."""
         del at
-        added = tuple(AddEntry(self.row.row.path, self._value(line)) for line in text.splitlines() if line.strip())
-        if all(one.value is not None for one in added):
+        with suppress(ValueError):  # another text than points
+            added = tuple(AddEntry(self.row.row.path, self._value(line)) for line in text.splitlines() if line.strip())
             after = tuple(range(len(self.lines), len(self.lines) + len(added)))
             self.changes.emit(Several(f"Paste into {self.row.row.label}", added), after)
 
     def _value(self, text: str) -> Any:
-        """Return the value that a line says, None where it is not a point."""
+        """Return the value that a line says; a ValueError says why it is not a point."""
         if self.row.row.kind == "texts":
             return text
-        numbers = [number_of(part) for part in NUMBERS_APART.split(text.strip())]
-        return None if None in numbers else numbers
+        return [number for _, number in typed_numbers(text)]
 
     def _take(self, at: int, text: str) -> None:
-        value = self._value(text)
-        self.refusal = f"“{text}” is not a point: write its numbers with spaces between." if value is None else ""
-        self.lines[at].show_refused(value is None)
+        self.refusal, value = "", None
+        try:
+            value = self._value(text)
+        except ValueError as unclear:
+            self.refusal = f"{unclear}. The study keeps the last value."
+        self.lines[at].show_refused(bool(self.refusal))
         self.came.emit()
-        if value is not None:
+        if not self.refusal:
             self.asked.emit(SetValue((*self.row.row.path, at), value, typing=True))
 
 

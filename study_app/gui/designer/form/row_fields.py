@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 from PySide6.QtCore import Qt, Signal
@@ -13,14 +12,13 @@ from study_app.gui.designer.segments import Segments
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label
-from study_app.number_text import number_of
+from study_app.number_text import number_of, typed_numbers
 from study_app.viewmodels.designer.form.form_rows import FormRow, choice_words, new_words
 from study_app.viewmodels.designer.keys import with_key
 from study_app.viewmodels.designer.requests import AddNamed, RemoveKey, SetValue, SwitchKind
 
 MOST_SEGMENTS, SEGMENT_LETTERS = 4, 34
 NUMBER_PX = 96
-NUMBERS_APART = re.compile(r",?[;\s]+")
 
 
 class Field(QWidget):
@@ -127,10 +125,10 @@ class LineField(Field):
                 wanted = "a whole number" if row.kind == "whole number" else "a number"
                 self.refusal = f"“{text}” is not {wanted}: the study keeps the last value."
         elif row.kind in {"numbers", "vector"}:
-            parts = [number_of(part) for part in NUMBERS_APART.split(text.strip())]
-            value = parts
-            if None in parts:
-                self.refusal = f"“{text}” is not a list of numbers: write them with spaces between."
+            try:
+                value = [number for _, number in typed_numbers(text)]
+            except ValueError as unclear:
+                self.refusal = f"{unclear}. The study keeps the last value."
         self.line.show_refused(bool(self.refusal))
         if self.refusal or before:
             self.came.emit()  # the form shows what is wrong with it, or no longer

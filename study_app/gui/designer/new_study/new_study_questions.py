@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any, Final
 
 from PySide6.QtCore import Signal
@@ -12,7 +11,7 @@ from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.controls import Check
 from study_app.gui.widgets.labels import label
-from study_app.number_text import number_of
+from study_app.number_text import number_of, typed_numbers
 from study_app.viewmodels.designer.new_study import (
     Answers,
     OwnQuestion,
@@ -23,7 +22,6 @@ from study_app.viewmodels.designer.new_study import (
 
 FIELD_PX, WORDS_PX = 36, 112
 NAME_HINT: Final = "small letters and digits"
-_PARTS: Final = re.compile(r"[,;\s]+")
 
 
 class Questions(Themed, QWidget):
@@ -122,8 +120,14 @@ class Questions(Themed, QWidget):
             text = field.text().strip()
             if not text or text == question.value:
                 continue
-            numbers = [number_of(part) for part in _PARTS.split(text)]
-            if None in numbers or (len(numbers) > 1 and not question.several):
-                return f"{question.words}: “{text}” is not {'numbers' if question.several else 'a number'}"
-            values.append((question.path, numbers if question.several else numbers[0]))
+            if not question.several:
+                number = number_of(text) if len(text.split()) == 1 else None
+                if number is None:
+                    return f"{question.words}: “{text}” is not a number"
+                values.append((question.path, number))
+                continue
+            try:
+                values.append((question.path, [number for _, number in typed_numbers(text)]))
+            except ValueError as unclear:
+                return f"{question.words}: {unclear}"
         return Answers(self.title.text().strip(), chosen, tuple(values))
