@@ -11,9 +11,17 @@ from study_app.app.designer.editing import Editing
 from study_app.app.designer.measures.measures_worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
 from study_app.app.designer.measures.page_fit import PageFit
 from study_app.app.designer.measures.slow_numbers import SlowNumbers
-from study_app.app.designer.measures.wanted import LAPSES, participants_of, precision_of, threshold_of, wanted_of
+from study_app.app.designer.measures.wanted import (
+    LAPSES,
+    participants_of,
+    planned_of,
+    precision_of,
+    threshold_of,
+    wanted_of,
+)
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.authoring.edited_study import Study
+from study_app.authoring.measures.kept_participants import keep_participants, kept_participants
 from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import Detectable, GroupPrecision
 from study_app.authoring.measures.valid_part import valid_part
@@ -135,19 +143,22 @@ class MeasuresController(QObject):
         return pane.isVisible() and (pane.tab == "measures" or pane.facts.isVisible())
 
     def _forget(self) -> None:
-        self._participants, self._lapses, self._sound = None, LAPSES, None
+        opened = self._editing.opened
+        kept = None if opened is None else kept_participants(opened.file)
+        self._participants = None if kept is None else _permitted(kept)
+        self._lapses, self._sound = LAPSES, None
         self._thresholds, self._last, self._repairs = {}, {}, {}
         self._idle.start()
 
     def _controls(self, protocol: Protocol | None, focus: Focus) -> Controls:
-        planned = participants_of(protocol)
-        participants = planned if self._participants is None else self._participants
+        participants = participants_of(protocol) if self._participants is None else self._participants
+        planned = planned_of(protocol)
         if focus.plan is None or focus.block is None:
-            return Controls(participants, lapses=self._lapses)
+            return Controls(participants, lapses=self._lapses, planned=planned)
         asked = self._thresholds.get(focus.block.id)
         low, high = focus.plan.stimulus.levels
         threshold = asked if asked is not None and low <= asked <= high else threshold_of(focus.plan)
-        return Controls(participants, threshold, self._lapses, precision_of(protocol))
+        return Controls(participants, threshold, self._lapses, precision_of(protocol), planned)
 
     def _results(self, wanted: tuple[Wanted, ...], focus: Focus, controls: Controls) -> SlowResults:
         """Return what is known of what is wanted; where nothing is, what was known of the block before."""
@@ -184,7 +195,13 @@ class MeasuresController(QObject):
         self._idle.start()
 
     def _take_participants(self, number: float) -> None:
-        self._participants = min(MOST_PARTICIPANTS, max(2, round(number)))
+        """Simulate so many participants from now on, also when the study is opened again."""
+        opened = self._editing.opened
+        if opened is None:
+            return
+        asked = _permitted(number)
+        self._participants = None if asked == participants_of(valid_part(opened.study).protocol) else asked
+        keep_participants(opened.file, self._participants)
         self.show()
 
     def _take_threshold(self, number: float) -> None:
@@ -197,3 +214,8 @@ class MeasuresController(QObject):
     def _take_lapses(self, number: float) -> None:
         self._lapses = min(0.2, max(0.0, number / 100))
         self.show()
+
+
+def _permitted(number: float) -> int:
+    """Return the nearest number of participants that can be simulated."""
+    return min(MOST_PARTICIPANTS, max(2, round(number)))

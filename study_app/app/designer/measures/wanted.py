@@ -50,9 +50,14 @@ def precision_of(protocol: Protocol | None) -> float:
 
 
 def participants_of(protocol: Protocol | None) -> int:
-    """Return how many participants are planned."""
+    """Return how many participants are simulated unless another number is asked for: the planned ones."""
+    return planned_of(protocol) or PARTICIPANTS
+
+
+def planned_of(protocol: Protocol | None) -> int | None:
+    """Return how many participants the file plans; None where it does not say."""
     decided = None if protocol is None else protocol.analysis
-    return PARTICIPANTS if decided is None or decided.participants is None else decided.participants
+    return None if decided is None else decided.participants
 
 
 def threshold_of(plan: ThresholdPlan) -> float:

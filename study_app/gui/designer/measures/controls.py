@@ -72,6 +72,7 @@ class MeasureControls(QWidget):
 
     def show_values(self, shown: ControlValues) -> None:
         """Show other values; threshold and lapses only where observers are simulated."""
+        self.participants.show_words("participants", shown.participants_unit)
         self.participants.show_number(str(shown.participants))
         simulated = shown.threshold is not None and shown.lapses is not None
         self.threshold.setVisible(simulated)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from study_app.authoring.edited_study import Study
@@ -55,12 +55,16 @@ class Focus:
 
 @dataclass(frozen=True, slots=True)
 class Controls:
-    """What is simulated: participants, the threshold (a level), the lapse rate, and the precision that is wanted."""
+    """What is simulated: participants, the threshold (a level), the lapse rate, and the precision that is wanted.
+
+    ``planned`` is how many participants the file plans, None where it does not say.
+    """
 
     participants: int = 12
     threshold: float = 0.2
     lapses: float = 0.02
     precision: float = 0.15
+    planned: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,12 +113,14 @@ def focus_of(protocol: Protocol | None, path: Path) -> Focus:
 
 def control_values(protocol: Protocol | None, focus: Focus, controls: Controls) -> ControlValues:
     """Return what the controls show: threshold and lapses only where observers are simulated."""
+    planned = controls.planned if controls.planned != controls.participants else None
+    values = ControlValues(controls.participants, "" if planned is None else f"({planned} planned)")
     if protocol is None or focus.plan is None:
-        return ControlValues(controls.participants)
+        return values
     words = LevelWords(focus.plan.stimulus, focus.plan.design)
-    return ControlValues(
-        controls.participants, words.number(controls.threshold), f"simulated {words.name}", words.unit,
-        rounded(100 * controls.lapses),
+    return replace(
+        values, threshold=words.number(controls.threshold), threshold_words=f"simulated {words.name}",
+        threshold_unit=words.unit, lapses=rounded(100 * controls.lapses),
     )  # fmt: skip
 
 
@@ -155,16 +161,16 @@ def measures_view(
         )  # fmt: skip
         return MeasuresView(
             values, numbers, function_plot(of, slow.simulated), track_plot(of, slow.simulated),
-            forces_plot(of, problems), (), tuple(_others(study, facts, path, slow)), waiting,
+            forces_plot(of, problems), (), tuple(_others(study, facts, path, controls, slow)), waiting,
         )  # fmt: skip
     shown = tuple(_cards(study, facts, path, focus, controls, slow))
     forces = None if of is None else forces_plot(of, problems)
     return MeasuresView(values, forces=forces, cards=shown, below=shown[:BELOW], waiting=waiting)
 
 
-def _others(study: Study, facts: Facts, path: Path, slow: SlowResults) -> list[Card]:
+def _others(study: Study, facts: Facts, path: Path, controls: Controls, slow: SlowResults) -> list[Card]:
     session: list[Card] = [cards.session_card(study, facts, path)]
-    warned = cards.warnings_card(facts, slow.warnings)
+    warned = cards.warnings_card(facts, slow.warnings, controls.planned, controls.participants)
     return session if warned is None else [*session, warned]
 
 
@@ -192,7 +198,7 @@ def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Contr
         found.append(cards.block_card(study, facts, protocol, block))
     if not asked:
         found.append(cards.texts_card(study))
-    warned: LinesCard | None = cards.warnings_card(facts, slow.warnings)
+    warned: LinesCard | None = cards.warnings_card(facts, slow.warnings, controls.planned)
     return found if warned is None else [*found, warned]
 
 

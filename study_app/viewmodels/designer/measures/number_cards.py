@@ -283,6 +283,8 @@ class ControlValues:
     ----------
     participants : int
         Of each study.
+    participants_unit : str
+        How many are planned, "" where it is the same number.
     threshold : str or None
         The simulated threshold, as it is written.
     threshold_words, threshold_unit : str
@@ -292,6 +294,7 @@ class ControlValues:
     """
 
     participants: int
+    participants_unit: str = ""
     threshold: str | None = None
     threshold_words: str = "simulated JND"
     threshold_unit: str = "%"

@@ -248,9 +248,27 @@ def detectable_card(
     return LinesCard(title, f"points of {found.points}", tuple(lines), (note,), anew)
 
 
-def warnings_card(facts: Facts, more: Sequence[str]) -> LinesCard | None:
-    """Return the warnings of ``check``; None where there are none."""
+def warnings_card(
+    facts: Facts, more: Sequence[str], planned: int | None = None, simulated: int | None = None
+) -> LinesCard | None:
+    """Return the warnings of ``check``; None where there are none.
+
+    Parameters
+    ----------
+    facts : Facts
+        The facts of the study, with its warnings.
+    more : sequence of str
+        Those about a precision that is not reached, which take simulated observers.
+    planned : int or None
+        How many participants they are of: those that the file plans.
+    simulated : int or None
+        Of how many participants the card of numbers is, where there is one.
+    """
     sentences: list[Verdict] = [("warn", "warning", _sentence(one)) for one in (*facts.warnings, *more)]
+    if more and planned is not None:
+        of_check = f"This precision is the expected one, of the {planned} participants that the file plans."
+        of_card = f" The number above counts simulated studies of {simulated} participants that are as precise."
+        sentences.append(("neutral", "info", of_check if simulated is None else of_check + of_card))
     return LinesCard("Warnings", "of check", (), tuple(sentences)) if sentences else None
 
 

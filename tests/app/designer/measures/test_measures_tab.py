@@ -19,6 +19,7 @@ from study_app.app.designer.measures.measures_worker import (
     Observing,
     start_measure_worker,
 )
+from study_app.authoring.measures.kept_participants import kept_participants
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.gui.designer.measures.parts import NumberPart
@@ -105,6 +106,34 @@ def test_what_is_simulated_is_typed_at_the_right(qtbot: Any, designer: Any, work
     designer.editing.select(("pages", "welcome"))
     qtbot.waitUntil(lambda: not controls.threshold.isVisible())
     assert controls.participants.isVisible()
+
+
+def test_the_number_of_participants_is_kept_for_each_study(qtbot: Any, designer: Any, worker: Worker) -> None:
+    jnd(designer)
+    control = designer.place.measures.controls.participants
+
+    def simulate(number: str) -> None:
+        control.field.setFocus()
+        control.field.selectAll()
+        qtbot.keyClicks(control.field, number)
+        qtbot.keyClick(control.field, Qt.Key.Key_Return)
+
+    def shows(number: str, planned: str) -> None:
+        qtbot.waitUntil(lambda: (control.field.text(), control.unit.text()) == (number, planned))
+
+    shows("20", "")
+    simulate("8")
+    shows("8", "(20 planned)")
+    file = designer.editing.opened.file
+    designer.controller.open("kitchen")
+    shows("12", "")
+    designer.controller.open(str(file))
+    shows("8", "(20 planned)")
+    assert kept_participants(file) == 8
+    assert b"participants = 20" in designer.editing.opened.source()
+    simulate("20")
+    shows("20", "")
+    assert kept_participants(file) is None  # from now on it follows the file
 
 
 def test_a_verdict_says_whether_the_participants_are_enough(qtbot: Any, designer: Any, worker: Worker) -> None:
