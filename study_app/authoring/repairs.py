@@ -167,7 +167,24 @@ def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
     if len(levels) == 2 and all(isinstance(level, int | float) for level in levels):
         highest = highest_level(study, fault, *levels)
         if highest is not None:
-            yield Repair(f"Highest level {shown(highest)}", (Set((*fault.path, 1), highest),))
+            lowered = _lowered(study, str(fault.path[1]), highest)
+            edits = (Set(("methods", name, "levels"), list(own)) for name, own in lowered.items())
+            yield Repair(f"Highest level {shown(highest)}", (Set((*fault.path, 1), highest), *edits))
+
+
+def _lowered(study: Study, stimulus: str, highest: float) -> dict[str, tuple[float, ...]]:
+    """Return the levels that methods of a stimulus list, none above the highest, of those that have one above it.
+
+    A method of another stimulus, too, keeps its levels.
+    """
+    blocks = () if study.formed is None else study.formed.blocks.values()
+    found: dict[str, tuple[float, ...]] = {}
+    for name in {str(block.method) for block in blocks if block.stimulus == stimulus}:
+        own = value_at(study.document, ("methods", name, "levels"))
+        shared = any(block.method == name and block.stimulus != stimulus for block in blocks)
+        if isinstance(own, tuple) and not shared and any(level > highest for level in own):
+            found[name] = tuple(dict.fromkeys(min(level, highest) for level in own))
+    return found
 
 
 def highest_level(study: Study, fault: Fault, low: float, high: float) -> float | None:
@@ -179,7 +196,11 @@ def highest_level(study: Study, fault: Fault, low: float, high: float) -> float 
 
     def passes(level: float) -> bool:
         stimulus = formed.stimuli[name].model_copy(update={"levels": (low, level)})
-        changed = formed.model_copy(update={"stimuli": {**formed.stimuli, name: stimulus}})
+        lowered = _lowered(study, name, level).items()
+        methods = {one: formed.methods[one].model_copy(update={"levels": own}) for one, own in lowered}
+        changed = formed.model_copy(
+            update={"stimuli": {**formed.stimuli, name: stimulus}, "methods": {**formed.methods, **methods}}
+        )
         return not any(one.path == fault.path for one in paced(changed))
 
     least, most = low, high

@@ -16,7 +16,7 @@ from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, UNKNOWN, Dyn
 from study_app.haptics.model.slope_limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.outlets.session_outlets import OutletStatus
-from study_app.protocol.checks.pace import beyond_slope_limit, highest_damping
+from study_app.protocol.checks.clipped_levels import beyond_slope_limit, highest_damping
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.latin_squares import enrolment

@@ -5,7 +5,9 @@ import pytest
 from study_app.authoring.additions import additions_for
 from study_app.authoring.changes.languages import with_language
 from study_app.authoring.edited_study import Study, read
+from study_app.authoring.new_study import template
 from study_app.authoring.repairs import repairs
+from study_app.authoring.writer.edits import Set
 from tests.authoring.grown import PROTOCOLS
 from tests.protocol.faulty_protocols import CASES, Case
 
@@ -107,6 +109,26 @@ def test_a_level_beyond_the_slope_limit_is_repaired_by_the_highest_that_passes()
     highest = after.document["stimuli"]["damping"]["levels"][1]
     above = study.text.replace("levels = [0.02, 3]", f"levels = [0.02, {highest * 1.01}]")
     assert read(above.encode()).protocol is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("standard", "frequency_hz", "limit", "most"),
+    [(40, 1.0, "the slope limit", 0.324), (30, 1.3, "device.force_limit_n", 0.36)],
+)
+def test_the_highest_level_is_that_of_fixed_levels_too(
+    standard: float, frequency_hz: float, limit: str, most: float
+) -> None:
+    edits = Set(("stimuli", "damping", "standards"), [standard]), Set(("tasks", "stir", "frequency_hz"), frequency_hz)
+    study, _ = template("viscosity-jnd").edited(*edits)
+    assert len(study.faults) == 2  # of two blocks
+    for fault in study.faults:
+        assert limit in fault.message
+        assert [one.words for one in repairs(study, fault)] == [f"Highest level {most:g}"]
+        (repair,) = repairs(study, fault)
+        after, _ = study.edited(*repair.edits)
+        assert after.document["stimuli"]["damping"]["levels"] == (0.02, most)
+        assert after.document["methods"]["easy"]["levels"] == (most,)
 
 
 def test_every_text_that_a_language_lacks_is_copied_in_one_step() -> None:

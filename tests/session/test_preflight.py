@@ -199,8 +199,8 @@ def test_levels_beyond_the_limit_of_the_measured_delay_are_refused_with_the_high
     (two,) = [check for check in checks(facts, study) if check.name == "Levels"]
     assert (two.verdict, two.value, two.about) == ("failure", "up to 25.6 N·s/m", "with a delay of 2 ticks")
     assert refused(checks(facts, study)) == (
-        "levels: standard 16 at level 0.6 gives 25.6 N·s/m at the hand; the slope limit (1000 Hz, kalman, 2 ticks) "
-        "is 20.6: levels to 0.287, or the standard to 12.8"
+        "levels: standard 16 at levels 0.34 and 0.6 gives up to 25.6 N·s/m at the hand; the slope limit (1000 Hz, "
+        "kalman, 2 ticks) is 20.6: levels to 0.287, or the standard to 12.8"
     )
 
 

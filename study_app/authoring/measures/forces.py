@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.authoring.block_levels import hand_mps_of
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.steady_state import HAND_MPS, Steady, steady
+from study_app.protocol.checks.clipped_levels import hand_mps_of
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.stimuli import OF_CONDITION
 from study_app.protocol.trials.tracks import condition_of, stimulus_of

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Final
 
-from study_app.haptics.model.steady_state import steady
 from study_app.protocol.blocks import Block
+from study_app.protocol.checks.clipped_levels import PACED, clipped_unpaced, highest_damping
 from study_app.protocol.checks.estimator_response import fastest_hz
 from study_app.protocol.checks.expected_precision import imprecise
-from study_app.protocol.checks.pace import ends, highest_damping
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.tracks import design_of, method_of, tracks_of
-
-UNPACED_MPS: Final = 0.3
-"""A hand that is free moves as fast. [choice]"""
 
 
 def level_warnings(protocol: Protocol, *, simulates: bool = True) -> Iterator[str]:
@@ -79,16 +74,12 @@ def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
     task = protocol.tasks[block.task]
     if isinstance(task, Follow) or block.stimulus is None:
         return
-    advice = 'choose a task of kind "follow"'
-    if any(steady(scene, UNPACED_MPS).drag_n > scene.force_limit_n for _, _, scene in ends(protocol, block)):
-        yield (
-            f"tasks.{block.task}: at {UNPACED_MPS:g} m/s the force is clipped at {protocol.device.force_limit_n:g} N: "
-            f"such trials are repeated: {advice}"
-        )
+    if (said := clipped_unpaced(protocol, block)) is not None:
+        yield said
     error_percent = protocol.limits.level_error_percent
     if highest_damping(protocol, block) > 0 and error_percent is not None:
         fast_hz = fastest_hz(protocol.scene.velocity, protocol.device.rate_hz, 1 - error_percent / 100)
         yield (
             f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator takes more than "
-            f"{error_percent:g} % of a damper's force: such trials are repeated: {advice}"
+            f"{error_percent:g} % of a damper's force: such trials are repeated: {PACED}"
         )

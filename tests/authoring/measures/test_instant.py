@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.authoring.block_levels import levels, standard_of
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.forces import level_limits
@@ -13,6 +12,7 @@ from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set, Unset
 from study_app.haptics.model.slope_limits import slope_limit
+from study_app.protocol.checks.clipped_levels import levels, standard_of
 from study_app.protocol.load import load, shipped
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.source.files import shipped_file

@@ -157,7 +157,8 @@ def study(*edits: tuple[str, str]) -> Protocol:
             [("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [40]")],
             "stimuli.damping.levels",
             "levels = [0.02, 0.6]",
-            "standard 40 at level 0.6 gives 64 N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53",
+            "standard 40 at levels 0.34 and 0.6 gives up to 64 N·s/m at the hand; the slope limit (1000 Hz, kalman, "
+            "1 tick) is 53",
             "levels to 0.325, or the standard to 33.1",
         ),
         (
@@ -307,8 +308,8 @@ def test_limits_of_intervals_have_defaults_where_a_block_has_a_design() -> None:
         (
             [('kind = "follow"', 'kind = "explore"\nmin_s = 2\nmax_s = 4\ninstruction = "Stir."'),
              ("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [32]")],
-            "tasks.stir: at 0.3 m/s the force is clipped at 8 N: such trials are repeated: "
-            'choose a task of kind "follow"',
+            "tasks.stir: at 0.3 m/s the force of standard 32 at levels 0.02 to 0.6 is clipped at 8 N: such trials are "
+            'repeated: choose a task of kind "follow"',
         ),
         (
             [('kind = "2ifc"', 'kind = "2ifc"\nfeedback = "always"'), ('blinding = "single"', 'blinding = "double"')],
@@ -352,7 +353,7 @@ def test_hidden_and_shown_balls_make_different_conditions() -> None:
     ("ticks", "code", "said"),
     [
         ("1", 0, "Duration"),
-        ("2", 2, "gives 25.6 N·s/m at the hand; the slope limit (1000 Hz, kalman, 2 ticks) is 20.6"),
+        ("2", 2, "gives up to 25.6 N·s/m at the hand; the slope limit (1000 Hz, kalman, 2 ticks) is 20.6"),
         ("5", 2, "5 is not in the range"),
     ],
 )

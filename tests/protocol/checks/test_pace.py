@@ -9,7 +9,7 @@ import pytest
 from study_app.errors import ProtocolError
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.steady_state import steady
-from study_app.protocol.checks.pace import FASTER
+from study_app.protocol.checks.clipped_levels import FASTER
 from study_app.protocol.load import parse
 from study_app.protocol.model import Follow, Protocol
 
@@ -44,6 +44,11 @@ REACH = (
     'instruction = "Reach."',
 )
 EWMA = ("[liquids.damper]", '[scene.velocity]\nkind = "ewma"\n[liquids.damper]')
+VISCOUS = (
+    'drag = { law = "linear", damping_nspm = 8 }',
+    'density_kg_m3 = 1260\nviscosity_pa_s = 1\ndrag = { law = "haider-levenspiel" }',
+)
+SLOW = ("amplitude_mm = 25", "amplitude_mm = 20\nfrequency_hz = 0.5")
 HIDDEN = ('liquid = "damper"\n[tasks', 'liquid = "damper"\nball = "hidden"\n[tasks')
 
 
@@ -59,21 +64,23 @@ def study(edits: Iterable[tuple[str, str]]) -> Protocol:
     ("edits", "place", "message", "hint"),
     [
         (
-            [("[8]", "[40]")],
+            [("[8]", "[40]"), ("amplitude_mm = 25", "amplitude_mm = 20")],
             "stimuli.damping.levels",
-            "standard 40 at level 0.6 gives 64 N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53",
+            "standard 40 at levels 0.34 and 0.6 gives up to 64 N·s/m at the hand; the slope limit (1000 Hz, kalman, "
+            "1 tick) is 53",
             "levels to 0.325, or the standard to 33.1",
         ),
         (
             [("[8]", "[32]")],
             "stimuli.damping.levels",
-            "51.2 N·s/m at 1.2 times the paced 0.157 m/s is 9.7 N; device.force_limit_n is 8",
+            "standard 32 at levels 0.34 and 0.6 is up to 9.7 N at 1.2 times the paced 0.157 m/s; device.force_limit_n "
+            "is 8",
             "amplitude_mm = 20.7 or frequency_hz = 0.82",
         ),
         (
             [CONDITIONS, ("damping_nspm = 8", "damping_nspm = 45")],
             "blocks.thicker.conditions",
-            '"damper" at 1.2 times the paced 0.157 m/s is 8.5 N; device.force_limit_n is 8',
+            '"damper" is 8.5 N at 1.2 times the paced 0.157 m/s; device.force_limit_n is 8',
             "amplitude_mm = 23.5 or frequency_hz = 0.94",
         ),
         (
@@ -94,6 +101,30 @@ def study(edits: Iterable[tuple[str, str]]) -> Protocol:
             'is hidden, but block "thicker" has a reaching task: it cannot be aimed',
             'a task of kind "follow" or "explore"',
         ),
+        (
+            [
+                ("[8]", "[3.5]"),
+                VISCOUS,
+                ('vary = "damping_nspm"', 'vary = "viscosity_pa_s"'),
+                ("repetitions = 2", "repetitions = 2\nlevels = [0.1, 0.2, 0.3, 0.6]"),
+                SLOW,
+            ],
+            "stimuli.damping.levels",
+            "standard 3.5 at levels 0.2, 0.3 and 0.6 is up to 5.1 N at 1.2 times the paced 0.0628 m/s; the slope limit "
+            "(1000 Hz, kalman, 1 tick) leaves 4.0 N",
+            "levels to 0.124",
+        ),
+        (
+            [
+                ("[8]", "[40, 45]"),
+                ("amplitude_mm = 25", "amplitude_mm = 15"),
+                ("repetitions = 2", "repetitions = 2\nlevels = [0.1, 0.2, 0.3, 0.5, 0.6]"),
+            ],
+            "stimuli.damping.levels",
+            "standard 40 at levels 0.5 to 0.6 and standard 45 at levels 0.2 to 0.6 give up to 72 N·s/m at the hand; "
+            "the slope limit (1000 Hz, kalman, 1 tick) is 53",
+            "levels to 0.177, or the standard to 33.1",
+        ),
     ],
 )
 def test_each_row_is_reported_at_its_line(edits: list[tuple[str, str]], place: str, message: str, hint: str) -> None:
@@ -103,6 +134,17 @@ def test_each_row_is_reported_at_its_line(edits: list[tuple[str, str]], place: s
     assert problem.place.startswith(place)
     assert (problem.message, problem.hint) == (message, hint)
     assert problem.line is not None
+
+
+def test_levels_that_only_the_force_limit_clips_are_named_too() -> None:
+    with pytest.raises(ProtocolError) as refused:
+        study([("[8]", "[40]"), ("repetitions = 2", "repetitions = 2\nlevels = [0.1, 0.2, 0.6]")])
+    said = [problem.message for problem in refused.value.problems]
+    assert said == [
+        "standard 40 at level 0.6 gives 64 N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53",
+        "standard 40 at levels 0.1, 0.2 and 0.6 is up to 12.1 N at 1.2 times the paced 0.157 m/s; "
+        "device.force_limit_n is 8",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.authoring.block_levels import Level, levels, standard_of
 from study_app.authoring.measures.forces import LevelLimits, level_limits
 from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import ENOUGH, GroupPrecision
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.protocol.blocks import Block
+from study_app.protocol.checks.clipped_levels import Level, clipped, clipped_unpaced, levels, standard_of
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder
 from study_app.protocol.trials.tracks import design_of, stimulus_of
@@ -269,7 +270,7 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
     clipped = sum(one.clipped_by is not None for one in of.levels)
     asked = len(of.levels) - clipped
     row, repair = _repair(of, problems)
-    warning = "" if not clipped else row.message if row is not None else _clipped_words(of, clipped)
+    warning = "" if not clipped else row.message if row is not None else clipped_unpaced(of.protocol, of.block) or ""
     top = max(limit_n, *(bar.asked_n for bar in bars))
     step = max(1, math.ceil(len(bars) / MOST_LABELS))
     standard = "" if of.standard is None else f"standard {rounded(of.standard)} {unit}, "
@@ -303,15 +304,7 @@ def _repair(
 ) -> tuple[ProblemRow | None, RepairOffer | None]:
     """Return the problem of a block's levels, and the repair that was found for it."""
     place = ("stimuli", str(of.block.stimulus), "levels")
-    row = next((one for one in problems if one.fault.path == place), None)
+    said = {fault.message for fault in clipped(of.protocol, of.block, BELIEVED_TICKS)}
+    row = next((one for one in problems if one.fault.path == place and one.fault.message in said), None)
     words = () if row is None else problems[row]
     return row, RepairOffer(words[0], row) if words else None
-
-
-def _clipped_words(of: LevelBlock, clipped: int) -> str:
-    assert of.limits is not None  # noqa: S101 - forces are known
-    limits = (("the force limit", of.limits.force), ("the limit of the loop", of.limits.loop))
-    known = [f"above {rounded(at)} {of.words.value_unit} {name}" for name, at in limits if at is not None]
-    begins = " and ".join(known) or "the limits"
-    reduced = "the force of 1 level" if clipped == 1 else f"the force: {clipped} levels have the same force"
-    return f"{begins[:1].upper()}{begins[1:]} reduces {reduced}."

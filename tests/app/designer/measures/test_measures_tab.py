@@ -187,6 +187,22 @@ def test_a_clipped_level_is_repaired_by_its_button(qtbot: Any, designer: Any) ->
     assert designer.editing.opened.study.document["stimuli"]["damping"]["levels"][1] == 0.75
 
 
+@pytest.mark.usefixtures("worker")
+def test_each_block_names_its_own_levels_that_are_clipped(qtbot: Any, designer: Any) -> None:
+    jnd(designer)
+    designer.editing.make("Change", Set(("stimuli", "damping", "standards"), [40]))
+    page = designer.place.measures
+    qtbot.waitUntil(lambda: "forces" in page.cards)
+    forces = page.cards["forces"]
+    for block, named in (("viscosity", "levels 0.34 to 0.6 gives up to 64"), ("training", "level 0.5 gives 60")):
+        designer.editing.select(("blocks", block))
+        said = f"Standard 40 at {named} N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53"
+        qtbot.waitUntil(lambda said=said: forces.words.text() == said)
+        qtbot.waitUntil(forces.repair.isVisible)
+    click(forces.repair)
+    assert designer.editing.opened.study.faults == ()
+
+
 def test_a_block_of_statements_shows_what_people_can_show(qtbot: Any, designer: Any, worker: Worker) -> None:
     designer.controller.open("rek2024")
     designer.editing.select(("blocks", "liquids"))
