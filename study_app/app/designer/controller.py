@@ -40,7 +40,7 @@ from study_app.viewmodels.designer.designer_view import DesignerView, HeaderStat
 from study_app.viewmodels.designer.file_text import file_text
 from study_app.viewmodels.designer.form.form_rows import form
 from study_app.viewmodels.designer.outline_rows import outline_rows
-from study_app.viewmodels.designer.problem_rows import ProblemRow, problem_rows
+from study_app.viewmodels.designer.problem_rows import ProblemRow, problem_rows, warning_rows
 from study_app.viewmodels.designer.requests import DeleteElement, RenameElement, Request
 
 REST_MS: Final = 200
@@ -108,6 +108,7 @@ class DesignerController(QObject):
         self._repairs.found.connect(place.show_repairs)
         self.measures = MeasuresController(editing, place, self._repairs)
         self.measures.warned.connect(self._show_header)
+        self.measures.warned.connect(self._show_warnings)
 
     # opening
 
@@ -263,6 +264,12 @@ class DesignerController(QObject):
         if known.warnings != self._warnings:
             self._warnings = known.warnings
             self._show_header()
+        self._show_warnings()
+
+    def _show_warnings(self) -> None:
+        """List the warnings after the problems."""
+        if (opened := self.editing.opened) is not None:
+            self.place.show_warnings(warning_rows(opened.study, (*self._warnings, *self.measures.warnings)))
 
     def _header(self) -> HeaderState:
         warnings = len({*self._warnings, *self.measures.warnings})

@@ -39,7 +39,14 @@ class ProblemSteps(QObject):
         self._repairs = {row: words for row, words in self._repairs.items() if row in problems}
         self._form.show_repairs(self._repairs)
         self._card.show_problems(problems, element, self._repairs)
-        if before and not problems and not self._card.under_pointer:
+        if before and not self._card.rows and not self._card.under_pointer:
+            self._card.hide()
+
+    def show_warnings(self, warnings: tuple[ProblemRow, ...]) -> None:
+        """Show other warnings; the list closes when the last one is solved."""
+        before = self._card.rows
+        self._card.show_warnings(warnings)
+        if before and not self._card.rows and not self._card.under_pointer:
             self._card.hide()
 
     def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
@@ -55,7 +62,7 @@ class ProblemSteps(QObject):
         if row.element:
             self.selected.emit(row.element)
         in_form = bool(row.element) and self._form.focus(row.fault.path)
-        if row.line is not None and not in_form:
+        if row.line is not None and not in_form and not row.warning:
             self._areas.show_tab("file")
         if row.line is not None:
             self._file.editor.go_to(row.line - 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QMouseEvent, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
@@ -15,7 +15,7 @@ from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
-from study_app.gui.widgets.labels import Clamped, Elided, figures, label
+from study_app.gui.widgets.labels import Clamped, Elided, Ink, figures, label
 from study_app.viewmodels.designer.keys import key_cap, tip
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
@@ -46,7 +46,8 @@ class ProblemLine(Themed, QWidget):
         across = QHBoxLayout(self)
         across.setContentsMargins(10, 2, 6, 2)
         across.setSpacing(10)
-        across.addWidget(Icon("warning", "bad", 18))
+        self.mark = Icon("warning", "warn" if row.warning else "bad", 18)
+        across.addWidget(self.mark)
         across.addWidget(Icon(row.icon, "text2", 18))
         across.addWidget(self.go)
         field = Elided("label", "text2")
@@ -57,9 +58,9 @@ class ProblemLine(Themed, QWidget):
         said = Clamped(words, 2, "label")
         self.setToolTip(f"{row.message}  ({row.hint})" if row.hint else row.message)
         said.setAlignment(Qt.AlignmentFlag.AlignVCenter)
-        line = figures("" if row.line is None else f"line {row.line}", "small", "text2")
-        line.setFixedWidth(LINE_PX)
-        across.addWidget(line)  # before the sentence: repairs of different widths would shift it
+        self._line = figures("", "small", "text2")
+        self._line.setFixedWidth(LINE_PX)
+        across.addWidget(self._line)  # before the sentence: repairs of different widths would shift it
         across.addWidget(said, 1)
         buttons = QWidget()
         buttons.setMinimumWidth(NARROW_REPAIR_PX if narrow else REPAIR_PX)
@@ -71,6 +72,18 @@ class ProblemLine(Themed, QWidget):
         self.repairs: list[RepairButton] = []
         self.setMinimumHeight(ROW_PX)
         self.show_repairs(repairs)
+        self.follow(row)
+
+    def follow(self, row: ProblemRow | None) -> None:
+        """Stand for the same problem of the study as it is now; None: it is solved."""
+        if row is not None:
+            self.row = row
+            self._line.setText("" if row.line is None else f"line {row.line}")
+            for button in self.repairs:
+                button.problem = row
+        self.setEnabled(row is not None)
+        ink: Ink = "ok" if row is None else "warn" if row.warning else "bad"
+        self.mark.show_icon("check" if row is None else "warning", ink)
 
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
         """Offer repairs, two at most."""
@@ -104,7 +117,9 @@ class ProblemsCard(Card):
     def __init__(self) -> None:
         super().__init__(padding=16, gap=8)
         self.setAccessibleName("Problems")
-        self.rows: tuple[ProblemRow, ...] = ()
+        self._problems: tuple[ProblemRow, ...] = ()
+        self._warnings: tuple[ProblemRow, ...] = ()
+        self._moved = False
         self.lines: list[ProblemLine] = []
         self._element: object = None
         self._here_only = False
@@ -139,32 +154,73 @@ class ProblemsCard(Card):
         self, rows: tuple[ProblemRow, ...], element: object, repairs: Mapping[ProblemRow, tuple[str, ...]]
     ) -> None:
         """Show problems; ``element`` is the selected one."""
-        self.rows, self._element, self._repairs = rows, element, dict(repairs)
-        self.heading.setText(f"{len(rows)} problem{'s' * (len(rows) != 1)}" if rows else "No problems")
+        self._problems, self._element, self._repairs = rows, element, dict(repairs)
+        self._show()
+
+    def show_warnings(self, rows: tuple[ProblemRow, ...]) -> None:
+        """Show the warnings after the problems."""
+        self._warnings = rows
+        self._show()
+
+    @property
+    def rows(self) -> tuple[ProblemRow, ...]:
+        """The problems, then the warnings."""
+        return (*self._problems, *self._warnings)
+
+    def _show(self) -> None:
+        rows = self.rows
+        counts = ((len(self._problems), "problem"), (len(self._warnings), "warning"))
+        counted = [f"{count} {word}{'s' * (count != 1)}" for count, word in counts if count]
+        self.heading.setText(", ".join(counted) or "No problems")
         self.limit.show_values(((False, "All"), (True, "Here only")), self._here_only)
         self.next.setEnabled(bool(rows))
-        wanted = min(HIGHEST, HEAD_PX + (ROW_PX + 1) * max(1, len(rows)))
+        listed = tuple(row for row in rows if not self._here_only or row.element == self._element)
+        wanted = min(HIGHEST, HEAD_PX + (ROW_PX + 1) * max(1, len(listed)))
         self.setFixedHeight(max(wanted, self.height()) if self.under_pointer else wanted)
-        listed = tuple(row for row in rows if not self._here_only or row.element == element)
         if listed == self._listed:
             return
         self._listed = listed
+        if self.under_pointer and self.lines:
+            self._keep_places(listed)
+            return
         inside = QWidget()
-        column = QVBoxLayout(inside)
+        self._column = column = QVBoxLayout(inside)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
+        if rows and not listed:
+            column.addWidget(label(f"None in this element, {len(rows)} in others", "label", "text2"))
+        column.addStretch()
         self.lines = []
         for row in listed:
-            made = ProblemLine(row, repairs.get(row, ()), narrow=(self.parentWidget() or self).width() < NARROW_BELOW)
-            made.opened.connect(lambda row=row: self._open(row))
-            made.repair_asked.connect(lambda words, row=row: self.repair_asked.emit(row, words))
-            made.here = row == self.at
-            column.addWidget(made)
-            column.addWidget(Rule())
-            self.lines.append(made)
-        column.addStretch()
+            self._add_line(row)
         apply_theme_within(inside, self.theme)
         replace_inside(self.area, inside)
+
+    def _add_line(self, row: ProblemRow) -> None:
+        narrow = (self.parentWidget() or self).width() < NARROW_BELOW
+        made = ProblemLine(row, self._repairs.get(row, ()), narrow=narrow)
+        made.opened.connect(lambda: self._open(made.row))
+        made.repair_asked.connect(lambda words: self.repair_asked.emit(made.row, words))
+        made.here = row == self.at
+        for part in (made, Rule()):
+            apply_theme_within(part, self.theme)
+            self._column.insertWidget(self._column.count() - 1, part)
+        self.lines.append(made)
+
+    def _keep_places(self, listed: tuple[ProblemRow, ...]) -> None:
+        """Leave every line where it is while someone points at one: solved ones are marked, others come last."""
+        self._moved = True
+        rest = list(listed)
+        for line in self.lines:
+            before = line.row.fault
+            now = next((one for one in rest if one.fault[:2] == before[:2]), None)
+            line.follow(now)
+            if now is not None:
+                rest.remove(now)
+        for row in rest:
+            self._add_line(row)
+        inside = self.area.widget()  # at once: a layout that lacks room makes every line lower
+        inside.resize(inside.width(), max(inside.height(), self._column.minimumSize().height()))
 
     @property
     def under_pointer(self) -> bool:
@@ -174,9 +230,17 @@ class ProblemsCard(Card):
     def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
         """Take the height that the problems need; without any the list is closed."""
         super().leaveEvent(event)
-        self.show_problems(self.rows, self._element, self._repairs)
+        self._show()
+        if self._moved:  # later: Qt says that the pointer leaves where what is under it is replaced, too
+            QTimer.singleShot(0, self, self._order)
         if not self.rows:
             self.close_asked.emit()
+
+    def _order(self) -> None:
+        """List the problems in the order of their lines again."""
+        if self._moved and not self.under_pointer:
+            self._moved, self._listed = False, None
+            self._show()
 
     def show_repairs(self, row: ProblemRow, repairs: tuple[str, ...]) -> None:
         """Offer the repairs of a problem."""
@@ -210,5 +274,6 @@ class ProblemsCard(Card):
         self.opened.emit(row)
 
     def _limit(self, here_only: object) -> None:
-        self._here_only = bool(here_only)
-        self.show_problems(self.rows, self._element, self._repairs)
+        self._here_only, self._listed = bool(here_only), None
+        self.lines = []
+        self._show()

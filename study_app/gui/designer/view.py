@@ -205,6 +205,10 @@ class DesignerPlace(Place):
         """Show the rows of the outline."""
         self.outline.show_outline(rows, selected)
 
+    def show_warnings(self, rows: tuple[ProblemRow, ...]) -> None:
+        """List the warnings of ``check`` after the problems."""
+        self.problem_steps.show_warnings(rows)
+
     def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
         """Offer the repairs of a problem."""
         self.problem_steps.show_repairs(row, words)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Final
 
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.outline import title_of
-from study_app.protocol.source.document import Path, has
+from study_app.protocol.source.document import Path, has, names
 from study_app.protocol.source.line_numbers import places_of
 from study_app.protocol.source.problems import Fault
 from study_app.viewmodels.designer.outline_rows import FIRST, icon_of
+
+_PLACE: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
+"""The place in the file that a warning begins with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +36,8 @@ class ProblemRow:
         The sentence of ``check``, and its hint.
     line : int or None
         The line in the file, from 1.
+    warning : bool
+        Whether ``check`` only warns of it.
     """
 
     fault: Fault
@@ -40,6 +48,7 @@ class ProblemRow:
     message: str
     hint: str
     line: int | None
+    warning: bool = False
 
 
 @lru_cache(maxsize=2)
@@ -53,6 +62,28 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
     places = places_of(study.text)
     found = [_row(study, fault, places.line(fault.path)) for fault in study.faults]
     return tuple(sorted(found, key=lambda row: row.line or 0))
+
+
+def warning_rows(study: Study, sentences: Iterable[str]) -> tuple[ProblemRow, ...]:
+    """Return the warnings of ``check``, in its order, each with the element that it names first."""
+    places = places_of(study.text) if study.is_toml else None
+    found = []
+    for sentence in dict.fromkeys(sentences):
+        path, words = _placed(study, sentence)
+        line = None if places is None else places.line(path)
+        found.append(replace(_row(study, Fault(path, words), line), warning=True))
+    return tuple(found)
+
+
+def _placed(study: Study, sentence: str) -> tuple[Path, str]:
+    """Return the place of a warning, and what it says of it."""
+    if (stated := _PLACE.match(sentence)) is not None:
+        return tuple(int(step) - 1 if step.isdecimal() else step for step in stated[1].split(".")), stated[2]
+    for word in re.findall(r"\w+", sentence):
+        for section in ("liquids", "blocks"):
+            if word in names(study.document, section):
+                return (section, word), sentence
+    return FIRST, sentence
 
 
 def element_of(study: Study, path: Path) -> Path:

@@ -10,6 +10,7 @@ from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.authoring.study_facts import facts
+from study_app.authoring.writer.edits import Set
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.requests import ChangeLanguage, SetValue
 
@@ -45,6 +46,48 @@ def test_the_list_keeps_its_height_and_stays_while_the_pointer_is_over_it(design
     assert problems.isVisible()
     leave(problems)
     assert not problems.isVisible()
+
+
+def test_no_line_moves_while_the_pointer_is_over_the_list(qtbot: Any, designer: Any) -> None:
+    text = designer.file.read_text()
+    broken = text.replace("force_limit_n = 6", "force_limit_n = 60").replace('liquid = "thick"', 'liquid = "thik"', 1)
+    designer.file.write_text(broken)
+    designer.controller.open("kitchen")
+    designer.place.header.problems.click()
+    problems = designer.place.problems
+    enter(problems)
+    first, second, *_ = problems.lines
+    places = [line.pos() for line in problems.lines]
+    assert first.row.fault.path == ("device", "force_limit_n")
+    designer.editing.type_text("Correct it", "# one more line\n" + designer.text.replace("= 60", "= 6"))
+    designer.editing.ask(SetValue(("study", "version"), 3))
+    assert [line.pos() for line in problems.lines[: len(places)]] == places
+    assert (first.isEnabled(), first.mark.name) == (False, "check")
+    assert second.isEnabled()
+    assert second.row in designer.place.view.problems  # with its line as it is now
+    assert problems.lines[-1].row.fault.path == ("study", "version")
+    leave(problems)
+    qtbot.waitUntil(lambda: [line.row for line in problems.lines] == list(designer.place.view.problems))
+    assert problems.lines[0].row.fault.path == ("study", "version")
+
+
+def test_the_chip_of_warnings_opens_a_list_of_them(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.editing.make("Alike", Set(("liquids", "thick", "density_kg_m3"), 1001))
+    qtbot.waitUntil(lambda: "warning" in designer.place.header.problems.words)
+    warned = facts(designer.editing.opened.study).warnings
+    assert designer.place.view.problems == ()
+    designer.place.header.problems.click()
+    problems = designer.place.problems
+    assert [line.row.message.lower() for line in problems.lines] == [one.lower() for one in warned]
+    assert problems.heading.text() == designer.place.header.problems.words
+    designer.place.problems.next.click()
+    assert designer.editing.selected == problems.lines[0].row.element == ("liquids", "thin")
+    problems.limit.chosen.emit(True)
+    designer.editing.select(("pages", "welcome"))
+    assert not problems.lines
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: not problems.isVisible())
 
 
 def test_the_list_is_not_made_anew_while_the_pointer_leaves_it(qtbot: Any, designer: Any) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
@@ -320,7 +320,10 @@ def part_of(card: object) -> Made:
 
 
 class CardGrid(Themed, QWidget):
-    """Cards in two columns; only those that changed are made anew. ``open_asked`` carries the path of an element."""
+    """Cards in two columns; only those that changed are made anew. ``open_asked`` carries the path of an element.
+
+    While the pointer is over them, none becomes lower: what is pointed at stays where it is.
+    """
 
     open_asked = Signal(object)
 
@@ -336,6 +339,7 @@ class CardGrid(Themed, QWidget):
         """Show other cards."""
         if cards == self.cards:
             return
+        heights = [part.height() for part in self.parts] if self.isVisible() and self.underMouse() else []
         kept = {at: part for at, (part, card) in enumerate(zip(self.parts, self.cards, strict=True))
                 if at < len(cards) and card == cards[at]}  # fmt: skip
         for at, part in enumerate(self.parts):
@@ -354,6 +358,14 @@ class CardGrid(Themed, QWidget):
             self.grid.addLayout(row)
         self.grid.addStretch(1)
         self.cards = cards
+        for part, height in zip(self.parts, heights, strict=False):
+            part.setMinimumHeight(height)
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+        """Let each card be as high as it needs to be."""
+        super().leaveEvent(event)
+        for part in self.parts:
+            part.setMinimumHeight(0)
 
     def _made(self, card: object) -> Made:
         part = part_of(card)

@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 from pyqtgraph import TextItem
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QPointF, Qt
+from PySide6.QtGui import QEnterEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QLineEdit
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit
 
 from study_app.app.designer.measures.measures_worker import (
     Advising,
@@ -22,11 +23,11 @@ from study_app.app.designer.measures.measures_worker import (
 from study_app.authoring.measures.kept_participants import kept_participants
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
-from study_app.gui.designer.measures.parts import NumberPart
+from study_app.gui.designer.measures.parts import CardGrid, NumberPart
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.measures.number_cards import ANEW, UNKNOWN, NumberCard, TextsCard
+from study_app.viewmodels.designer.measures.number_cards import ANEW, UNKNOWN, Line, LinesCard, NumberCard, TextsCard
 from tests.app.designer.measures.conftest import Worker, jnd, shown
 
 pytestmark = pytest.mark.slow
@@ -318,3 +319,21 @@ def test_measures_are_those_of_the_study_that_is_opened(qtbot: Any, designer: An
     for study, titles in (("rek2024", ["English", "Dutch"]), ("demo", ["English"])):
         designer.controller.open(study)
         qtbot.waitUntil(lambda titles=titles: languages() == titles)
+
+
+def test_no_card_moves_while_the_pointer_is_over_the_cards(qtbot: Any) -> None:
+    grid = CardGrid()
+    qtbot.addWidget(grid)
+    grid.resize(600, 800)
+    grid.show()
+    lines = tuple(Line(f"Liquid {number}", "1 N", 0.5) for number in range(4))
+    long, other = LinesCard("Force", "", lines), LinesCard("Other", "", lines[:1])
+    grid.show_cards((long, long, other, other))
+    qtbot.wait(20)
+    before = grid.parts[2].pos()
+    QApplication.sendEvent(grid, QEnterEvent(QPointF(5, 5), QPointF(5, 5), QPointF(5, 5)))
+    grid.show_cards((other, other, other, long))
+    qtbot.wait(20)
+    assert grid.parts[2].pos() == before
+    QApplication.sendEvent(grid, QEvent(QEvent.Type.Leave))
+    qtbot.waitUntil(lambda: grid.parts[2].y() < before.y())
