@@ -269,7 +269,8 @@ class DesignerController(QObject):
     def _show_warnings(self) -> None:
         """List the warnings after the problems."""
         if (opened := self.editing.opened) is not None:
-            self.place.show_warnings(warning_rows(opened.study, (*self._warnings, *self.measures.warnings)))
+            warned = (*self._warnings, *self.measures.warnings)
+            self.place.problem_steps.show_warnings(warning_rows(opened.study, warned))
 
     def _header(self) -> HeaderState:
         warnings = len({*self._warnings, *self.measures.warnings})

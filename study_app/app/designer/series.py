@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QObject
 
 from study_app.app.designer.editing import Editing
+from study_app.authoring.changes.series import series_start
 from study_app.gui.designer.prompts import SeriesCard
 from study_app.gui.designer.view import DesignerPlace
 from study_app.protocol.source.document import Path
@@ -20,10 +21,11 @@ class SeriesPrompts(QObject):
         place.series_asked.connect(self.ask)
 
     def ask(self, path: Path) -> None:
-        """Ask for the values of a series of an element, or say why there can be none."""
-        self.editing.select(path)
+        """Ask for the values of a series of an element, or say why there can be none; of a section of its last one."""
         if (opened := self.editing.opened) is None:
             return
+        path = series_start(opened.study.document, path) or path
+        self.editing.select(path)
         prompt = series_prompt(opened.study, path)
         if prompt is None or opened.read_only:
             why = opened.read_only or "This element has no number field."

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from study_app.authoring.additions import duplicated
 from study_app.authoring.edited_study import Study
-from study_app.authoring.fields import Row, label_of, refused_at, rows, why_not
+from study_app.authoring.fields import Row, label_of, refused_at, row_at, rows, why_not
 from study_app.authoring.names import references_to, renamed
 from study_app.authoring.writer.edits import Edit, Insert, Set
 from study_app.authoring.writer.refused import Refused
@@ -52,6 +52,15 @@ def number_rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
     """Return the numbers of an element of which there can be a series, in the order of its form."""
     table = len(path) == 2 and isinstance(path[1], str) and isinstance(value_at(document, path), Mapping)
     return tuple(_numbers(document, path, _DEEPEST)) if table else ()
+
+
+def series_start(document: Mapping[str, Any], path: Path) -> Path | None:
+    """Return the element that a series begins with: the one at ``path``, of a section its last one with a number."""
+    row = row_at(document, path) if len(path) == 1 else None
+    inside = (
+        [(*path, name) for name in names(document, str(path[0]))] if row is not None and row.kind == "tables" else []
+    )
+    return next((one for one in reversed(inside or [path]) if number_rows(document, one)), None)
 
 
 def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:

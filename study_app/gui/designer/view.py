@@ -135,9 +135,9 @@ class DesignerPlace(Place):
         outline.rename_asked.connect(self._rename)
         outline.move_asked.connect(self._move_by)
         outline.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
-        self.adding.chosen.connect(self._take_chosen)
+        self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
         self.parts.path.open_asked.connect(self._select)
-        form.asked.connect(self.asked)
+        form.asked.connect(self._take_asked)
         form.open_asked.connect(self._select)
         form.join_asked.connect(self._join)
         form.head.up.clicked.connect(lambda: self._move_by(-1))
@@ -204,10 +204,6 @@ class DesignerPlace(Place):
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
         """Show the rows of the outline."""
         self.outline.show_outline(rows, selected)
-
-    def show_warnings(self, rows: tuple[ProblemRow, ...]) -> None:
-        """List the warnings of ``check`` after the problems."""
-        self.problem_steps.show_warnings(rows)
 
     def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
         """Offer the repairs of a problem."""
@@ -286,14 +282,14 @@ class DesignerPlace(Place):
         button = self.outline.add if self.outline.add.isVisible() else self.header
         self.adding.open(every, button.mapToGlobal(button.rect().topLeft()))
 
-    def _take_chosen(self, one: Addable) -> None:
-        """Do what was chosen in the list of what can be added."""
-        if isinstance(one.asks, AskSeries):
-            self.series_asked.emit(one.asks.path)
-        elif isinstance(one.asks, GoTo):
-            self._go_to(one.asks.element, one.asks.field)
+    def _take_asked(self, asked: object) -> None:
+        """Hand on a request; those of the place itself are done here."""
+        if isinstance(asked, AskSeries):
+            self.series_asked.emit(asked.path)
+        elif isinstance(asked, GoTo):
+            self._go_to(asked.element, asked.field)
         else:
-            self.asked.emit(one.asks)
+            self.asked.emit(asked)
 
     def _go_to(self, element: ElementPath, field: ElementPath) -> None:
         """Select an element and give the keyboard to one of its fields."""

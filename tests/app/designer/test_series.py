@@ -95,6 +95,27 @@ def test_another_number_is_chosen_and_the_series_made_by_the_mouse(qtbot: Any, w
     assert "delay_ms" not in conditions["thin_0_25"] or conditions["thin_0_25"]["delay_ms"] == 0
 
 
+def test_a_series_is_offered_in_the_list_of_conditions_and_at_headings(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    head = designer.place.form.head
+    designer.select(LISTED[:2])
+    assert head.series.isVisible()  # of blocks
+    field = designer.row(*LISTED).field
+    for chosen, name in (((0,), "thin"), ((), "thick")):
+        field = designer.row(*LISTED).field
+        field.choose(chosen)
+        qtbot.mouseClick(field.series, LEFT)
+        assert card(designer).asked.path == ("conditions", name)
+        designer.place.close_prompt()
+        designer.select(LISTED[:2])
+    designer.select(LISTED[2:])
+    qtbot.mouseClick(head.series, LEFT)
+    assert card(designer).asked.path == ("conditions", list(document(designer)["conditions"])[-1])
+    for path in (("study",), ("scene",)):
+        designer.select(path)
+        assert not head.series.isVisible()
+
+
 @pytest.mark.parametrize("word", ["series", "levels", "delays"])
 @pytest.mark.parametrize("selected", [CONDITION, LISTED[:2]])
 def test_a_series_is_found_in_the_list_of_what_can_be_added(

@@ -146,7 +146,9 @@ class FormHead(QWidget):
         self.feel.setVisible(bool(form.feel))
         self.feel.setAccessibleName(form.feel or "Feel")
         self.feel.setToolTip(f"{form.feel} in the lab")
-        self.series.setVisible(form.series and form.position is None and not read_only)
+        self.series.setVisible(form.series and not read_only)
+        self.series.show_action("bars", "Series …" if form.position is None else "")  # next to the arrows an icon alone
+        self.series.setAccessibleName(f"Series of {form.title}")
         place, count = form.position or (0, 0)
         for button in (self.up, self.down):
             button.setVisible(form.position is not None and not read_only)

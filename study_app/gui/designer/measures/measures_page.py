@@ -9,8 +9,9 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
+from study_app.gui.designer.measures.card_grid import CardGrid
 from study_app.gui.designer.measures.controls import MeasureControls
-from study_app.gui.designer.measures.parts import CardGrid, NumberPart
+from study_app.gui.designer.measures.parts import NumberPart
 from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.controls import ActionButton

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QEvent, QRectF, Qt, Signal
+from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
@@ -317,73 +317,3 @@ def part_of(card: object) -> Made:
         return TextsPart(card)
     assert isinstance(card, LinesCard)  # noqa: S101 - the last kind
     return LinesPart(card)
-
-
-class CardGrid(Themed, QWidget):
-    """Cards in two columns; only those that changed are made anew. ``open_asked`` carries the path of an element.
-
-    While the pointer is over them, none becomes lower: what is pointed at stays where it is.
-    """
-
-    open_asked = Signal(object)
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.cards: tuple[object, ...] = ()
-        self.parts: list[Made] = []
-        self.grid = QVBoxLayout(self)
-        self.grid.setContentsMargins(0, 0, 0, 0)
-        self.grid.setSpacing(8)
-
-    def show_cards(self, cards: tuple[object, ...]) -> None:
-        """Show other cards."""
-        if cards == self.cards:
-            return
-        heights = [part.height() for part in self.parts] if self.isVisible() and self.underMouse() else []
-        kept = {at: part for at, (part, card) in enumerate(zip(self.parts, self.cards, strict=True))
-                if at < len(cards) and card == cards[at]}  # fmt: skip
-        for at, part in enumerate(self.parts):
-            if at not in kept:
-                remove_widget(part)
-        while self.grid.count():
-            self.grid.takeAt(0)
-        self.parts = []
-        for at, card in enumerate(cards):
-            self.parts.append(kept[at] if at in kept else self._made(card))
-        for some in _rows(self.parts):
-            row = QHBoxLayout()
-            row.setSpacing(8)
-            for part in some:
-                row.addWidget(part, 1)
-            self.grid.addLayout(row)
-        self.grid.addStretch(1)
-        self.cards = cards
-        for part, height in zip(self.parts, heights, strict=False):
-            part.setMinimumHeight(height)
-
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
-        """Let each card be as high as it needs to be."""
-        super().leaveEvent(event)
-        for part in self.parts:
-            part.setMinimumHeight(0)
-
-    def _made(self, card: object) -> Made:
-        part = part_of(card)
-        part.open_asked.connect(self.open_asked)
-        apply_theme_within(part, self.theme)
-        return part
-
-
-def _rows(parts: Sequence[Made]) -> list[list[Made]]:
-    """Return cards in rows of two, wide ones in a row of their own."""
-    rows: list[list[Made]] = []
-    waiting: list[Made] = []
-    for part in parts:
-        if part.wide:
-            rows.append([part])
-            continue
-        waiting.append(part)
-        if len(waiting) == 2:
-            rows.append(waiting)
-            waiting = []
-    return [*rows, waiting] if waiting else rows

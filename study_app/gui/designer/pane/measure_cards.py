@@ -6,8 +6,8 @@ from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
+from study_app.gui.designer.measures.card_grid import CardGrid
 from study_app.gui.designer.measures.measures_page import NumbersRow
-from study_app.gui.designer.measures.parts import CardGrid
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.measures.number_cards import EARLIER, MeasuresView
 

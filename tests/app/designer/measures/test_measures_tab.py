@@ -23,7 +23,8 @@ from study_app.app.designer.measures.measures_worker import (
 from study_app.authoring.measures.kept_participants import kept_participants
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
-from study_app.gui.designer.measures.parts import CardGrid, NumberPart
+from study_app.gui.designer.measures.card_grid import CardGrid
+from study_app.gui.designer.measures.parts import NumberPart
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.source.files import shipped_file
@@ -327,12 +328,12 @@ def test_no_card_moves_while_the_pointer_is_over_the_cards(qtbot: Any) -> None:
     grid.resize(600, 800)
     grid.show()
     lines = tuple(Line(f"Liquid {number}", "1 N", 0.5) for number in range(4))
-    long, other = LinesCard("Force", "", lines), LinesCard("Other", "", lines[:1])
+    long, short, other = LinesCard("Force", "", lines), LinesCard("Force", "", ()), LinesCard("Other", "", lines)
     grid.show_cards((long, long, other, other))
     qtbot.wait(20)
     before = grid.parts[2].pos()
     QApplication.sendEvent(grid, QEnterEvent(QPointF(5, 5), QPointF(5, 5), QPointF(5, 5)))
-    grid.show_cards((other, other, other, long))
+    grid.show_cards((short, short, other, other))
     qtbot.wait(20)
     assert grid.parts[2].pos() == before
     QApplication.sendEvent(grid, QEvent(QEvent.Type.Leave))

@@ -6,12 +6,16 @@ from dataclasses import replace
 from typing import Final
 
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout
 
 from study_app.gui.designer.form.entry_row import EntryRow
 from study_app.gui.designer.form.list_fields import EntriesField
+from study_app.gui.designer.form.row_fields import add_button
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.widgets.labels import Elided, figures
-from study_app.viewmodels.designer.form.form_rows import Entry
+from study_app.viewmodels.designer.form.form_rows import Entry, FormRow
+from study_app.viewmodels.designer.keys import tip
+from study_app.viewmodels.designer.requests import AskSeries
 from study_app.viewmodels.designer.special.conditions import CAPTION, ConditionLine
 
 FORCE_PX = 52
@@ -41,6 +45,25 @@ class ConditionsField(EntriesField):
     """The conditions, in their order."""
 
     caption = CAPTION
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.series = add_button(f"Series of {row.row.label.lower()}", "Series …")
+        self.series.setToolTip(tip("series"))
+        self.series.setEnabled(bool(row.entries))
+        self.series.clicked.connect(self._ask_for_series)
+        self.box.removeWidget(self.names)
+        below = QHBoxLayout()
+        for part in (self.names, self.series):
+            below.addWidget(part)
+        below.addStretch()
+        self.box.addLayout(below)
+
+    def _ask_for_series(self) -> None:
+        """Ask for a series of the selected condition, of the last one where none or several are."""
+        at = self.chosen[0] if len(self.chosen) == 1 else len(self.row.entries) - 1
+        if target := self.row.entries[at].target:
+            self.asked.emit(AskSeries(target))
 
     def entry_row(self, entry: Entry, words: str, *, grip: bool) -> EntryRow:
         """Return the row of a condition."""
