@@ -5,6 +5,7 @@ from typing import Any
 import numba
 import numpy as np
 
+from study_app.haptics.kernels.compiled import entry_of
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
@@ -125,6 +126,7 @@ class Hand:
         self.safety[0].fade = 1.0 if faded_in else 0.0
         self.sample = records(SAMPLE, 1)
         self.time_ns = 0
+        self._tick = entry_of(tick, self.model, self.safety[0], self.sample[0])
 
     def tick(self, position_m: Any = None, *, after_ns: int = TICK_NS) -> Any:
         """Take one tick, with a new sample at ``position_m`` (hand frame), or without one; return a copy of it."""
@@ -134,7 +136,7 @@ class Hand:
         sample.fresh = int(position_m is not None)
         if position_m is not None:
             sample.position_m[:] = position_m
-        tick(self.model, self.safety[0], sample)
+        self._tick(self.model, self.safety[0], sample)
         return self.sample.copy()[0]
 
     def sweep(self, speed_mps: float, ticks: int, *, start_m: float = 0.0) -> list[Any]:

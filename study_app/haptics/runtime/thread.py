@@ -10,11 +10,14 @@ import signal
 import threading
 import time
 import weakref
+from collections.abc import Callable
+from functools import cached_property
 from types import FrameType
 from typing import Any
 
 from study_app.errors import DeviceError, ServoFault
 from study_app.haptics.kernels.c_functions import Driver
+from study_app.haptics.kernels.compiled import entry_of
 from study_app.haptics.kernels.loop import (
     CONTROL,
     ClockCalls,
@@ -102,7 +105,11 @@ class LoopThread:
     def compile(self) -> None:
         """Compile the loop for its arguments, or load it from the cache: zero force is written, no tick taken."""
         let_go(self._exchanged.command, self._device)
-        run(*self._arguments, 0)
+        self._run(*self._arguments, 0)
+
+    @cached_property
+    def _run(self) -> Callable[..., int]:
+        return entry_of(run, *self._arguments, 0)
 
     @property
     def stuck(self) -> bool:
@@ -154,7 +161,7 @@ class LoopThread:
         """Take ``ticks`` in the calling thread; return how many were taken."""
         if not self.live:
             self._begin()
-        return int(run(*self._arguments, max(ticks, 0)))
+        return int(self._run(*self._arguments, max(ticks, 0)))
 
     def hand_over(self, scene: Scene, serial: int, *, goes_on: bool = False) -> None:
         """Pack ``scene`` into the spare slot and let the next tick take it; first let it take the one before.
@@ -251,7 +258,7 @@ class LoopThread:
         finally:
             ready.set()
         try:
-            run(*self._arguments, _FOREVER)
+            self._run(*self._arguments, _FOREVER)
         finally:
             let_go(self._exchanged.command, self._device)
 

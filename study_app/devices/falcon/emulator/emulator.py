@@ -7,6 +7,8 @@ depends on nothing but its commands and the ``random`` it was made with.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from random import Random
 from typing import Any
 
@@ -35,6 +37,7 @@ from study_app.devices.falcon.transport.bulk_calls import BulkCalls
 from study_app.devices.falcon.wire import constants
 from study_app.devices.scripted import TREMOR_M, new_scripted_handle
 from study_app.devices.simulated.hand_commands import HandOrders
+from study_app.haptics.kernels.compiled import entry_of
 from study_app.haptics.model.layout import records
 
 STOPS_M = (0.055, 0.055, 0.050)
@@ -83,6 +86,7 @@ class Emulator(HandOrders):
         self.memory = memory
         self._address = int(memory.ctypes.data)
         random = random or Random(0)  # noqa: S311 - faults and tremor keep no secrets
+        self._now_ns = memory["bridge"]["now_ns"]
         self._tremble(random, tremor_m)
         self.faults = Faults(self.state.faults, random)
         power_up(self.state.bridge)
@@ -163,11 +167,15 @@ class Emulator(HandOrders):
     @property
     def now_ns(self) -> int:
         """How far its time has come [ns]."""
-        return int(self.state.bridge.now_ns)
+        return int(self._now_ns[0])
 
     def pause(self, seconds: float) -> None:
         """Let emulated time pass, hand and handle move."""
-        let_pass(self.state, round(seconds * 1e9))
+        self._let_pass(self.state, round(seconds * 1e9))
+
+    @cached_property
+    def _let_pass(self) -> Callable[[Any, int], None]:
+        return entry_of(let_pass, self.state, 0)
 
     def look(self) -> None:
         """Let it come up to the present of its clock: hear what has arrived, move for a while at most."""
