@@ -21,6 +21,7 @@ SLOW_MPS: Final = 1e-3
 """Speed at which friction is taken as three quarters of what it is in motion."""
 MOST_DELAY_S: Final = 8e-3
 _STEP_S: Final = 0.1e-3
+_NEAR: Final = 10
 _REACH: Final = 5  # widths of the Gaussian on either side
 
 
@@ -159,7 +160,9 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
         force = force_n(delay_s)
         return float(force @ force - np.sum((force @ orthogonal) ** 2)) / len(force)
 
-    delay_s = float(min(np.arange(0.0, MOST_DELAY_S, _STEP_S), key=residual_n2))
+    nearest_s = min(np.arange(0.0, MOST_DELAY_S, _NEAR * _STEP_S), key=residual_n2)  # no force varies within 1 ms
+    around_s = nearest_s + np.arange(1 - _NEAR, _NEAR) * _STEP_S
+    delay_s = float(min(around_s[around_s >= 0.0], key=residual_n2))
     mass_kg, damping_nspm, friction_n, *_ = np.linalg.solve(triangle, force_n(delay_s) @ orthogonal)
     left, variance = residual_n2(delay_s), float(force_n(delay_s).var())
     return Motion(
