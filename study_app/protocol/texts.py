@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, Any, Final, TypeAlias
 
 from pydantic import AfterValidator, BeforeValidator, Field, StringConstraints
@@ -40,6 +41,7 @@ def _tidy_each(value: Any) -> Any:
     raise PydanticCustomError("text_type", 'a text is a string, or one string per language: {en = "…", nl = "…"}')
 
 
+@lru_cache(maxsize=4096)  # a study that is edited is validated after each change
 def _printable(text: str) -> str:
     """Return ``text`` if a person can read it: something visible, and nothing that hides or reorders what is there."""
     for letter in text:
