@@ -1,17 +1,17 @@
-"""A choice between few words, side by side: the chosen one is raised, with an accent edge."""
+"""A choice between few words, side by side: the chosen one is raised, the one with the keyboard has a ring."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 
-INSIDE = 3
+INSIDE, BETWEEN = 3, 4
 
 
 class _Segment(Themed, QAbstractButton):
@@ -29,6 +29,13 @@ class _Segment(Themed, QAbstractButton):
             self.setText(words)
             self.setAccessibleName(words)
 
+    def event(self, event: QEvent) -> bool:
+        """Let the strip paint the ring around the part with the keyboard."""
+        strip = self.parentWidget()
+        if event.type() in (QEvent.Type.FocusIn, QEvent.Type.FocusOut) and strip is not None:
+            strip.update()
+        return super().event(event)
+
     def nextCheckState(self) -> None:  # noqa: N802 - Qt's name
         """Leave it to `Segments` which is chosen."""
 
@@ -45,9 +52,9 @@ class _Segment(Themed, QAbstractButton):
         t, painter = self.theme, QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         body = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        if self.isChecked() or self.hasFocus():
-            painter.setPen(QPen(QColor(t.accent if self.isEnabled() else t.ctl), 2 if self.hasFocus() else 1.2))
-            painter.setBrush(QColor(t.surface) if self.isChecked() else Qt.BrushStyle.NoBrush)
+        if self.isChecked():
+            painter.setPen(QPen(QColor(t.accent if self.isEnabled() else t.ctl), 1.2))
+            painter.setBrush(QColor(t.surface))
             painter.drawRoundedRect(body, RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
         painter.setPen(QColor(t.text if self.isChecked() else t.text2))
         painter.setFont(font("label", weight=600 if self.isChecked() else 500))
@@ -68,7 +75,7 @@ class Segments(Themed, QWidget):
         self.buttons: list[_Segment] = []
         self._row = QHBoxLayout(self)
         self._row.setContentsMargins(INSIDE, INSIDE, INSIDE, INSIDE)
-        self._row.setSpacing(2)
+        self._row.setSpacing(BETWEEN)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._add_button()
 
@@ -110,9 +117,15 @@ class Segments(Themed, QWidget):
             super().keyPressEvent(event)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the sunk strip."""
+        """Paint the sunk strip, and the ring."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(self.theme.sunk))
         painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+        for button in self.buttons:
+            if button.hasFocus():
+                painter.setPen(QPen(QColor(self.theme.accent), 2))
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+                ring = QRectF(button.geometry()).adjusted(-2, -2, 2, 2)
+                painter.drawRoundedRect(ring, RADIUS_CONTROL, RADIUS_CONTROL)

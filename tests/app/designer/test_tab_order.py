@@ -9,6 +9,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.viewmodels.designer.requests import ChangeLanguage
 
 pytestmark = pytest.mark.slow
@@ -99,3 +100,18 @@ def test_ctrl_l_shows_the_page_in_the_next_language(qtbot: Any, dutch: Any, widt
     assert "(Ctrl+L)" in tab.languages.buttons[0].toolTip()
     press(qtbot, KEY.Key_L, CONTROL)
     assert tab.view.language == "en"
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK])
+def test_a_ring_shows_the_tab_with_the_keyboard_and_its_surface_the_chosen_one(dutch: Any, theme: Any) -> None:
+    dutch.window.show_theme(theme)
+    tabs = dutch.place.pane.tabs
+    chosen, other, third = tabs.buttons[:3]
+    for focused in (chosen, other):
+        focused.setFocus()
+        image = tabs.grab().toImage()
+        for one in (chosen, other, third):
+            middle, top = one.geometry().center().x(), one.geometry().top()
+            at = [image.pixelColor(middle, top + y).name().upper() for y in (-2, 4)]
+            assert (at[0] == theme.accent.upper()) == (one is focused)
+            assert (at[1] == theme.surface.upper()) == (one is chosen)
