@@ -21,10 +21,18 @@ from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import has
 from study_app.protocol.source.files import find, shipped, shipped_file
 from study_app.viewmodels.designer.designer_view import HeaderState, StudyChoice, problems_chip
-from study_app.viewmodels.designer.new_study import TEMPLATES, TemplateChoice, copy_choice, template_choice
+from study_app.viewmodels.designer.new_study import (
+    SHIPPED,
+    TEMPLATES,
+    TemplateChoice,
+    copy_choice,
+    copy_name,
+    template_choice,
+)
 from study_app.viewmodels.designer.outline_rows import FIRST
 from study_app.viewmodels.designer.versions.standing import VersionChip
 from study_app.viewmodels.home import holds_liquids_alone, is_shipped, sources
+from study_app.workspace import workspace
 
 
 def studies(opened: OpenStudy | None) -> tuple[StudyChoice, ...]:
@@ -107,12 +115,14 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
     """
     in_order = [name for name in TEMPLATES if name in templates()]
     choices = [_template_choice(name) for name in dict.fromkeys((*in_order, *templates()))]
+    files = (*workspace().protocols.glob("*.toml"), *unsaved_studies())
+    taken = {*shipped(), *(file.stem for file in files)}
     copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
     for name in copied:
         file = shipped_file(name) if name in shipped() else find(name)
-        note = "ships with the program" if name in shipped() else str(file.name)
+        note = SHIPPED if name in shipped() else str(file.name)
         document, _places = read_document(file.read_bytes(), name)
-        choices.append(copy_choice(name, document, note))
+        choices.append(copy_choice(name, document, note, copy_name(file.stem, taken)))
     return tuple(choices)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal, TypeAlias
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QAccessible, QFontMetricsF, QResizeEvent, QTextLayout
+from PySide6.QtGui import QAccessible, QFont, QFontMetrics, QFontMetricsF, QResizeEvent, QTextLayout
 from PySide6.QtWidgets import QLabel, QSizePolicy
 
 from study_app.gui.theme.theme import TypeRole, font
@@ -114,26 +114,26 @@ class Clamped(QLabel):
             self._cut()
 
     def _cut(self) -> None:
-        lines = self._broken(self.width())
-        if len(lines) > self._most:
-            rest = " ".join(lines[self._most - 1 :])
-            rest = self.fontMetrics().elidedText(rest, Qt.TextElideMode.ElideRight, self.width())
-            lines = [*lines[: self._most - 1], rest]
+        lines = clamped(self.whole, self._most, self.font(), self.width())
         self.setText("\n".join(lines))
         if not self._steady:
             self.setFixedHeight(max(1, len(lines)) * self.fontMetrics().lineSpacing() + 2)
         self.setToolTip(self.whole if lines and lines[-1].endswith("…") else "")
 
-    def _broken(self, width: int) -> list[str]:
-        """Return the text in lines that fit into ``width``."""
-        layout = QTextLayout(self.whole, self.font())
-        layout.beginLayout()
-        lines = []
-        while (line := layout.createLine()).isValid():
-            line.setLineWidth(width)
-            lines.append(self.whole[line.textStart() : line.textStart() + line.textLength()].strip())
-        layout.endLayout()
+
+def clamped(text: str, most: int, font: QFont, width: int) -> list[str]:
+    """Return a text in lines that fit into ``width``; the last one ends in "…" where there would be too many."""
+    layout = QTextLayout(text, font)
+    layout.beginLayout()
+    lines = []
+    while (line := layout.createLine()).isValid():
+        line.setLineWidth(width)
+        lines.append(text[line.textStart() : line.textStart() + line.textLength()].strip())
+    layout.endLayout()
+    if len(lines) <= most:
         return lines
+    rest = QFontMetrics(font).elidedText(" ".join(lines[most - 1 :]), Qt.TextElideMode.ElideRight, width)
+    return [*lines[: most - 1], rest]
 
 
 def set_ink(widget: QLabel, ink: Ink) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import chain, count
 from typing import Final
 
 from study_app.authoring.edited_study import Study
@@ -50,6 +51,7 @@ TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
 """Title and question of each template, in the order in which they are shown."""
 
 
+SHIPPED: Final = "shipped study"
 STEPS: Final = ("pages", "blocks", "questionnaires")
 """Sections whose tables are steps of a session."""
 
@@ -112,7 +114,7 @@ class TemplateChoice:
     recovery : Recovery or None
         Its known answer.
     name, study_title : str
-        Short name and title that it has.
+        Short name that a copy gets where none is given, and title that it has.
     questions : tuple of OwnQuestion
         What it asks beyond title, name and languages.
     """
@@ -126,6 +128,7 @@ class TemplateChoice:
     tags: tuple[tuple[str, str], ...] = ()
     session: tuple[tuple[str, str, str], ...] = ()
     recovery: Recovery | None = None
+    name: str = ""
     study_title: str = ""
     languages: tuple[str, ...] = ()
     questions: tuple[OwnQuestion, ...] = ()
@@ -140,6 +143,13 @@ def proposed_name(title: str) -> str:
     """Return a short name made of a title: its letters a to z, small and without accents, and its digits."""
     plain = unicodedata.normalize("NFKD", title).lower()
     return re.sub(r"^[0-9]+", "", re.sub(r"[^a-z0-9]+", "", plain))[:NAME_LENGTH]
+
+
+def copy_name(name: str, taken: Collection[str]) -> str:
+    """Return a short name for a copy of a study that is free: "kitchencopy", "kitchencopy2"."""
+    stem = re.sub("copy[0-9]*$", "", proposed_name(name)) or "study"
+    ends = chain(("copy",), (f"copy{number}" for number in count(2)))
+    return next(free for end in ends if (free := f"{stem[: NAME_LENGTH - len(end)]}{end}") not in taken)
 
 
 def template_choice(name: str, study: Study) -> TemplateChoice:
@@ -167,12 +177,13 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
     return replace(found, figures=tuple(_figures(protocol)), tags=_tags(protocol), session=tuple(session))
 
 
-def copy_choice(source: str, document: Document, note: str) -> TemplateChoice:
+def copy_choice(source: str, document: Document, note: str, name: str) -> TemplateChoice:
     """Return what is shown of a study that can be copied."""
     title, words = _described(document)
     return TemplateChoice(
-        source, title or source, words, copy=True, note=note, study_title=title, languages=_languages(document)
-    )
+        source, title or source, words, copy=True, note=note, name=name, study_title=title,
+        languages=_languages(document),
+    )  # fmt: skip
 
 
 def _described(document: Document) -> tuple[str, str]:

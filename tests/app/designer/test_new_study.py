@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QLineEdit
+from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit
 
 from study_app.app.designer.controller import DesignerController
 from study_app.authoring.templates import templates
+from study_app.gui.designer.new_study.cards import RING
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.protocol.source.files import shipped
 from study_app.viewmodels.designer.requests import SetValue
@@ -124,6 +125,70 @@ def test_the_title_gives_the_short_name_where_none_is_typed(qtbot: Any, designer
     qtbot.keyClick(title, Qt.Key.Key_Return)
     assert designer.editing.opened.name == name
     assert designer.place.outline.tree.hasFocus()
+
+
+def test_a_copy_has_a_short_name_that_is_free_where_none_is_typed(qtbot: Any, designer: Any) -> None:
+    for name in ("kitchencopy", "kitchencopy2", "kitchencopy3"):
+        designer.controller.ask_for_new("kitchen")
+        page = designer.place.new_page
+        assert page.name.placeholderText() == name
+        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Return)
+        assert designer.editing.opened.name == name
+        if name == "kitchencopy":
+            designer.saving.save()
+    designer.controller.ask_for_new(str(designer.file.with_name("kitchencopy.toml")))
+    assert page.name.placeholderText() == "kitchencopy4"
+    qtbot.keyClicks(page.card.questions.title, "Cold tea")
+    assert page.name.placeholderText() == "coldtea"
+
+
+def test_tab_goes_to_the_chosen_card_and_arrows_to_others_which_are_scrolled_to(qtbot: Any, designer: Any) -> None:
+    designer.window.resize(1366, 768)
+    designer.controller.ask_for_new("demo")
+    page = designer.place.new_page
+    demo = button(page, "demo")
+    qtbot.waitUntil(lambda: not demo.visibleRegion().isEmpty())
+    page.file.setFocus()
+    page.area.verticalScrollBar().setValue(0)
+    qtbot.keyClick(page.file, Qt.Key.Key_Tab)
+    assert demo.hasFocus()
+    assert demo.visibleRegion().boundingRect() == demo.rect()
+    seen = {demo}
+    for _ in range(3):
+        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Up)
+        focused = QApplication.focusWidget()
+        assert focused.isChecked()
+        assert focused.visibleRegion().boundingRect() == focused.rect()
+        seen.add(focused)
+    assert len(seen) > 2
+
+
+def test_the_keyboard_stays_in_the_questions_where_a_card_is_clicked(qtbot: Any, designer: Any) -> None:
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    for field in (page.card.questions.title, page.name):
+        field.setFocus()
+        field.setText("oiling")
+        field.setCursorPosition(3)
+        for source in ("template:rate-realism", "template:rate-realism", "template:empty"):
+            qtbot.mouseClick(button(page, source), Qt.MouseButton.LeftButton)
+            assert button(page, source).isChecked()
+            assert field.hasFocus()
+        assert (field.cursorPosition(), field.selectedText()) == (3, "")
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK])
+def test_a_ring_shows_the_card_with_the_keyboard_and_an_edge_the_chosen_one(designer: Any, theme: Any) -> None:
+    designer.window.show_theme(theme)
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    chosen, other, third = page.buttons[:3]
+    for focused in (chosen, other):
+        focused.setFocus()
+        for one in (chosen, other, third):
+            image, middle = one.grab().toImage(), one.height() // 2
+            ring, edge = (image.pixelColor(x, middle).name().upper() == theme.accent.upper() for x in (1, RING + 1))
+            assert (ring, edge) == (one is focused, one is chosen)
 
 
 def test_the_header_names_a_study_that_was_saved_for_the_first_time(designer: Any) -> None:

@@ -1,22 +1,33 @@
-"""What a new study can begin as: a card for each template, and a smaller one for each study that can be copied."""
+"""What a new study can begin as: a card for each template, and a smaller one for each study that can be copied.
+
+The chosen card has an accent edge, the one with the keyboard a ring around it.
+"""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy
 
 from study_app.gui.designer.new_study.pictures import PICTURES, paint_picture
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CARD, font
 from study_app.gui.theme.themed import Themed
-from study_app.viewmodels.designer.new_study import TemplateChoice
+from study_app.gui.widgets.labels import clamped
+from study_app.viewmodels.designer.new_study import SHIPPED, TemplateChoice
 
 PICTURE_PX, WORDS_PX, COPY_PX = 150, 132, 76
+RING = 4
+"""The room around a card for the ring [px]."""
 
 
 class TemplateButton(Themed, QAbstractButton):
-    """One thing to begin from: its picture or icon, title, description and figures."""
+    """One thing to begin from: its picture or icon, title, description and figures.
+
+    ``came`` is emitted when it gets the keyboard; it says whether by a click.
+    """
+
+    came = Signal(bool)
 
     def __init__(self, choice: TemplateChoice) -> None:
         super().__init__()
@@ -38,14 +49,27 @@ class TemplateButton(Themed, QAbstractButton):
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the room of a card."""
-        return QSize(200, COPY_PX if self.choice.copy else PICTURE_PX + WORDS_PX)
+        return QSize(200, 2 * RING + (COPY_PX if self.choice.copy else PICTURE_PX + WORDS_PX))
+
+    @property
+    def _wide(self) -> int:
+        return self.width() - 2 * RING
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
+        """Say what led here."""
+        super().focusInEvent(event)
+        self.came.emit(event.reason() == Qt.FocusReason.MouseFocusReason)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the card."""
         t, painter = self.theme, QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        body, marked = QRectF(self.rect()).adjusted(1, 1, -1, -1), self.isChecked() or self.hasFocus()
-        empty = not self.picture and not self.choice.copy
+        if self.hasFocus():
+            painter.setPen(QPen(QColor(t.accent), 2))
+            painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), RADIUS_CARD + RING, RADIUS_CARD + RING)
+        painter.translate(RING, RING)
+        body = QRectF(0, 0, self._wide, self.height() - 2 * RING).adjusted(1, 1, -1, -1)
+        marked, empty = self.isChecked(), not self.picture and not self.choice.copy
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(t.hover if self.underMouse() or (empty and not marked) else t.surface))
         painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
@@ -54,7 +78,7 @@ class TemplateButton(Themed, QAbstractButton):
         elif empty:
             self._paint_empty(painter)
         else:
-            paint_picture(painter, self.picture, QRectF(1, 1, self.width() - 2, PICTURE_PX))
+            paint_picture(painter, self.picture, QRectF(1, 1, self._wide - 2, PICTURE_PX))
             self._paint_words(painter, PICTURE_PX)
         style = Qt.PenStyle.DashLine if empty and not marked else Qt.PenStyle.SolidLine
         edge = t.accent if marked else t.ctl if empty else t.border
@@ -63,7 +87,7 @@ class TemplateButton(Themed, QAbstractButton):
         painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
 
     def _paint_words(self, painter: QPainter, top: int) -> None:
-        t, wide = self.theme, self.width() - 32
+        t, wide = self.theme, self._wide - 32
         painter.setPen(QColor(t.text))
         painter.setFont(font("strong"))
         painter.drawText(QRectF(16, top + 10, wide, 24), Qt.AlignmentFlag.AlignVCenter, self._elided(painter, wide))
@@ -87,32 +111,31 @@ class TemplateButton(Themed, QAbstractButton):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(t.sunk))
         painter.drawRoundedRect(QRectF(16, 18, 40, 40), 8, 8)
-        draw_icon(
-            painter, "lock" if self.choice.note.startswith("ships") else "layers", QRectF(27, 29, 18, 18), t.text2
-        )
+        draw_icon(painter, "lock" if self.choice.note == SHIPPED else "layers", QRectF(27, 29, 18, 18), t.text2)
         painter.setPen(QColor(t.text))
-        wide = self.width() - 80
+        wide = self._wide - 80
         painter.setFont(font("label", weight=600))
-        two = painter.fontMetrics().horizontalAdvance(self.text()) > wide
-        box = QRectF(68, 8, wide, 36) if two else QRectF(68, 16, wide, 22)
-        painter.drawText(box, Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignVCenter, self.text())
+        lines = clamped(self.text(), 2, painter.font(), wide)
+        box = QRectF(68, 8, wide, 36) if len(lines) > 1 else QRectF(68, 16, wide, 22)
+        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, "\n".join(lines))
         painter.setPen(QColor(t.text2))
         painter.setFont(font("small"))
-        painter.drawText(QRectF(68, box.bottom(), wide, 20), Qt.AlignmentFlag.AlignVCenter, self.choice.note)
+        note = painter.fontMetrics().elidedText(self.choice.note, Qt.TextElideMode.ElideRight, wide)
+        painter.drawText(QRectF(68, box.bottom(), wide, 20), Qt.AlignmentFlag.AlignVCenter, note)
 
     def _paint_empty(self, painter: QPainter) -> None:
-        t, middle = self.theme, self.width() / 2
+        t, middle = self.theme, self._wide / 2
         painter.setPen(QPen(QColor(t.ctl), 1))
         painter.setBrush(QColor(t.surface))
         painter.drawEllipse(QRectF(middle - 22, 78, 44, 44))
         draw_icon(painter, "plus", QRectF(middle - 9, 91, 18, 18), t.text, 2.0)
         painter.setPen(QColor(t.text))
         painter.setFont(font("strong"))
-        painter.drawText(QRectF(16, 134, self.width() - 32, 24), Qt.AlignmentFlag.AlignCenter, self.text())
+        painter.drawText(QRectF(16, 134, self._wide - 32, 24), Qt.AlignmentFlag.AlignCenter, self.text())
         painter.setPen(QColor(t.text2))
         painter.setFont(font("label", weight=400))
         words = Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
-        painter.drawText(QRectF(28, 166, self.width() - 56, 80), words, self.choice.description)
+        painter.drawText(QRectF(28, 166, self._wide - 56, 80), words, self.choice.description)
 
     def _elided(self, painter: QPainter, wide: int) -> str:
         return painter.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, wide)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
@@ -18,13 +19,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.gui.designer.new_study.cards import TemplateButton
+from study_app.gui.designer.new_study.cards import RING, TemplateButton
 from study_app.gui.designer.new_study.new_study_questions import Questions
 from study_app.gui.designer.new_study.recovery_bar import RecoveryBar
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label
+from study_app.gui.widgets.main_view import last_focused
 from study_app.viewmodels.designer.designer_view import StudyChoice
 from study_app.viewmodels.designer.new_study import TemplateChoice
 
@@ -233,7 +235,7 @@ class NewStudyPage(Themed, QWidget):
         self._choices = choices
         inside = QWidget()
         column = QVBoxLayout(inside)
-        column.setContentsMargins(SHADOW, 0, 12, 0)
+        column.setContentsMargins(0, 0, 12 - RING, 0)
         column.setSpacing(12)
         self.buttons = []
         for heading, aside, copies, across in (
@@ -241,16 +243,18 @@ class NewStudyPage(Themed, QWidget):
             ("Or a copy of a study", "with its comments; the original stays as it is", True, COPIES_ACROSS),
         ):
             line = QHBoxLayout()
+            line.setContentsMargins(RING, 0, 0, 0)
             line.setSpacing(10)
             line.addWidget(label(heading, "card"))
             line.addWidget(label(aside, "small", "text2"))
             line.addStretch()
             column.addLayout(line)
             grid = QGridLayout()
-            grid.setSpacing(14)
+            grid.setSpacing(14 - 2 * RING)
             columns = across if self.width() >= NARROW_BELOW else 2
             for at, choice in enumerate(one for one in choices if one.copy == copies):
                 made = TemplateButton(choice)
+                made.came.connect(partial(self._come, made))
                 self._group.addButton(made)
                 grid.addWidget(made, at // columns, at % columns)
                 self.buttons.append(made)
@@ -264,7 +268,17 @@ class NewStudyPage(Themed, QWidget):
             QWidget.setTabOrder(before, after)
         self.refuse("")
         first = next((button for button in self.buttons if button.choice.source == chosen), self.buttons[0])
+        for button in self.buttons:  # Tab goes to the chosen one, and arrows to the others
+            button.setFocusPolicy(Qt.FocusPolicy.StrongFocus if button is first else Qt.FocusPolicy.ClickFocus)
         first.setChecked(True)
+        QTimer.singleShot(0, first, lambda: self.area.ensureWidgetVisible(first))  # once it has its place
+
+    def _come(self, button: TemplateButton, by_mouse: bool) -> None:
+        """Show the card that the keyboard came to; after a click the keyboard stays in the questions."""
+        if by_mouse:
+            (last_focused(self.card) or self.card.questions.title).setFocus()
+        else:
+            self.area.ensureWidgetVisible(button)
 
     def refuse(self, sentence: str) -> None:
         """Say why a study cannot begin so."""
@@ -292,8 +306,9 @@ class NewStudyPage(Themed, QWidget):
             self.begin_asked.emit(chosen.source, self.card.questions.short_name(), answers)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Begin at Enter on a language, as in the fields; go back at Esc."""
-        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and isinstance(self.focusWidget(), Check):
+        """Begin at Enter on a card or a language, as in the fields; go back at Esc."""
+        begins = isinstance(self.focusWidget(), Check | TemplateButton)
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and begins:
             self._begin()
         elif event.key() == Qt.Key.Key_Escape:
             self.given_up.emit()

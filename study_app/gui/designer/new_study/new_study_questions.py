@@ -31,12 +31,12 @@ class Questions(Themed, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self._choice: TemplateChoice | None = None
         self.title, self.name = self._field("Title"), self._field("Short name of the new study")
-        self.name.setPlaceholderText(NAME_HINT)
-        self.title.textChanged.connect(lambda text: self.name.setPlaceholderText(proposed_name(text) or NAME_HINT))
+        self._propose()
+        self.title.textChanged.connect(self._propose)
         self.languages: dict[str, Check] = {}
         self.own: dict[OwnQuestion, QLineEdit] = {}
-        self._choice: TemplateChoice | None = None
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setSpacing(8)
@@ -85,6 +85,7 @@ class Questions(Themed, QWidget):
         if before is not None and before.source == choice.source:
             return
         self.title.setPlaceholderText(choice.study_title)
+        self._propose()
         for code, check in self.languages.items():
             check.setChecked(code in choice.languages)
         for part in self._own:
@@ -106,9 +107,17 @@ class Questions(Themed, QWidget):
             self.own[question] = field
             apply_theme_within(beside, self.theme)
 
+    def _propose(self) -> None:
+        """Show the short name that counts where none is typed."""
+        self.name.setPlaceholderText(self._proposed or NAME_HINT)
+
+    @property
+    def _proposed(self) -> str:
+        return proposed_name(self.title.text()) or ("" if self._choice is None else self._choice.name)
+
     def short_name(self) -> str:
-        """Return the short name that was typed, else the one that the title gives."""
-        return self.name.text().strip() or proposed_name(self.title.text())
+        """Return the short name that was typed, else the one that the title gives, else that of a copy."""
+        return self.name.text().strip() or self._proposed
 
     def answers(self) -> Answers | str:
         """Return the answers, or a sentence about one that cannot be taken."""
