@@ -205,10 +205,13 @@ class MainController(QObject):
 
     def show_help(self) -> None:
         """Go to the page of the documentation that is about the place one is at."""
-        page = PAGES_OF_PLACES.get(self.window.here, FIRST_PAGE)
+        here = self.window.here
         self.window.place("help")
         assert self.help is not None  # noqa: S101 - made with its place
-        self.help.open_page(page)
+        if here == "help":
+            self.help.open_page(FIRST_PAGE)
+        else:
+            self.help.open_from(here, PAGES_OF_PLACES[here])
         self.window.go("help")
 
     def _show_saved(self) -> None:

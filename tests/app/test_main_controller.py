@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from study_app.session.request import NewSession
 
 pytestmark = pytest.mark.slow
 
+ALT = Qt.KeyboardModifier.AltModifier
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
 
 
@@ -163,3 +165,25 @@ def test_f1_shows_the_page_about_the_place(visit: MainController, qtbot: Any) ->
     assert (visit.window.here, visit.help.reader.page) == ("help", "this-machine")
     qtbot.keyClick(visit.window, Qt.Key.Key_F1)
     assert visit.help.reader.page == "index"
+
+
+def test_back_leads_from_the_help_to_the_place_where_it_was_asked_for(visit: MainController, qtbot: Any) -> None:
+    window = visit.window
+    window.go("machine")
+    window.activateWindow()
+    window.place("machine").focusNextChild()
+    asked_in = window.focusWidget()
+    for by_keys in (False, True):
+        qtbot.keyClick(window, Qt.Key.Key_F1)
+        assert visit.help is not None
+        leave = partial(qtbot.keyClick, window, Qt.Key.Key_Left, ALT) if by_keys else visit.help.back.click
+        visit.help.open_page("lab")
+        leave()
+        assert (window.here, visit.help.reader.page) == ("help", "this-machine")
+        leave()
+        assert window.here == "machine"
+        assert window.focusWidget() is asked_in
+    qtbot.keyClick(window, Qt.Key.Key_F1)
+    window.go("home")
+    window.go("help")
+    assert not visit.help.back.isEnabled(), "the place was left in another way"

@@ -35,6 +35,7 @@ class HelpPlace(Place):
     def __init__(self, folder: Path | None = None) -> None:
         super().__init__()
         self._before: list[str] = []
+        self._came_from = ""
         self.words = QLineEdit()
         self.words.setPlaceholderText("Search the pages")
         self.words.setAccessibleName("Search the pages")
@@ -100,13 +101,26 @@ class HelpPlace(Place):
         self.reader.show_page(name, anchor)
         self._select(name)
 
+    def open_from(self, place: str, name: str) -> None:
+        """Show a page from another place, to which *Back* leads."""
+        self.open_page(name)
+        self._before, self._came_from = [], place
+        self.back.setEnabled(True)
+
     def go_back(self) -> None:
-        """Show the page that was shown before."""
+        """Show the page that was shown before; before the first one, the place where help was asked for."""
         if self._before:
             name = self._before.pop()
-            self.back.setEnabled(bool(self._before))
+            self.back.setEnabled(bool(self._before or self._came_from))
             self.reader.show_page(name)
             self._select(name)
+        elif self._came_from:
+            self.go_asked.emit(self._came_from)
+
+    def leave(self) -> None:
+        """Forget where help was asked for."""
+        self._came_from = ""
+        self.back.setEnabled(bool(self._before))
 
     def _show_rows(self, rows: tuple[HelpEntry, ...]) -> None:
         self.list.blockSignals(True)
