@@ -76,12 +76,14 @@ class ProblemSteps(QObject):
             lead_by_tab(here, self._form.repairs_of(row) or self._card.repairs_of(row))
 
     def _repair(self, row: ProblemRow, words: str) -> None:
-        """Make a repair; one that was made by keys leads to the next problem, and the last one to its field."""
+        """Make a repair; a key leads to the next problem, or from the last one to its field, where a click leads."""
         here = self._card.window().focusWidget()
         by_keys = isinstance(here, RepairButton) and here.by_keys and here.problem == row
         self._card.set_current(row)
         self.repair_asked.emit(row, words)
-        if by_keys and self._problems and row not in self._problems:
+        if row in self._problems:
+            return
+        if by_keys and self._problems:
             self._card.open_next()
-        elif by_keys and not self._problems and not self._form.focus(row.fault.path):
-            self._areas.focus_form()
+        else:
+            self._areas.focus_field(row.fault.path)

@@ -83,6 +83,7 @@ def test_a_repair_by_the_mouse_shows_what_was_repaired(qtbot: Any, broken: Any) 
     qtbot.mouseClick(broken.place.problems.lines[0].repairs[0], Qt.MouseButton.LeftButton)
     assert len(broken.place.view.problems) == 1
     assert broken.editing.selected == first.element
+    assert broken.row(*first.fault.path).isAncestorOf(QApplication.focusWidget())
 
 
 def test_f8_goes_on_where_a_problem_was_solved(qtbot: Any, broken: Any) -> None:
@@ -117,6 +118,7 @@ def test_a_repair_that_is_clicked_after_tab_led_to_it_shows_what_was_repaired(qt
     qtbot.mouseClick(repair, Qt.MouseButton.LeftButton)
     assert len(broken.place.view.problems) == 1
     assert broken.editing.selected == first.element
+    assert broken.row(*first.fault.path).isAncestorOf(QApplication.focusWidget())
 
 
 def test_repairs_that_are_found_later_leave_the_keyboard_at_the_repairs(
