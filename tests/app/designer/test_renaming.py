@@ -47,3 +47,29 @@ def test_after_a_rename_the_button_of_an_absent_key_is_found_at_its_new_path(des
     assert form.focus(("conditions", "thicker", path[-1]))
     assert QApplication.focusWidget() is button
     assert not form.focus(path), "there is no element of the old id"
+
+
+def test_a_rename_says_once_how_many_references_followed(
+    designer: Any, qtbot: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr("study_app.gui.designer.form.form_head.say", lambda _head, words: said.append(words))
+    designer.controller.open("kitchen")
+    head = designer.place.form.head
+    for path, name, words in (
+        (("conditions", "thick"), "honey", "1 place updated"),
+        (("tasks", "reach"), "touch", "1 place updated"),
+        (("scales", "agreement"), "likert", "2 places updated"),
+        (("questionnaires", "liquid", "items", 0), "feels", "0 places updated"),
+    ):
+        designer.select(path)
+        assert head.followed.text() == ""
+        head.edit_id()
+        qtbot.keyClicks(head.id, name)
+        qtbot.keyClick(head.id, Qt.Key.Key_Return)
+        assert head.followed.text() == f"·  {words}"
+        assert head.followed.isVisible()
+        assert said.pop() == words
+    designer.editing.undo()
+    assert head.followed.text() == ""
+    assert not said

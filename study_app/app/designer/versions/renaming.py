@@ -1,4 +1,4 @@
-"""What a new id does beyond the references: answers recorded under the old one, and comments that mention it."""
+"""What a new id does: how many references follow, answers recorded under the old one, comments that mention it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from PySide6.QtCore import QObject
 
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.versions.known_runs import KnownRuns
+from study_app.authoring.names import references_to
 from study_app.authoring.writer.comments import Comment, comments_naming
 from study_app.gui.designer.versions.rename_cards import CommentsCard, UnlockCard, title_of
 from study_app.gui.designer.view import DesignerPlace
@@ -23,7 +24,7 @@ BREAKS: Final = (
 
 
 class Renaming(QObject):
-    """Locks the ids of questions with recorded answers, and offers the comments that mention the old id after a rename.
+    """Locks the ids of questions with recorded answers; after a rename counts references, and offers comments.
 
     It notes a rename before `Editing` makes it: construct it before requests are connected to that.
     """
@@ -32,11 +33,11 @@ class Renaming(QObject):
         super().__init__(editing)
         self.editing, self.place, self.runs = editing, place, runs
         self._unlocked: Path = ()
-        self._renamed: tuple[Path, str] | None = None
+        self._renamed: tuple[str, int] | None = None
         self._listed: tuple[Path, str, tuple[Comment, ...]] = ((), "", ())
         place.asked.connect(self._note)
         editing.changed.connect(self._lock)
-        editing.edited.connect(self._find_comments)
+        editing.edited.connect(self._tell)
         runs.changed.connect(self._lock)
         place.form.head.unlock_asked.connect(self._explain)
         place.form.head.comments_asked.connect(self._list_comments)
@@ -63,6 +64,7 @@ class Renaming(QObject):
         if path != self._listed[0]:
             self._listed = ((), "", ())
             self.place.form.head.show_comments("")
+            self.place.form.head.show_followed("")
         self.place.form.head.show_lock(path, self._why(path))
 
     def _explain(self) -> None:
@@ -77,17 +79,23 @@ class Renaming(QObject):
         self.place.form.head.edit_id()
 
     def _note(self, asked: Request) -> None:
-        self._renamed = (asked.path, self._id(asked.path)) if isinstance(asked, RenameElement) else None
+        self._renamed, opened = None, self.editing.opened
+        if isinstance(asked, RenameElement) and opened is not None:
+            self._renamed = (self._id(asked.path), len(references_to(opened.study.document, asked.path)))
 
-    def _find_comments(self) -> None:
+    def _tell(self) -> None:
+        """Say how many references followed a rename, and which comments mention the old id."""
         renamed, self._renamed = self._renamed, None
-        opened = self.editing.opened
+        opened, head = self.editing.opened, self.place.form.head
         if renamed is None or opened is None:
+            head.show_followed("")
             return
-        found = comments_naming(opened.study.text, renamed[1])
+        name, references = renamed
+        head.show_followed(f"{counted(references, 'place')} updated")
+        found = comments_naming(opened.study.text, name)
         if found:
-            self._listed = (self.editing.selected, renamed[1], found)
-            self.place.form.head.show_comments(title_of(renamed[1], found))
+            self._listed = (self.editing.selected, name, found)
+            head.show_comments(title_of(name, found))
 
     def _list_comments(self) -> None:
         card = CommentsCard(*self._listed[1:])

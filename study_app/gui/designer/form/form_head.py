@@ -60,6 +60,7 @@ class FormHead(QWidget):
         self.tile = Tile()
         self.title = Elided("card")
         self.kind = label("", "small", "text2")
+        self.followed = Elided("small", "text2")
         self.id = TypedLine("Id")
         self.id.setMinimumWidth(110)
         self.id.setMaximumWidth(230)
@@ -91,7 +92,7 @@ class FormHead(QWidget):
         below = QHBoxLayout()
         below.setSpacing(8)
         below.addWidget(self.kind)
-        below.addStretch()
+        below.addWidget(self.followed, 1)
         words.addLayout(below)
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -170,6 +171,12 @@ class FormHead(QWidget):
             say(self, words)
         self.comments.setText(words or "Comments")
         self.comments.setVisible(bool(words))
+
+    def show_followed(self, words: str) -> None:
+        """Show next to the kind, and say once, what followed the id."""
+        if words:
+            say(self, words)
+        self.followed.show_text(f"·  {words}" if words else "")
 
     def _apply_lock(self) -> None:
         path, why = self._lock
