@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Final
 
@@ -17,13 +17,16 @@ from study_app.authoring.outline import title_of
 from study_app.authoring.schema_nodes import node_at, tags
 from study_app.protocol.formats import TABLES, is_second
 from study_app.protocol.instruments.instrument import instrument, instruments
-from study_app.protocol.source.document import Path
+from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.viewmodels.designer.finding import found_fields
 from study_app.viewmodels.designer.outline_rows import icon_of
 from study_app.viewmodels.designer.requests import AddElement, AddInstrument, AskSeries, ChangeLanguage, GoTo
 
 MOST_FIELDS: Final = 12
+QUESTIONNAIRES: Final = "questionnaires"
+NAMES: Final = {"designs": "Trial design"}
+"""What is called otherwise here than its section: a design is also that of a study."""
 SERIES: Final = "Copies at several levels of one number: {}"
 
 
@@ -50,13 +53,14 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
     found = [one for path in lists for one in _of_list(study, path)]
     found += [
         Addable(
-            label_of(singular(path[0])),
+            NAMES.get(str(path[0]), label_of(singular(path[0]))),
             icon_of(path, study.document),
             AddElement(path),
             f"To {label_of(path[0]).lower()}",
         )
         for path in sections
     ]
+    found += _questions(study, around) if not any(path[0] == QUESTIONNAIRES for path in lists) else ()
     found += _series(study, selected)
     found += _instruments() if second else ()
     there = languages_of(study)
@@ -66,6 +70,20 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
         if code not in there
     ]
     return tuple(found)
+
+
+def _questions(study: Study, around: Path) -> Iterator[Addable]:
+    """Yield a question for each questionnaire to which one can be added: for the one that the element names alone.
+
+    Where there are several, each says of which it is.
+    """
+    named = value_at(study.document, (*around, "questionnaire")) if around else None
+    tables = names(study.document, QUESTIONNAIRES)
+    every = [one for one in tables if value_at(study.document, (QUESTIONNAIRES, one, "instrument")) is None]
+    for name in (named,) if named in every else every:
+        first = next(_of_list(study, (QUESTIONNAIRES, str(name), "items")))
+        title = title_of(study.document, (QUESTIONNAIRES, str(name)))
+        yield first if len(every) == 1 else replace(first, words=f"{first.words} of {title}")
 
 
 def _series(study: Study, selected: Path) -> Iterator[Addable]:

@@ -292,6 +292,30 @@ def test_what_can_be_added_is_filtered_by_typing_and_comes_after_the_selected_el
     assert designer.editing.opened.study.faults == ()
 
 
+def test_a_question_can_be_added_wherever_there_is_a_questionnaire(designer: Any, qtbot: Any) -> None:
+    designer.controller.begin("template:compare-liquids", "asked")
+    adding = designer.place.adding
+
+    def offered(selected: tuple[str, ...], words: str = "question") -> list[str]:
+        designer.editing.select(selected)
+        designer.place.ask_to_add()
+        adding.words.setText(words)
+        every = [adding.list.item(at).data(Qt.ItemDataRole.UserRole) for at in range(adding.list.count())]
+        return [one.words for one in every if isinstance(one.asks, AddElement)]
+
+    assert offered(("pages", "welcome")) == ["Questionnaire", "Question"]
+    assert offered(("pages", "welcome"), "design") == ["Trial design"]
+    designer.editing.ask(AddElement(("questionnaires",)))
+    questions = [words for words in offered(("pages", "welcome")) if words.startswith("Question of")]
+    assert questions == ["Question of Liquid", "Question of Questionnaire"]
+    assert "Question of Liquid" in offered(("blocks", "liquids"))
+    assert "Question of Questionnaire" not in offered(("blocks", "liquids"))
+    before = len(designer.editing.opened.study.document["questionnaires"]["liquid"]["items"])
+    adding.list.setCurrentRow(offered(("blocks", "liquids")).index("Question of Liquid"))
+    qtbot.keyClick(adding.words, Qt.Key.Key_Return)
+    assert designer.place.view.form.path == ("questionnaires", "liquid", "items", before)
+
+
 def test_what_is_refused_is_said_at_its_field(designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.editing.select(("liquids", "thin"))

@@ -62,7 +62,7 @@ def make_two_interval(user: User) -> None:
     user.add("Stimulus")
     user.write("Vary", "delay_ms")
     user.write("Levels", "50 200")
-    user.add("Design")
+    user.add("Trial design")
     user.choose("Kind", "2ifc")
     user.press("Add Item")
     user.write("Item", "later")
