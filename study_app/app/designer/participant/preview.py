@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
@@ -18,9 +18,10 @@ from study_app.app.designer.participant.shown_step import (
     side_of,
     step_name,
 )
-from study_app.app.designer.participant.sound_part import sound_part
+from study_app.app.designer.participant.sound_part import last_valid, sound_part
 from study_app.app.workstation_controller import screen_number, settings_here, text_scale_on
 from study_app.authoring.edited_study import Study
+from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
 from study_app.gui.designer.pane.right_pane import PanePage
 from study_app.gui.designer.participant.participant_tab import ParticipantTab
@@ -71,7 +72,7 @@ class ParticipantPreview(QObject):
         self._selected: Path = ()
         self._protocol: Protocol | None = None
         self._study: Study | None = None
-        self._sound: Mapping[str, Any] = {}
+        self._valid: Study | None = None
         self._answers: dict[tuple[str, int], dict[str, Value]] = {}
         self._ball: ProgrammedBall | None = None
         self._ball_of: object = None
@@ -189,8 +190,8 @@ class ParticipantPreview(QObject):
     # following the study
 
     def _begin(self) -> None:
-        self._found = self._moment = self._protocol = self._study = None
-        self._selected, self._sound, self._answers, self._language = (), {}, {}, ""
+        self._found = self._moment = self._protocol = self._study = self._valid = None
+        self._selected, self._answers, self._language = (), {}, ""
         self._side = "questions"
         self._after_form.start()
 
@@ -217,9 +218,14 @@ class ParticipantPreview(QObject):
         study, selected = opened.study, opened.history.selected
         if study is not self._study:
             self._study, before = study, self._protocol
-            self._protocol = sound_part(study, self._sound)
             if study.protocol is not None:
-                self._sound = study.document
+                self._valid = study
+            elif self._valid is None and before is None:
+                self._valid = last_valid(opened)
+            valid = {} if self._valid is None else self._valid.document
+            self._protocol = sound_part(study, valid) or valid_part(study).protocol
+            if self._protocol is None and self._valid is not None:
+                self._protocol = self._valid.protocol
             if self._protocol is not None and before is not None and self._found is not None:
                 self._found = self._again(self._found)
         if self._protocol is None:
@@ -318,9 +324,10 @@ class ParticipantPreview(QObject):
         if own and self._protocol is not None:
             if not self._holds(self._protocol, study):
                 return f"{title} cannot be shown: {own[0].message}"
-            return f"{title} has a problem ({own[0].message}): the last valid value is shown."
-        count = len(study.problems)
-        return f"{count} problem{'s' * (count > 1)} elsewhere: the last valid values are shown."
+            value = "an initial" if self._valid is None else "the last valid"
+            return f"{title} has a problem ({own[0].message}): {value} value is shown."
+        count, values = len(study.problems), "only valid parts" if self._valid is None else "the last valid values"
+        return f"{count} problem{'s' * (count > 1)} elsewhere: {values} are shown."
 
     def _holds(self, protocol: Protocol, study: Study) -> bool:
         """Return whether the selected table, or question, is in the protocol that is shown."""

@@ -37,7 +37,7 @@ from shiboken6 import isValid
 from study_app.gui.participant.forms.questions_page import QuestionsPage
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
+from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.session.pages import Page, QuestionnairePage, TaskPage
 from study_app.session.trial import TankView
@@ -69,7 +69,6 @@ class LivePage(Themed, QGraphicsView):
         self.setScene(self._scene)
         QApplication.sendEvent(self._scene, QEvent(QEvent.Type.WindowActivate))
         self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setBackgroundBrush(QBrush(QColor(PARTICIPANT.window)))
         self.setRenderHints(QPainter.RenderHint.SmoothPixmapTransform | QPainter.RenderHint.TextAntialiasing)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleDescription(f"{LEAVES}, and so does Tab after its last control.")
@@ -93,6 +92,7 @@ class LivePage(Themed, QGraphicsView):
         """Show a page; one that is the same but for its answers stays, with what was typed into it."""
         before, self._view = self._view, view
         self.setAccessibleName(view.name)
+        self._colour_ground()
         if view.page is None:
             self._frames.stop()
             self.close_page()
@@ -118,6 +118,16 @@ class LivePage(Themed, QGraphicsView):
             view.focused if view.focused is not None and view.focused != before.focused else kept or view.focused
         )
         self._time_frames()
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of ``theme``; those of a page stay."""
+        super().apply_theme(theme)
+        self._colour_ground()
+
+    def _colour_ground(self) -> None:
+        """Be dark around a page, as in a session, and like a card without one."""
+        colour = self.theme.surface if self._view.page is None else PARTICIPANT.window
+        self.setBackgroundBrush(QBrush(QColor(colour)))
 
     def show_screen(self, screen: ScreenSize) -> None:
         """Show the page as on another screen."""

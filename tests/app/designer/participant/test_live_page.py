@@ -15,6 +15,8 @@ from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from study_app.authoring.edited_study import read
+from study_app.authoring.writer.edits import Set, Unset
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
@@ -183,7 +185,50 @@ def test_a_study_that_was_never_sound_shows_what_is_sound(designer: Any) -> None
     live = designer.controller.preview.tab.page
     assert [item.id for item in live.page_window.page.items].count("like_honey") == 1
     designer.select(("tasks", "reach"))
-    assert "cannot be shown" in designer.controller.preview.tab.view.note
+    assert designer.controller.preview.tab.view.note == "Reach has a problem (is missing): an initial value is shown."
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        Set(("device", "force_limit_n"), 60),
+        Set(("liquids", "thin", "density_kg_m3"), -5),
+        Set(("liquids", "thin"), "water"),
+        Set(("blocks", "liquids", "conditions"), "thin"),
+        Set(("scales", "agreement"), 7),
+        Unset(("liquids", "thin")),
+        Unset(("blocks", "liquids", "task")),
+        Set(("tasks", "explore", "max_s"), "long"),
+        Set(("format",), 9),
+    ],
+)
+@pytest.mark.parametrize("opened", ["sound", "faulty, saved before"])
+def test_no_fault_blanks_the_page(designer: Any, broken: Any, opened: str) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("pages", "welcome"))
+    designer.editing.make("Another version", Set(("study", "version"), "2"))
+    designer.saving.save()
+    if opened == "sound":
+        designer.editing.make("Break it", broken)
+    else:
+        designer.file.write_text(read(designer.file.read_bytes()).edited(broken)[0].text)
+        designer.controller.open("demo")
+        designer.controller.open("kitchen")
+        designer.select(("pages", "welcome"))
+    assert designer.editing.opened.study.faults
+    view = designer.controller.preview.tab.view
+    assert getattr(view.page, "title", "") == "A first look"
+    assert "last valid" in view.note
+
+
+def test_a_study_of_which_no_page_can_be_shown_says_why_on_the_ground_of_cards(designer: Any) -> None:
+    designer.file.write_text("format = 2\n[study]\nname = 3\n")
+    designer.controller.open("kitchen")
+    tab = designer.controller.preview.tab
+    QApplication.processEvents()
+    assert tab.view.page is None
+    assert tab.note.text().startswith("The page cannot be shown: ")
+    assert tab.page.backgroundBrush().color().name() == designer.place.theme.surface.lower()
 
 
 def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live: Any) -> None:
