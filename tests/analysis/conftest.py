@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -270,3 +271,11 @@ def twelve(results: Results, *, people: int = 12) -> Results:
 
 HIDDEN = ("zembla", "quorn", "1013.7", "877.3")
 """What the small study hides: its liquids' and conditions' names (any case) and densities."""
+
+
+@pytest.fixture
+def figures_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw PNG alone, which the page holds: every form is drawn anew, by the same code."""
+    from study_app.analysis.figures.report_figures import pictures
+
+    monkeypatch.setattr("study_app.analysis.report.write_report.pictures", partial(pictures, forms=("png",)))

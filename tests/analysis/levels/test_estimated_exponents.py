@@ -138,6 +138,7 @@ def test_the_export_has_the_exponents_of_the_report(thickness: Path, tmp_path: P
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("figures_of_the_page")
 def test_r_computes_the_same_exponents(thickness: Path, tmp_path: Path) -> None:
     report(thickness, tmp_path)
     done = run_in_r(tmp_path)

@@ -118,6 +118,7 @@ def test_a_damaged_preregistration_is_one_line(answered: Results, content: str) 
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("figures_of_the_page")
 def test_the_report_lists_deviations_and_hashes_the_file(answered: Results, tmp_path: Path) -> None:
     committed(answered, 12)
     written_to = tmp_path / "report"

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import pytest
 
-from study_app.analysis.figures.report_figures import pictures
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from tests.analysis.conftest import make_results, twelve
 from tests.studies import once
-
-
-@pytest.fixture
-def figures_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw PNG alone, which the page holds: every form is drawn anew, by the same code."""
-    monkeypatch.setattr("study_app.analysis.report.write_report.pictures", partial(pictures, forms=("png",)))
 
 
 @pytest.fixture(scope="session")

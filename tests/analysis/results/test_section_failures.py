@@ -16,7 +16,7 @@ from study_app.cli import commands
 from study_app.protocol.load import load
 from tests.analysis.conftest import Results, make_results, twelve
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 TESTS = {
     "tables.study_tables.Study.aggregate": ("liquids", "measures of settings"),
