@@ -196,6 +196,24 @@ def test_changes_lists_what_differs_and_reverts_single_differences(ran: Any, qtb
     qtbot.waitUntil(lambda: len(rows(ran)) == 2)
 
 
+@pytest.mark.parametrize(("kind", "key"), [("pilot", "pilot"), ("rehearsal", "simulated")])
+def test_changes_begin_with_the_last_session_where_no_participant_was_run(
+    designer: Any, qtbot: Any, kind: str, key: str
+) -> None:
+    source = designer.file.read_bytes()
+    early = source.replace(b"max_s = 30 ", b"max_s = 40 ")
+    assert early != source
+    run(designer, "P001", source, study=f"kitchen-{kind}-1", **{key: True})
+    run(designer, "P001", early, study=f"kitchen-{kind}-2", started_at="2026-11-19T12:00:00+00:00", **{key: True})
+    designer.controller.open("kitchen")
+    qtbot.waitUntil(lambda: bool(designer.controller.runs.known))
+    designer.editing.ask(SetValue(REPETITIONS, 3))
+    designer.place.show_tab("changes")
+    view = designer.controller.changes.card.view
+    assert view.versions[0].words == "The file, without the edits"
+    assert view.chosen == protocol_hash(source)
+
+
 def test_of_a_version_without_a_copy_the_receipt_says_what_differs(ran: Any, qtbot: Any) -> None:
     source = (
         ran.file.read_bytes()

@@ -55,7 +55,7 @@ class ChangesController(QObject):
         self.card.revert_text_asked.connect(self.revert_text)
 
     def compare_with(self, key: str) -> None:
-        """Show the tab with a version by its hash, the file ("file"), or by default what was run last."""
+        """Show the tab with a version by its hash, the file ("file"), by default that of the last session."""
         self._chosen = key or self._chosen
         self.place.show_tab(TAB)
         self.show()

@@ -82,5 +82,6 @@ def compare(version: Version, study: Study) -> Comparison:
 
 
 def newest(known: Iterable[Run]) -> Run | None:
-    """Return what participants were run with last."""
-    return next((run for run in reversed(tuple(known)) if run.sessions), None)
+    """Return what participants were run with last; where there are none, what was run last as a pilot or rehearsal."""
+    ran = tuple(known)
+    return next((run for run in reversed(ran) if run.sessions), ran[-1] if ran else None)
