@@ -119,6 +119,17 @@ def read(path: Path) -> dict[str, Any]:
     return receipt
 
 
+def began_at(receipt: Mapping[str, Any]) -> str | None:
+    """Return when a session was begun by people, as ISO 8601; None where the receipt does not say.
+
+    A pilot that is played from a later step began with steps that a simulated participant had answered: it was resumed
+    at once, at the time when it was played.
+    """
+    first = next(iter(receipt.get("resumed") or ()), None)
+    skipped = isinstance(first, dict) and bool((receipt.get("screens") or {}).get("steps"))
+    return first.get("at") if isinstance(first, dict) and skipped else receipt.get("started_at")
+
+
 def other_format(receipt: Mapping[str, Any], start: Mapping[str, Any]) -> bool:
     """Return whether the journal that begins with the line ``start`` has another format than its receipt says."""
     return bool(receipt.get("format", 1) != start.get("format", 1))

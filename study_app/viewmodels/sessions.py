@@ -11,6 +11,7 @@ from typing import Any, Literal, TypeAlias
 
 from study_app.authoring.versions.runs import run_of
 from study_app.errors import StoreError
+from study_app.store import receipt
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
@@ -109,7 +110,7 @@ def session_facts(
             participant=row["participant"],
             session=int(row["session"]),
             study=str(row["study"]),
-            started=_started(row["session_started_at"], session.path),
+            started=_started(_began(row, session), session.path),
             status="running" if row["status"] == "unfinished" and is_open(session.path) else row["status"],
             validity=row["validity"],
             answers=int(row["responses"] or 0),
@@ -124,6 +125,14 @@ def session_facts(
         )
         for (row, session), (lost, reconnected, outlets_lost) in zip(placed, counts, strict=True)
     ]
+
+
+def _began(row: Mapping[str, Any], session: SessionFolder) -> object:
+    """Return when a session began; of a pilot that was played from a later step when it was played."""
+    if row["pilot"] and row["simulated"] and row.get("resumed"):
+        with contextlib.suppress(StoreError):
+            return receipt.began_at(receipt.read(session.receipt))
+    return row["session_started_at"]
 
 
 def _started(time: object, folder: Path) -> datetime:

@@ -102,7 +102,7 @@ def _run(path: Path, _changed_ns: int) -> Run:
     version = str(held.get("protocol", {}).get("study", {}).get("version", ""))
     simulated, pilot = bool(held.get("simulated")), bool(held.get("pilot"))
     counted = (int(not simulated and not pilot), int(pilot), int(simulated and not pilot))
-    return Run(str(held.get("protocol_hash")), version, *counted, str(held.get("started_at") or ""), path)
+    return Run(str(held.get("protocol_hash")), version, *counted, str(receipt.began_at(held) or ""), path)
 
 
 def recorded_items(known: Iterable[Run]) -> dict[tuple[str, str], int]:

@@ -6,6 +6,7 @@ import json
 import re
 import tempfile
 import threading
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from study_app.gui.widgets.compact_stop import CompactStop
 from study_app.session.pages import ChoicePage, FeedbackPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.simulated.preview import preview
 from study_app.store.verification.verify_study import verify
+from study_app.viewmodels.sessions import sessions
 from tests.app.people import window
 from tests.compiled import needs_servo
 
@@ -126,6 +128,12 @@ def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, 
     assert changes.version.currentText().startswith("1.0: 1 pilot, last today")
     assert changes.view.note == "The study does not differ from this version."
     lines = lines_of(study)
+    (shown,) = sessions(likert.results, {})
+    played = datetime.fromisoformat(next(line["at"] for line in lines if line["event"] == "session_resumed"))
+    assert abs((shown.started - played).total_seconds()) < 1
+    assert (played - datetime.fromisoformat(lines[0]["at"])).total_seconds() > 20  # of the steps that were skipped
+    (known,) = likert.controller.runs.known
+    assert datetime.fromisoformat(known.last) == shown.started
     assert lines[0]["pilot"] is True
     assert lines[0]["simulated"] is True
     resumed = next(at for at, line in enumerate(lines) if line["event"] == "session_resumed")
