@@ -149,7 +149,7 @@ def draft_of(file: Path) -> Draft | None:
 def drafted_files() -> tuple[Path, ...]:
     """Return the files that have a draft, sorted; a draft that cannot be read has none."""
     found: list[Path] = []
-    for kept in (data_folder() / "drafts").glob("*.json"):
+    for kept in draft_files():
         try:
             file = Path(parse_json(kept.read_bytes())["file"])
         except (OSError, ValueError, KeyError, TypeError):
@@ -157,6 +157,17 @@ def drafted_files() -> tuple[Path, ...]:
         if draft_of(file) is not None:
             found.append(file)
     return tuple(sorted(found))
+
+
+def draft_files() -> tuple[Path, ...]:
+    """Return the files that drafts are kept in."""
+    return tuple((data_folder() / "drafts").glob("*.json"))
+
+
+def unsaved_files(folder: Path) -> tuple[Path, ...]:
+    """Return the files in a folder that have a draft and were never saved."""
+    whole = folder.resolve()
+    return tuple(file for file in drafted_files() if file.parent == whole and not file.exists())
 
 
 def discard(file: Path) -> None:

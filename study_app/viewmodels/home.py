@@ -9,6 +9,9 @@ from datetime import datetime
 from functools import lru_cache, partial
 from pathlib import Path
 
+from study_app.authoring.drafts import draft_files, draft_of, unsaved_files
+from study_app.authoring.edited_study import read
+from study_app.authoring.outline import study_title
 from study_app.errors import ProtocolError, StudyError
 from study_app.protocol.load import at_hand, is_scene_file, load, parse
 from study_app.protocol.model import Protocol
@@ -31,7 +34,10 @@ from study_app.workspace import workspace
 
 @dataclass(frozen=True, slots=True)
 class StudyFacts:
-    """A protocol as a card shows it; ``source`` is the name or path it is loaded by."""
+    """A protocol as a card shows it; ``source`` is the name or path it is loaded by.
+
+    ``draft`` says that there is a draft of it that was not saved, "" where there is none.
+    """
 
     source: str
     protocol: Protocol
@@ -41,6 +47,7 @@ class StudyFacts:
     extent: str
     duration: str
     needs: str
+    draft: str = ""
 
     @property
     def name(self) -> str:
@@ -55,10 +62,20 @@ class StudyFacts:
 
 @dataclass(frozen=True, slots=True)
 class BrokenFacts:
-    """A protocol file that cannot be used, and the first thing wrong with it."""
+    """A protocol file that cannot be used, and the first thing wrong with it; ``draft`` as of `StudyFacts`."""
 
     source: str
     problem: str
+    draft: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DraftFacts:
+    """A study that was never saved: the path of its file, its title, and what is said of its draft."""
+
+    source: str
+    title: str
+    draft: str
 
 
 def sources() -> tuple[str, ...]:
@@ -71,19 +88,26 @@ def sources() -> tuple[str, ...]:
 def file_states(opened: Iterable[str]) -> frozenset[tuple[Path, int, int]]:
     """Return path, time of change [ns] and size [bytes] of the files that studies come from, liquid files among them.
 
-    These are the workspace's files, recent ones and ``opened`` ones.
+    These are the workspace's files, recent ones and ``opened`` ones, and drafts.
     """
     states = []
-    for path in (*workspace().own_protocols(), *map(Path, (*recent_protocols(), *opened))):
+    for path in (*workspace().own_protocols(), *map(Path, (*recent_protocols(), *opened)), *draft_files()):
         with suppress(OSError):
             state = path.stat()
             states.append((path, state.st_mtime_ns, state.st_size))
     return frozenset(states)
 
 
-def read_studies(opened: Iterable[str]) -> tuple[StudyFacts | BrokenFacts, ...]:
-    """Return what is said of each study at hand, ``opened`` ones first."""
-    return tuple(study_facts(source) for source in dict.fromkeys((*opened, *sources())))
+def read_studies(opened: Iterable[str]) -> tuple[StudyFacts | BrokenFacts | DraftFacts, ...]:
+    """Return what is said of each study at hand, ``opened`` ones first, those that were never saved last."""
+    found = [study_facts(source) for source in dict.fromkeys((*opened, *sources()))]
+    return (*found, *(_of_draft(file) for file in unsaved_files(workspace().protocols)))
+
+
+def _of_draft(file: Path) -> DraftFacts:
+    draft = draft_of(file)
+    title = "" if draft is None else study_title(read(draft.text.encode(), file.parent).document)
+    return DraftFacts(str(file), title or file.stem, draft_words(file))
 
 
 def holds_liquids_alone(source: str) -> bool:
@@ -119,7 +143,7 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
     except ProtocolError as error:
         count = len(error.problems)
         others = f" (and {count - 1} more: liquid-study check {source})" if count > 1 else ""
-        return BrokenFacts(source, f"{error.problems[0]}{others}")
+        return BrokenFacts(source, f"{error.problems[0]}{others}", _draft_words_of(source))
     language = operator_language(protocol)
     extent = extent_of(protocol)
     return StudyFacts(
@@ -137,7 +161,34 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
         ),
         duration=f"about {extent.minutes}",
         needs=f"Haptic device or mouse; at most {protocol.device.force_limit_n:g} N",
+        draft=_draft_words_of(source),
     )
+
+
+def draft_words(file: Path) -> str:
+    """Return what is said of a draft that was not saved: "Draft of today 14:02, not saved"; "" where there is none."""
+    draft = draft_of(file)
+    try:
+        saved = draft is None or draft.text.encode() == file.read_bytes()
+    except OSError:
+        saved = False
+    return "" if draft is None or saved else f"Draft of {time_words(draft.kept_at)}, not saved"
+
+
+def _draft_words_of(source: str) -> str:
+    with suppress(ProtocolError):
+        return "" if is_shipped(source) else draft_words(find(source))
+    return ""
+
+
+def time_words(moment: str) -> str:
+    """Return when a draft was kept: "today 14:02", "2026-11-20 14:02"."""
+    try:
+        kept = datetime.fromisoformat(moment).astimezone()
+    except ValueError:
+        return "an unknown time"
+    today = kept.date() == datetime.now().astimezone().date()
+    return f"today {kept:%H:%M}" if today else f"{kept:%Y-%m-%d %H:%M}"
 
 
 @dataclass(frozen=True, slots=True)

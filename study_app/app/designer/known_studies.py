@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from study_app.app.designer.open_study import OpenStudy, unsaved_studies
-from study_app.authoring.drafts import draft_of, drafted_files
+from study_app.app.designer.open_study import OpenStudy
+from study_app.authoring.drafts import draft_of, drafted_files, unsaved_files
 from study_app.authoring.edited_study import read
 from study_app.authoring.fields import row_at
 from study_app.authoring.names import Document
@@ -40,7 +39,7 @@ def studies(opened: OpenStudy | None) -> tuple[StudyChoice, ...]:
 
     They are in the order of their titles; studies that ship with the program come last.
     """
-    found = dict.fromkeys([*map(str, unsaved_studies()), *sources()])
+    found = dict.fromkeys([*map(str, unsaved_files(workspace().protocols)), *sources()])
     own = "" if opened is None else source_of(opened.file)
     if opened is not None:
         found[own] = None
@@ -140,16 +139,6 @@ def there(document: Document, path: Place) -> Place:
             return path[:length] if length > 1 else known
         found = found[step]
     return path or FIRST
-
-
-def time_words(moment: str) -> str:
-    """Return when a draft was kept: "today 14:02", "2026-11-20 14:02"."""
-    try:
-        kept = datetime.fromisoformat(moment).astimezone()
-    except ValueError:
-        return "an unknown time"
-    today = kept.date() == datetime.now().astimezone().date()
-    return f"today {kept:%H:%M}" if today else f"{kept:%Y-%m-%d %H:%M}"
 
 
 def _resolved(source: str) -> Path | None:

@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-from study_app.authoring.drafts import Draft, Keeper, draft_of, drafted_files
+from study_app.authoring.drafts import Draft, Keeper, draft_of
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.new_study import check_free, copy_of
 from study_app.authoring.outline import study_title
@@ -27,7 +27,6 @@ from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import is_open
 from study_app.viewmodels.designer.form.form_rows import first_element
 from study_app.viewmodels.designer.outline_rows import FIRST
-from study_app.workspace import workspace
 
 RESTORE: Final = "Restore the draft"
 DEFAULT_VERSION: Final = "1"
@@ -253,12 +252,6 @@ def open_unsaved(file: Path, draft: Draft) -> OpenStudy:
     opened = OpenStudy(file, History(Study(draft.text, file.parent), draft.selected or FIRST), draft=draft)
     opened.keeper.take(draft)
     return opened
-
-
-def unsaved_studies() -> tuple[Path, ...]:
-    """Return the files of drafts in the workspace's protocols that were never saved."""
-    folder = workspace().protocols.resolve()
-    return tuple(file for file in drafted_files() if file.parent == folder and not file.exists())
 
 
 def _with_draft(opened: OpenStudy) -> OpenStudy:

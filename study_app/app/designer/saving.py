@@ -9,7 +9,7 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.app.designer.editing import Editing
-from study_app.app.designer.known_studies import source_of, time_words
+from study_app.app.designer.known_studies import source_of
 from study_app.app.designer.open_study import OpenStudy, why_read_only
 from study_app.app.designer.versions.comparison import Comparison, compare, newest, version_of
 from study_app.app.designer.versions.file_watch import FileWatch
@@ -23,6 +23,7 @@ from study_app.gui.designer.view import DesignerPlace
 from study_app.viewmodels.designer.designer_view import Banner
 from study_app.viewmodels.designer.versions.changes_view import FILE
 from study_app.viewmodels.designer.versions.standing import save_prompt
+from study_app.viewmodels.home import time_words
 from study_app.viewmodels.sessions import counted
 
 DRAFT_MS: Final = 50

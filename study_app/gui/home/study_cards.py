@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Clamped, Elided, label
-from study_app.viewmodels.home import BrokenFacts, StudyFacts
+from study_app.viewmodels.home import BrokenFacts, DraftFacts, StudyFacts
 
 LEAST_WIDTH = 330
 GAP = 18
@@ -49,6 +51,7 @@ class StudyCard(Card):
         head.addWidget(title, 1)
         head.addWidget(self.pen)
         self.column.addLayout(head)
+        self.draft = _say_draft(self, facts.draft)
         self.column.addWidget(Clamped(facts.description or facts.title, ABOUT_LINES, "body", "text2"))
         self.column.addStretch()
         time = f"{facts.duration}  ·  {facts.languages}"
@@ -78,14 +81,15 @@ class StudyCard(Card):
 
 
 class BrokenCard(Card):
-    """A protocol file that cannot be used, and why; ``edit`` carries its facts."""
+    """A protocol file that cannot be used, and why, or a study without a file; ``edit`` carries its facts."""
 
     edit = Signal(object)
 
-    def __init__(self, facts: BrokenFacts) -> None:
+    def __init__(self, facts: BrokenFacts | DraftFacts) -> None:
         super().__init__(padding=22, gap=10)
+        self.facts = facts
         title = Elided("card")
-        title.show_text(facts.source)
+        title.show_text(facts.source if isinstance(facts, BrokenFacts) else facts.title)
         row = QHBoxLayout()
         row.addWidget(Icon("warning", "warn", 20))
         row.addWidget(title, 1)
@@ -93,11 +97,27 @@ class BrokenCard(Card):
         self.pen.clicked.connect(lambda: self.edit.emit(facts))
         row.addWidget(self.pen)
         self.column.addLayout(row)
-        self.column.addWidget(label("This file cannot be used.", "strong", "warn"))
-        said = label(facts.problem, "label", "text2", wraps=True)
+        self.draft = _say_draft(self, facts.draft)
+        words = "This file cannot be used." if isinstance(facts, BrokenFacts) else "This study was never saved."
+        self.column.addWidget(label(words, "strong", "warn"))
+        said = label(_why(facts), "label", "text2", wraps=True)
         said.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.column.addWidget(said, 1)
         self.setMinimumHeight(LEAST_HEIGHT)
+
+
+def _say_draft(card: Card, words: str) -> QLabel:
+    """Add a line about the draft of a study, where there is one."""
+    made = label(words, "small", "warn")
+    card.column.addWidget(made)
+    made.setVisible(bool(words))
+    return made
+
+
+def _why(facts: BrokenFacts | DraftFacts) -> str:
+    if isinstance(facts, BrokenFacts):
+        return facts.problem
+    return f"{Path(facts.source).name} is written when it is saved."
 
 
 class CardGrid(QWidget):

@@ -7,6 +7,7 @@ from datetime import datetime
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import TypeAlias
 
 from PySide6.QtCore import QEvent, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
@@ -35,6 +36,7 @@ from study_app.viewmodels.devices.list_view import DeviceShown, looking
 from study_app.viewmodels.extent import extent_of
 from study_app.viewmodels.home import (
     BrokenFacts,
+    DraftFacts,
     Interrupted,
     StudyFacts,
     file_states,
@@ -47,6 +49,7 @@ from study_app.viewmodels.home import (
 from study_app.viewmodels.sessions import SessionFacts, sessions
 from study_app.workspace import workspace
 
+Facts: TypeAlias = StudyFacts | BrokenFacts | DraftFacts
 STACKED_BELOW = 1080
 COLUMN_PX = 326
 
@@ -76,7 +79,7 @@ class HomePlace(Place):
         self.machine = DEFAULTS
         self.dialog: NewSessionDialog | RehearsalDialog | SessionPage | None = None
         self._opened: list[str] = []
-        self._facts: tuple[StudyFacts | BrokenFacts, ...] = ()
+        self._facts: tuple[Facts, ...] = ()
         self._files = file_states(())
         self._studies = Background(self)
         self._studies.done.connect(self._show_changed)
@@ -128,7 +131,7 @@ class HomePlace(Place):
             opened = tuple(self._opened)
             self._studies.run(lambda: (opened, read_studies(opened)))
 
-    def _show_changed(self, read: tuple[tuple[str, ...], tuple[StudyFacts | BrokenFacts, ...]]) -> None:
+    def _show_changed(self, read: tuple[tuple[str, ...], tuple[Facts, ...]]) -> None:
         opened, facts = read
         if opened == tuple(self._opened) and facts != self._facts:
             self._show_facts(facts)
@@ -184,11 +187,11 @@ class HomePlace(Place):
         self._files = file_states(self._opened)
         self._show_facts(read_studies(self._opened))
 
-    def _show_facts(self, shown: tuple[StudyFacts | BrokenFacts, ...]) -> None:
+    def _show_facts(self, shown: tuple[Facts, ...]) -> None:
         self._facts = shown
         cards: list[QWidget] = []
         for facts in self._facts:
-            if isinstance(facts, BrokenFacts):
+            if not isinstance(facts, StudyFacts):
                 broken = BrokenCard(facts)
                 broken.edit.connect(lambda facts: self.edit_asked.emit(facts.source))
                 cards.append(broken)
@@ -310,14 +313,13 @@ def _buttons(card: StudyCard | BrokenCard) -> tuple[QWidget, ...]:
     return (card.pen, card.new, card.rehearse) if isinstance(card, StudyCard) else (card.pen,)
 
 
-def _read(
-    results: Path, studies: tuple[StudyFacts | BrokenFacts, ...]
-) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
+def _read(results: Path, studies: tuple[Facts, ...]) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
     """Return the sessions in the results folder, and the one that can go on."""
     counts = {it.name: set(extent_of(it.protocol).answers) for it in studies if isinstance(it, StudyFacts)}
     answers = {name: max(each) for name, each in counts.items() if len(each) == 1}
     found = sessions(results, answers)
-    return results, found, interrupted(found, studies, datetime.now().astimezone())
+    saved = [it for it in studies if not isinstance(it, DraftFacts)]
+    return results, found, interrupted(found, saved, datetime.now().astimezone())
 
 
 def _screens(settings: MachineSettings) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAccessible, QFontMetrics
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
+from study_app.authoring.drafts import Draft, keep
 from study_app.devices.descriptor import NONE, Backend
 from study_app.gui.home.main_window import LEAST, MainWindow
 from study_app.gui.home.study_cards import BrokenCard, StudyCard
@@ -257,6 +258,36 @@ def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_pat
     file.unlink()
     come_back()
     qtbot.waitUntil(lambda: titles(home) == before)
+
+
+def test_a_card_says_that_a_draft_was_not_saved_and_its_pen_opens_it(qtbot, tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    file = own_study(tmp_path)
+    home = open_home(qtbot, tmp_path / "results")
+
+    def card_of(title):
+        return next(card for card in home.grid.cards if getattr(card.facts, "title", "") == title)
+
+    def hidden():
+        return not card_of("Own").draft.isVisible()
+
+    assert hidden()
+    keep(file, Draft(file.read_text(encoding="utf-8") + "# edited\n", ""))  # as after a kill
+    keep(tmp_path / "protocols" / "fresh.toml", Draft('format = 2\n[study]\nname = "fresh"\ntitle = "Fresh"\n', ""))
+    home.enter()
+    qtbot.waitUntil(lambda: any(getattr(card.facts, "title", "") == "Fresh" for card in home.grid.cards))
+    for title in ("Own", "Fresh"):
+        words = card_of(title).draft.text()
+        assert words.startswith("Draft of today ")
+        assert words.endswith(", not saved")
+    asked = []
+    home.edit_asked.connect(asked.append)
+    qtbot.mouseClick(card_of("Fresh").pen, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(card_of("Own").pen, Qt.MouseButton.LeftButton)
+    assert asked == [str(tmp_path / "protocols" / "fresh.toml"), "own"]
+    keep(file, Draft(file.read_text(encoding="utf-8"), ""))
+    home.enter()
+    qtbot.waitUntil(hidden)
 
 
 def test_cards_stay_where_no_file_has_changed(home, qtbot):
