@@ -11,7 +11,7 @@ from study_app.gui.designer.outline.card import OutlineCard
 from study_app.gui.designer.pane.right_pane import RightPane
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.segments import Segments
-from study_app.gui.designer.tab_order import beyond, lead_by_tab
+from study_app.gui.designer.tab_order import lead_by_tab
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.cards import SHADOW, Icon
@@ -145,6 +145,13 @@ class Arrangement(QWidget):
         assert isinstance(application, QApplication)  # noqa: S101 - a window has one
         application.focusChanged.connect(self._follow_focus)
 
+    @property
+    def in_order(self) -> list[QWidget]:
+        """The parts in the order in which Tab goes through them."""
+        asked = (self.prompts.itemAt(at).widget() for at in range(self.prompts.count()))
+        beside = [self.form.head, self.form.inside, *self.pane.in_order, self.problems]
+        return [self.outline, self.top, *(part for part in asked if part is not None), *beside]
+
     def show_side(self, side: str) -> None:
         """Show form or pane where they share a column."""
         self.side = side
@@ -218,15 +225,6 @@ class Arrangement(QWidget):
 
     def _place_drawer(self) -> None:
         self.outline.setGeometry(QRect(0, 46, DRAWER_PX, max(200, self.height() - 46)))
-
-    def focusNextPrevChild(self, forward: bool) -> bool:  # noqa: N802 - Qt's name
-        """Go on by Tab from path, form, views and problems as they are seen, however late each was made."""
-        parts = [self.top, self.form.head, self.form.inside, *self.pane.in_order, self.problems]
-        to = beyond(self.window().focusWidget(), parts, forward=forward)
-        if to is None:
-            return super().focusNextPrevChild(forward)
-        to.setFocus(Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason)
-        return True
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Keep the drawer as high as the place."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.designer.play.play_controls import PlayControls
 from study_app.gui.designer.play.play_strip import PlayStrip
@@ -69,7 +69,7 @@ class ChipButton(Themed, PressedByEnter):
 
 
 class DesignerHeader(QWidget):
-    """Signals: ``study_asked`` (source), ``new_asked``, ``file_asked``, ``problems_asked``, undo, redo, save, keys.
+    """Signals: ``study_asked`` (source), ``new_asked``, ``problems_asked``, undo, redo, save, keys.
 
     ``keyboard_left`` is emitted when a button that has the keyboard is about to be disabled, and after a click between
     the buttons or on one that is disabled.
@@ -77,7 +77,6 @@ class DesignerHeader(QWidget):
 
     study_asked = Signal(str)
     new_asked = Signal()
-    file_asked = Signal()
     problems_asked = Signal()
     undo_asked = Signal()
     redo_asked = Signal()
@@ -204,6 +203,11 @@ class DesignerHeader(QWidget):
         if source == NEW:
             self.new_asked.emit()
         elif source == OPEN:
-            self.file_asked.emit()
+            self._open_file()
         elif source != self.state.chosen:
             self.study_asked.emit(source)
+
+    def _open_file(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileName(self, "Open study", "", "Protocols (*.toml)")
+        if chosen:
+            self.study_asked.emit(chosen)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from PySide6.QtCore import Qt
@@ -24,22 +24,41 @@ def lead_by_tab(first: QWidget, parts: Sequence[QWidget]) -> None:
         QWidget.setTabOrder(before, after)
 
 
-def beyond(here: QWidget | None, parts: Sequence[QWidget], *, forward: bool) -> QWidget | None:
-    """Return where Tab goes from the last stop of a part, or Shift+Tab from the first one; None from any other stop.
+def go_on(parts: Sequence[QWidget], by_qt: Callable[[bool], bool], *, forward: bool) -> bool:
+    """Let Tab go through parts one after another, then to the beginning of the window, or Shift+Tab back.
 
-    It goes to the next of the parts that is shown, and from the last one to the beginning of the window.
+    Within a part the order is Qt's, ``by_qt``, except where Qt leaves the part before all of it was gone through.
     """
-    shown = [(part, found) for part in parts if (found := [one for one in stops(part) if _takes_keyboard(one)])]
-    at = next((at for at, (_, found) in enumerate(shown) if here is found[-1 if forward else 0]), None)
-    if at is None or (at == 0 and not forward):
-        return None
+    window = parts[0].window()
+    shown = [(part, found) for part in parts if (found := _shown(part))]
+    here = window.focusWidget()
+    at = next((at for at, (part, _) in enumerate(shown) if here is not None and part.isAncestorOf(here)), None)
+    if at is None or here not in shown[at][1]:
+        return by_qt(forward)
+    part, found = shown[at]
+    rest = found[found.index(here) + 1 :] if forward else found[: found.index(here)][::-1]
+    if rest:
+        moved = by_qt(forward)
+        if part.isAncestorOf(window.focusWidget() or window):
+            return moved
+    to = rest[0] if rest else _entry(shown, at, window, forward=forward)
+    if to is None:
+        return by_qt(forward)
+    to.setFocus(Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason)
+    return True
+
+
+def _entry(
+    shown: Sequence[tuple[QWidget, list[QWidget]]], at: int, window: QWidget, *, forward: bool
+) -> QWidget | None:
+    """Return the stop at which Tab enters the part after another one, or Shift+Tab the part before."""
     if not forward:
-        return shown[at - 1][1][-1]
+        return shown[at - 1][1][-1] if at else None
     if at + 1 == len(shown):
-        return next(one for one in stops(shown[at][0].window()) if _takes_keyboard(one))
+        return next(iter(_shown(window)), None)
     part, found = shown[at + 1]
     return next((one for one in found if one is part.focusProxy()), found[0])
 
 
-def _takes_keyboard(part: QWidget) -> bool:
-    return part.isVisible() and part.isEnabled()
+def _shown(part: QWidget) -> list[QWidget]:
+    return [one for one in stops(part) if one.isVisible() and one.isEnabled()]

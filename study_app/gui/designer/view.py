@@ -6,7 +6,7 @@ from functools import partial
 
 from PySide6.QtCore import Signal, SignalInstance
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFileDialog, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from study_app.gui.designer.arrangement import Arrangement
 from study_app.gui.designer.banner import BannerCard
@@ -24,6 +24,7 @@ from study_app.gui.designer.problem_steps import ProblemSteps
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt
 from study_app.gui.designer.shortcuts import make_shortcuts
+from study_app.gui.designer.tab_order import go_on
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.main_view import Place
@@ -112,7 +113,6 @@ class DesignerPlace(Place):
         header, outline, form = self.header, self.outline, self.form
         header.study_asked.connect(self.study_asked)
         header.new_asked.connect(self.new_asked)
-        header.file_asked.connect(self._open_file)
         header.problems_asked.connect(lambda: self.problems.setVisible(not self.problems.isVisible()))
         header.undo_asked.connect(undo)
         header.redo_asked.connect(redo)
@@ -346,11 +346,6 @@ class DesignerPlace(Place):
             self.parts.show_side("form")
             self.form.focus_first_text()
 
-    def _open_file(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(self, "Open study", "", "Protocols (*.toml)")
-        if chosen:
-            self.study_asked.emit(chosen)
-
     def _ask_for_repair(self, row: ProblemRow, words: str) -> None:
         self.flush()
         self.repair_asked.emit(row, words)
@@ -376,6 +371,11 @@ class DesignerPlace(Place):
         """Hand on what is being typed; the draft is written at once."""
         self.flush()
         self.left.emit()
+
+    def focusNextPrevChild(self, forward: bool) -> bool:  # noqa: N802 - Qt's name
+        """Let Tab go through the parts as they are seen."""
+        parts = [self.header, self.banner, *self.parts.in_order]
+        return go_on(parts, super().focusNextPrevChild, forward=forward)
 
     def wants_narrow_rail(self) -> bool:
         """Return that form and file need the width."""

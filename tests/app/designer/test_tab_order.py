@@ -15,7 +15,7 @@ from study_app.viewmodels.designer.requests import ChangeLanguage
 pytestmark = pytest.mark.slow
 
 KEY, CONTROL = Qt.Key, Qt.KeyboardModifier.ControlModifier
-MOST = 120
+MOST = 250
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def passed(qtbot: Any, until: Callable[[QWidget], bool]) -> list[Any]:
     """Press Tab until the keyboard is at a part; return all that it was at."""
     seen = [QApplication.focusWidget()]
     while not until(seen[-1]):
-        assert len(seen) < MOST, [one.accessibleName() for one in seen]
+        assert len(seen) < MOST, [one.accessibleName() for one in seen[-40:]]
         seen.append(press(qtbot, KEY.Key_Tab))
     return seen
 
@@ -100,6 +100,29 @@ def test_ctrl_l_shows_the_page_in_the_next_language(qtbot: Any, dutch: Any, widt
     assert "(Ctrl+L)" in tab.languages.buttons[0].toolTip()
     press(qtbot, KEY.Key_L, CONTROL)
     assert tab.view.language == "en"
+
+
+def test_tab_goes_through_problems_questions_and_the_banner_which_are_made_later(
+    qtbot: Any, designer: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("study_app.app.designer.repair_search.REST_MS", 0)
+    designer.controller.open("kitchen")
+    designer.editing.ask(ChangeLanguage("add", "nl"))
+    designer.saving.save()
+    place = designer.place
+    place.problems.show()
+    place.show_tab("changes")
+    qtbot.waitUntil(lambda: all(line.repairs for line in place.problems.lines))
+    designer.controller.ask_to_delete(("liquids", "thick"))
+    qtbot.waitUntil(place.prompt.isVisible)
+    place.areas.focus_header()
+    press(qtbot, KEY.Key_Tab)
+    seen = passed(qtbot, lambda part: part is place.header.study or designer.window.rail.isAncestorOf(part))
+    lines = [part for line in place.problems.lines for part in (line.go, *line.repairs)]
+    card = place.prompt
+    made = [*place.banner.buttons, place.outline.tree, card.cancel, card.gaps, card.other, card.all, *lines]
+    assert [part for part in seen if part in made] == made
+    assert len(set(seen)) == len(seen)
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
