@@ -79,6 +79,8 @@ def test_buttons_say_their_keys(designer: Any) -> None:
     ):  # fmt: skip
         assert f"({key})" in part.toolTip(), (key, part.toolTip())
     assert "Ctrl+F" in outline.words.placeholderText()
+    for button in (outline.add, outline.duplicate):
+        assert button.width() >= button.minimumSizeHint().width(), "there is room for the cap of its key"
 
 
 def test_the_documentation_lists_every_key() -> None:

@@ -62,7 +62,7 @@ class OutlineCard(Card):
         self.add = ActionButton("plus", "Add", cap=key_cap("add"), height=40)
         self.add.setAccessibleName(f"Add an element ({keys_of('add')[0]})")
         self.add.setToolTip(tip("add"))
-        self.duplicate = ActionButton("copy", "Duplicate", height=40)  # there is no room for the cap of its key
+        self.duplicate = ActionButton("", "Duplicate", cap=key_cap("duplicate"), height=40)  # no room for an icon, too
         self.duplicate.setAccessibleName(with_key("Duplicate the selected element", "duplicate"))
         self.duplicate.setToolTip(tip("duplicate"))
         for button in (self.add, self.duplicate):
@@ -71,7 +71,8 @@ class OutlineCard(Card):
         self.column.addWidget(self.tree, 1)
         buttons = QHBoxLayout()
         buttons.setSpacing(8)
-        buttons.addWidget(self.add, 1)
+        self.add.setMaximumWidth(self.add.minimumSizeHint().width())
+        buttons.addWidget(self.add)
         buttons.addWidget(self.duplicate, 1)
         self.column.addLayout(buttons)
         self.words.textChanged.connect(self.find_changed)
