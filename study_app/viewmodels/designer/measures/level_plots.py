@@ -108,14 +108,17 @@ def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> Lev
 
 
 def number_cards(
-    of: LevelBlock, simulated: Simulated, participants: int, duration_s: float, order: BlockOrder
+    of: LevelBlock, simulated: Simulated, participants: int, duration_s: float, order: BlockOrder, warned: int | None
 ) -> tuple[NumberCard, ...]:
-    """Return the four numbers of a block whose tracks are simulated."""
+    """Return the four numbers of a block whose tracks are simulated.
+
+    ``warned`` is of how many participants ``check`` warns that they are too few; None: it does not.
+    """
     breaks = f", {order.breaks} break{'s' * (order.breaks > 1)}" if order.breaks else ""
     return (
         _range(of, simulated),
         _one_person(of, simulated),
-        _people(simulated, participants, simulated.precision),
+        _people(simulated, participants, simulated.precision, warned),
         NumberCard(
             "Lasts", f"{duration_s / 60:.0f}", "min",
             ("neutral", "clock", f"{order.trials} trials{breaks}"),
@@ -157,7 +160,7 @@ def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
     return NumberCard("One person", f"± {100 * found.error:.0f}", "%", note, "observed" in simulated.anew)
 
 
-def _people(simulated: Simulated, participants: int, precision: float) -> NumberCard:
+def _people(simulated: Simulated, participants: int, precision: float, warned: int | None) -> NumberCard:
     found = simulated.group
     if found is None:
         return _unknown(f"{participants} people in ± {100 * precision:g} %", "% of studies", simulated)
@@ -167,6 +170,8 @@ def _people(simulated: Simulated, participants: int, precision: float) -> Number
     many = f"More than {found.most}" if found.enough is None else f"About {found.enough}"
     needed = f"{100 * ENOUGH:g} % needed" if enough else f"{many} participants are needed for {100 * ENOUGH:g} %"
     more = f"{needed}; with {found.more_trials} trials: {100 * found.more_share:.0f} %"
+    if warned is not None:
+        more += f". The warning of check is of the {warned} planned, and of the expected precision"
     return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, "group" in simulated.anew, more)
 
 

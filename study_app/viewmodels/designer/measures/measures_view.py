@@ -157,7 +157,7 @@ def measures_view(
     if protocol is not None and block is not None and of is not None and focus.plan is not None:
         numbers = number_cards(
             of, slow.simulated, controls.participants, facts.steps_s.get(block.id, 0.0),
-            order_of(protocol, block),
+            order_of(protocol, block), controls.planned if slow.warnings else None,
         )  # fmt: skip
         return MeasuresView(
             values, numbers, function_plot(of, slow.simulated), track_plot(of, slow.simulated),

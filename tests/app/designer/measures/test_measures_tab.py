@@ -141,19 +141,20 @@ def test_the_number_of_participants_is_kept_for_each_study(qtbot: Any, designer:
 def test_a_verdict_says_whether_the_participants_are_enough(qtbot: Any, designer: Any, worker: Worker) -> None:
     jnd(designer)
     people = designer.place.measures.numbers.parts[2]
+    of_check = ". The warning of check is of the 20 planned, and of the expected precision"
     for participants, number, verdict, more in (
-        (20, "93", ("ok", "check", "Enough"), "80 % needed; with 107 trials: 98 %"),
+        (20, "93", ("ok", "check", "Enough"), f"80 % needed; with 107 trials: 98 %{of_check}"),
         (
             12,
             "13",
             ("warn", "warning", "Not enough"),
-            "About 22 participants are needed for 80 %; with 107 trials: 22 %",
+            f"About 22 participants are needed for 80 %; with 107 trials: 22 %{of_check}",
         ),
         (
             8,
             "13",
             ("warn", "warning", "Not enough"),
-            "More than 60 participants are needed for 80 %; with 107 trials: 22 %",
+            f"More than 60 participants are needed for 80 %; with 107 trials: 22 %{of_check}",
         ),
     ):
         designer.place.measures.controls.participants.entered.emit(participants)
