@@ -73,7 +73,8 @@ class ActionButton(Themed, PressedByEnter):
 
     def _content_width(self) -> float:
         width = QFontMetricsF(self.font()).horizontalAdvance(self.text())
-        return width + (28 if self._icon else 0) + (12 + self._cap_width() if self._cap else 0)
+        icon = (28 if self.text() or self._cap else 20) if self._icon else 0
+        return width + icon + (12 + self._cap_width() if self._cap else 0)
 
     def _cap_width(self) -> float:
         return max(20.0, QFontMetricsF(self._key_font).horizontalAdvance(self._cap) + 10)

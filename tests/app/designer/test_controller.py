@@ -303,7 +303,7 @@ def test_a_question_can_be_added_wherever_there_is_a_questionnaire(designer: Any
         every = [adding.list.item(at).data(Qt.ItemDataRole.UserRole) for at in range(adding.list.count())]
         return [one.words for one in every if isinstance(one.asks, AddElement)]
 
-    assert offered(("pages", "welcome")) == ["Questionnaire", "Question"]
+    assert offered(("pages", "welcome")) == ["Question", "Questionnaire"]
     assert offered(("pages", "welcome"), "design") == ["Trial design"]
     designer.editing.ask(AddElement(("questionnaires",)))
     questions = [words for words in offered(("pages", "welcome")) if words.startswith("Question of")]

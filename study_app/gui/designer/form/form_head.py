@@ -18,6 +18,7 @@ from study_app.viewmodels.designer.keys import tip
 from study_app.viewmodels.designer.requests import RenameElement, SetValue
 
 TILE = 40
+QWIDGETSIZE_MAX = (1 << 24) - 1
 LABEL_PX = 116
 
 
@@ -148,7 +149,9 @@ class FormHead(QWidget):
         self.feel.setAccessibleName(form.feel or "Feel")
         self.feel.setToolTip(f"{form.feel} in the lab")
         self.series.setVisible(form.series and not read_only)
-        self.series.show_action("bars", "Series …" if form.position is None else "")  # next to the arrows an icon alone
+        alone = form.position is not None  # next to the arrows there is room for the icon alone
+        self.series.show_action("bars", "" if alone else "Series …")
+        self.series.setMaximumWidth(34 if alone else QWIDGETSIZE_MAX)
         self.series.setAccessibleName(f"Series of {form.title}")
         place, count = form.position or (0, 0)
         for button in (self.up, self.down):

@@ -84,7 +84,9 @@ class AddList(Themed, QFrame):
         self.typed.emit(words)
         wanted = words_sought(words)
         self.list.clear()
-        fitting = (one for one in self._every if all(part in f"{one.words} {one.help}".casefold() for part in wanted))
+        fitting = [one for one in self._every if all(part in f"{one.words} {one.help}".casefold() for part in wanted)]
+        typed = words.casefold().split()
+        fitting.sort(key=lambda one: one.words.casefold().split()[: len(typed)] != typed)  # whole words come first
         for one in (*fitting, *self._fields):
             item = QListWidgetItem(icon(one.icon, self.theme.text2, 18), one.words)
             item.setData(Qt.ItemDataRole.UserRole, one)
