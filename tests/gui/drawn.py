@@ -18,7 +18,9 @@ MODULES = tuple(
     f"study_app.gui.participant.{name}"
     for name in (
         "tank_widget",
+        "forms.foot",
         "forms.option_button",
+        "forms.question_words",
         "pages.column_labels",
         "pages.key_caps",
         "pages.language_switch",

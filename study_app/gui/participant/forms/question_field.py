@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QAccessible, QColor, QFocusEvent, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
+from PySide6.QtGui import QAccessible, QColor, QFocusEvent, QFont, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QGridLayout, QWidget
 
-from study_app.gui.participant.forms.foot import Sign
-from study_app.gui.participant.pages.page_widget import beginning, page_painter
+from study_app.gui.participant.forms.question_words import QuestionWords
+from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import give_role
@@ -62,28 +62,13 @@ class QuestionField(QWidget):
         self._answer: QWidget | None = None
         self.scale = 1.0
         give_role(self, QAccessible.Role.Grouping)
-        self._ordinal, self.statement, self._note = QLabel(str(view.number)), QLabel(view.text), QLabel()
-        self._sign = Sign(self)
-        self._note.setWordWrap(True)
-        self.statement.setWordWrap(True)
-        self.statement.setStyleSheet(f"color: {PARTICIPANT.text}; background: transparent;")
-        top = Qt.AlignmentFlag.AlignTop
-        for label in (self._ordinal, self.statement, self._note):
-            label.setAlignment(beginning(parent) | top)
-        self._words_grid = QGridLayout()
-        self._words_grid.setSpacing(0)
-        self._words_grid.setRowStretch(0, 1)
-        self._words_grid.addWidget(self._ordinal, 1, 0, top)
-        self._words_grid.addWidget(self.statement, 1, 1, 1, 2)
-        self._words_grid.addWidget(self._sign, 2, 1)
-        self._words_grid.addWidget(self._note, 2, 2)
-        self._words_grid.setColumnStretch(2, 1)
-        self._words_grid.setRowStretch(3, 1)
+        self.statement = QuestionWords(view.number, view.text, self)
         self.grid = QGridLayout(self)
         self.grid.setHorizontalSpacing(0)
-        self.grid.addLayout(self._words_grid, 0, 0)
+        self.grid.addWidget(self.statement, 0, 0)
         self.grid.setColumnStretch(0, WORDS_SHARE)
         self.grid.setColumnStretch(self.ANSWER, ANSWER_SHARE)
+        self.setAccessibleName(f"{view.number}. {view.text}")
         self._tell()
 
     @property
@@ -130,21 +115,17 @@ class QuestionField(QWidget):
 
     def set_fonts(self, statement: QFont, note: QFont, scale: float) -> None:
         """Write statement and note in these fonts, and the number as large as in all rows of a page."""
-        self.statement.setFont(statement)
-        self._note.setFont(note)
-        self._sign.set_size(QFontMetricsF(note).height() - 1, NOTE_GAP * scale)
-        self._ordinal.setFont(font("cell", scale=scale * 0.9, weight=700 if self.missing else 400))
+        number = font("cell", scale=scale * 0.9, weight=700 if self.missing else 400)
+        self.statement.set_fonts(statement, note, number, NOTE_GAP * scale)
 
     def set_words_columns(self, number: float, after: float) -> None:
         """Give the number its width, and keep so much room after the words [px]."""
-        self._ordinal.setFixedWidth(round(number))
+        self.statement.set_number_width(round(number))
         self.grid.setColumnMinimumWidth(1, round(after))
 
     def height_in(self, width: int, room: int) -> int:
         """Return the height [px] that words, note and answer need in a width; there is ``room`` for so much."""
-        self._note.setText(self.note or self._words.please_answer)  # that may come once Continue is pressed
-        self._note.show()
-        self._sign.show()
+        self.statement.show_note(self.note or self._words.please_answer, missing=True)  # once Continue is pressed
         if self._answer is not None:
             self._answer.updateGeometry()  # the layout keeps what it asked for before
         self.grid.invalidate()
@@ -234,18 +215,13 @@ class QuestionField(QWidget):
     def _tell(self) -> None:
         """Give the field its words and its state for a screen reader."""
         words = self._words
-        style = f"color: {PARTICIPANT.warn if self.missing else PARTICIPANT.text3}; background: transparent;"
-        if style != self._note.styleSheet():
-            for label in (self._ordinal, self._note):
-                label.setStyleSheet(style)
-        self._sign.setVisible(self.missing)
-        self._note.setText(self.note)
-        self._note.setVisible(bool(self.note))
-        self.setAccessibleName(f"{self.view.number}. {self.view.text}")
+        self.statement.show_note(self.note, missing=self.missing)
         if self.is_answered:
             state = f"{words.chosen}: {self.spoken()}"
         else:
             state = words.please_answer if self.missing else words.no_answer_yet
+        if self.note and not self.missing:
+            state = f"{self.note}, {state}"
         self.setAccessibleDescription(state)
         self.update()
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
-
 from study_app.gui.participant.forms.option_button import RadioOption
 from study_app.gui.participant.forms.options_field import MOST_DIGITS, OptionsField
 from study_app.protocol.forms.show_if import Value
@@ -25,16 +22,6 @@ class ScaleField(OptionsField):
         if judge_name is not None:
             self.judge = RadioOption(judge_text or "", judge_name, text, self, look="off scale")
         self.hold([*self.points, *([] if self.judge is None else [self.judge])])
-        scale, area = QWidget(self), QWidget(self)
-        scale.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
-        self.cells = QGridLayout(scale)
-        self.cells.setContentsMargins(0, 0, 0, 0)
-        self.row = QHBoxLayout(area)
-        self.row.setContentsMargins(0, 0, 0, 0)
-        self.row.addWidget(scale, 1)
-        if self.judge is not None:
-            self.row.addWidget(self.judge)
-        self.put(area)
 
     @property
     def digits(self) -> int:

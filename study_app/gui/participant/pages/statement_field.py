@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
-from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFocusEvent, QFont, QFontMetricsF, QPainter, QPen
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from study_app.gui.participant.forms.option_button import NO_WORDS
 from study_app.gui.participant.forms.scale_field import ScaleField
@@ -24,6 +25,13 @@ WRAP_LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.Text
 Fitted: TypeAlias = tuple[QFont, QFont, float, float]
 
 
+@lru_cache(maxsize=256)
+def statement_height(text: str, scale: float, weight: int, width_px: int) -> float:
+    """Return the height of a statement that is wrapped at a width [px]; a page of statements often comes again."""
+    room = QRectF(0, 0, width_px, 1e4)
+    return QFontMetricsF(font("statement", scale=scale, weight=weight)).boundingRect(room, WRAP_LEFT, text).height()
+
+
 class StatementField(ScaleField):
     """A statement with its cells; their names stand over the columns, once for all statements."""
 
@@ -33,8 +41,17 @@ class StatementField(ScaleField):
         self.sizes: Grid | None = None
         super().__init__(view, words, parent)
         self.build(labels, judge, NO_WORDS)
-        for place, point in enumerate(self.points):
-            self.cells.addWidget(point, 0, place)
+        self.statement.fill_row()
+        self.cells, self.row = QHBoxLayout(), QHBoxLayout()
+        mirrored = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+        for point in reversed(self.points) if mirrored else self.points:  # a scale has the same order in every language
+            self.cells.addWidget(point)
+            if mirrored:
+                point.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
+        self.row.addLayout(self.cells)
+        if self.judge is not None:
+            self.row.addWidget(self.judge)
+        self.grid.addLayout(self.row, 0, self.ANSWER, Qt.AlignmentFlag.AlignVCenter)
         self.grid.setColumnStretch(self.ANSWER, 0)
 
     @property
@@ -47,7 +64,7 @@ class StatementField(ScaleField):
     @property
     def columns(self) -> list[tuple[float, float]]:
         """Left end and width of every cell in the row [px]."""
-        return [(cell.mapTo(self, QPoint(0, 0)).x(), cell.width()) for cell in self.options]
+        return [(cell.x(), cell.width()) for cell in self.options]
 
     @property
     def rule(self) -> float | None:
@@ -64,18 +81,15 @@ class StatementField(ScaleField):
         self.grid.setContentsMargins(margin, 0, margin, 0)
         self.set_words_columns(sizes.number_width, AFTER_STATEMENT * sizes.scale)
         width, height = math.floor(sizes.cell_width), math.floor(sizes.cell_height + 0.01)
-        self.cells.setHorizontalSpacing(round(CELL_GAP * sizes.scale))
+        self.cells.setSpacing(round(CELL_GAP * sizes.scale))
         for point in self.points:
             point.set_scale(sizes.text)
             point.setFixedSize(width, height)
         if self.judge is not None:
             self.judge.set_scale(sizes.text)
             self.judge.setFixedSize(math.floor(sizes.judge_width), height)
-            self.row.setSpacing(round(sizes.judge_gap))
+        self.row.setSpacing(round(sizes.judge_gap))
         self.setFixedHeight(math.floor(sizes.pitch))
-        area = self.row.parentWidget()
-        self.cells.parentWidget().updateGeometry()  # else the row remembers the size of earlier cells
-        area.setFixedWidth(area.sizeHint().width())
         self._tell()
 
     def fits(self, sizes: Grid, note: str) -> bool:
@@ -117,8 +131,7 @@ class StatementField(ScaleField):
         weight = 500 if self.missing or self.hasFocus() else 400
         face = font("statement", scale=sizes.text * shrink, weight=weight)
         note_face = font("label", scale=sizes.text * note_shrink, weight=600)
-        room = QRectF(0, 0, math.floor(sizes.statement_width), 1e4)
-        height = QFontMetricsF(face).boundingRect(room, WRAP_LEFT, self.view.text).height()
+        height = statement_height(self.view.text, sizes.text * shrink, weight, math.floor(sizes.statement_width))
         return face, note_face, height, QFontMetricsF(note_face).height() if note else 0.0
 
     def _tell(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
 
 from study_app.gui.participant.forms.scale_field import ScaleField
 from study_app.gui.theme.theme import PARTICIPANT, font
@@ -28,6 +28,16 @@ class RatingField(ScaleField):
         assert isinstance(view, RatingView)  # noqa: S101 - the registry names this widget
         super().__init__(view, words, parent)
         self.build(view.labels, view.cannot_judge, view.cannot_judge)
+        scale, area = QWidget(self), QWidget(self)
+        scale.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
+        self.cells = QGridLayout(scale)
+        self.cells.setContentsMargins(0, 0, 0, 0)
+        self.row = QHBoxLayout(area)
+        self.row.setContentsMargins(0, 0, 0, 0)
+        self.row.addWidget(scale, len(self.points))
+        if self.judge is not None:
+            self.row.addWidget(self.judge, JUDGE_SHARE, Qt.AlignmentFlag.AlignBottom)
+        self.put(area)
         self._names = [QLabel() for _ in self._columns()]
         for (first, last), label, side in zip(self._columns(), self._names, self._sides(), strict=True):
             label.setWordWrap(True)
@@ -36,10 +46,6 @@ class RatingField(ScaleField):
         for place, point in enumerate(self.points):
             self.cells.addWidget(point, 1, place)
             self.cells.setColumnStretch(place, 1)
-        self.row.setStretch(0, len(self.points))
-        if self.judge is not None:
-            self.row.setStretch(1, JUDGE_SHARE)
-            self.row.setAlignment(self.judge, Qt.AlignmentFlag.AlignBottom)
         self.pointed_at.connect(self._name_points)
         self._name_points()
 

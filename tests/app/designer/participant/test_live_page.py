@@ -158,7 +158,7 @@ def test_an_edit_repaints_the_page_and_keeps_answers_and_focus_where_they_were(d
     typing = QApplication.focusWidget()
     designer.editing.ask(SetText((*ITEM, "text"), "en", "This is like honey."))
     shown = next(one for one in live.page_window.widget.fields if one.view.id == "like_honey")
-    assert shown.statement.text() == "This is like honey."
+    assert shown.statement.text == "This is like honey."
     assert answers(live) == {"like_honey": 2}
     assert QApplication.focusWidget() is typing
 

@@ -60,6 +60,7 @@ def test_every_part_fits_and_can_be_hit(
             assert field.isVisible()
             assert opened.page.rect().contains(field.geometry())
             assert field.geometry().bottom() <= opened.page.foot.geometry().top()
+            assert field.statement.height() >= field.statement.heightForWidth(field.statement.width()) - 1
             for label in field.findChildren(QLabel):
                 if label.isVisible() and label.wordWrap():
                     assert label.height() >= label.heightForWidth(label.width()) - 1, label.text()

@@ -20,6 +20,7 @@ from study_app.protocol.questions.question import ItemView
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
+from tests.gui.drawn import drawn_by
 from tests.gui.small import LABELS, ManualClock, questionnaire
 
 pytestmark = pytest.mark.slow
@@ -227,6 +228,16 @@ def test_names_for_a_screen_reader(shown: Shown) -> None:
     assert row.options[4].accessibleName() == "5 Somewhat agree"
     shown.click(4, 4)
     assert row.accessibleDescription() == "chosen: 5 Somewhat agree"
+
+
+def test_a_screen_reader_hears_that_a_statement_is_optional(qtbot: Any) -> None:
+    shown = Shown(qtbot, questionnaire(items=(ItemView("may", 1, "B.", required=False),)), (1366, 768))
+    assert shown.rows[0].accessibleDescription() == f"{words('en').optional}, no answer yet"
+
+
+def test_statement_is_shown_as_it_is_written(qtbot: Any) -> None:
+    shown = Shown(qtbot, questionnaire(("It is <b>not</b> thick & cold.",)), (1366, 768))
+    assert "It is <b>not</b> thick & cold." in {one.text for one in drawn_by(shown.widget)}
 
 
 def place_in(row: StatementField, part: QWidget) -> QRect:
