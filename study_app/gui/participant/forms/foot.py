@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QFontMetricsF, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import QRect, QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QFontMetricsF, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QStyle, QWidget
 
-from study_app.gui.participant.pages.key_caps import GoButton, KeyCap
-from study_app.gui.participant.pages.page_widget import page_painter
+from study_app.gui.participant.pages.key_caps import GoButton, draw_key, key_size
+from study_app.gui.participant.pages.page_widget import beginning, page_painter
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, font
 
@@ -19,109 +19,124 @@ if TYPE_CHECKING:
 
 MARK = 22.0
 MOVE_KEYS = "↑ ↓"
-
-
-class Sign(QWidget):
-    """The sign of what is missing."""
-
-    _side = MARK
-
-    def set_size(self, side: float, gap: float = 0.0) -> None:
-        """Give it its size, and a gap to the words after it [px]."""
-        self._side = side
-        self.setFixedSize(round(side + gap), round(side))
-
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Draw it."""
-        painter = page_painter(self)
-        flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
-        left = self.width() - self._side if flip else 0.0
-        draw_icon(painter, "warning", QRectF(left, 0, self._side, self._side), PARTICIPANT.warn)
-        painter.end()
+LINE = 1  # over the foot [px]
+GAP = 9.0
+HIGHEST = 2000  # of wrapped words [px]
+WRAPPED = int(Qt.TextFlag.TextWordWrap)
 
 
 class Foot(QWidget):
-    """One line; the keys give way where a message needs the room."""
+    """One line; the keys give way where a message needs the room. All but the button is painted."""
 
     def __init__(self, words: Words, parent: QWidget) -> None:
         super().__init__(parent)
         self._words = words
         self._scale = 1.0
-        self._answer_keys = ""
-        self._sign = Sign(self)
-        self._caps = (KeyCap(self), KeyCap(self))
-        self._hints = (QLabel(words.key_answer, self), QLabel(words.key_move, self))
-        self._message, self._kept, self._count = QLabel(self), QLabel(words.answers_kept, self), QLabel(self)
+        self._message, self._count, self._answer_keys = "", "", ""
         self.button = GoButton(words.continue_, words.enter_key, self)
-        self._message.setStyleSheet(f"color: {PARTICIPANT.text}; background: transparent;")
-        for label in (self._kept, self._count, *self._hints):
-            label.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
-        self._message.setWordWrap(True)
-        lines = QVBoxLayout()
-        lines.setSpacing(0)
-        lines.addStretch(1)
-        lines.addWidget(self._message)
-        lines.addWidget(self._kept)
-        lines.addStretch(1)
         self._row = QHBoxLayout(self)
-        self._row.addWidget(self._sign)
-        self._row.addLayout(lines, 1)
-        for cap, hint in zip(self._caps, self._hints, strict=True):
-            self._row.addWidget(cap)
-            self._row.addWidget(hint)
-        self._row.addWidget(self._count)
+        self._row.addStretch(1)
         self._row.addWidget(self.button)
 
     def set_scale(self, scale: float, margin: int, *, tight: bool) -> None:
         """Grow with the page."""
         self._scale = scale
-        self._sign.set_size(MARK * scale)
-        self._message.setFont(font("statement", scale=scale, weight=600))
-        small = font("body", scale=scale * 0.94)
-        for label in (self._kept, *self._hints):
-            label.setFont(small)
-        self._count.setFont(font("cell", scale=scale * 0.95))
-        self._count.setContentsMargins(round(14 * scale), 0, round(4 * scale), 0)
+        self._strong = font("statement", scale=scale, weight=600)
+        self._small = font("body", scale=scale * 0.94)
+        self._tabular = font("cell", scale=scale * 0.95)
         self.button.set_scale(scale * (0.95 if tight else 1.0))
-        self._row.setContentsMargins(margin, 0, margin - 4, 0)
-        self._row.setSpacing(round(9 * scale))
-        self.setFixedHeight(round((72 if tight else 96) * scale))
-        self._fit()
+        self._row.setContentsMargins(margin, LINE, margin - 4, 0)
+        self.setFixedHeight(LINE + round((72 if tight else 96) * scale))
+        self.update()
 
     def show_state(self, message: str, done: int, of: int, keys: str) -> None:
         """Say what is missing, how many are answered, and which keys answer."""
-        self._message.setText(message)
-        self._count.setText(self._words.answered.format(done=done, of=of))
-        self._answer_keys = keys
-        self._fit()
+        self._message, self._answer_keys = message, keys
+        self._count = self._words.answered.format(done=done, of=of)
+        self.setAccessibleName(" ".join(filter(None, (message, self._count))))
+        self.update()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        """Show what there is room for."""
-        super().resizeEvent(event)
-        self._fit()
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+        """Draw a line, and under it from the end: how many are answered, the keys, and what is missing."""
+        painter = page_painter(self)
+        painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # words are in their own language's
+        painter.fillRect(0, 0, self.width(), LINE, QColor(PARTICIPANT.border))
+        gap = round(GAP * self._scale)
+        line = self._row.contentsRect()
+        end = self._paint_count(painter, line.right() + 1 - self.button.width() - gap)
+        room = end - 2 * gap - line.left()
+        room_after_sign = room - round(MARK * self._scale) - gap
+        light = QFontMetricsF(self._small).horizontalAdvance(self._words.answers_kept)
+        strong = QFontMetricsF(self._strong).horizontalAdvance(self._message) + 4
+        needed = max(strong, light) if self._message else 0.0
+        end = self._paint_keys(painter, end - gap, room_after_sign - needed if self._message else room)
+        if self._message:
+            lines = math.ceil(needed / max(1.0, room_after_sign))
+            high = lines * QFontMetricsF(self._strong).height() + QFontMetricsF(self._small).height()
+            kept = light <= room_after_sign and high <= self.height() - LINE
+            self._paint_message(painter, end - gap, kept=kept)
+        painter.end()
 
-    def _fit(self) -> None:
-        """Show the message with its second line where that fits, and the keys in the width that is left."""
-        message, gap = self._message.text(), self._row.spacing()
-        margins = self._row.contentsMargins()
-        room = self.width() - margins.left() - margins.right() - self.button.width() - 3 * gap
-        room -= self._count.sizeHint().width()
-        strong, light = (QFontMetricsF(label.font()) for label in (self._message, self._kept))
-        kept = light.horizontalAdvance(self._words.answers_kept)
-        needed = max(strong.horizontalAdvance(message) + 4, kept) if message else 0.0
-        room_after_sign = room - self._sign.width() - gap
-        lines = math.ceil(needed / max(1.0, room_after_sign))
-        height = lines * strong.height() + light.height()
-        for part, shown in (
-            (self._sign, bool(message)),
-            (self._message, bool(message)),
-            (self._kept, bool(message) and kept <= room_after_sign and height <= self.height()),
-        ):
-            part.setVisible(shown)
-        hints = (self._answer_keys, MOVE_KEYS)
-        for cap, key in zip(self._caps, hints, strict=True):
-            cap.show_key(key, self._scale)
-        taken = sum(label.sizeHint().width() for label in self._hints) + sum(cap.width() for cap in self._caps)
-        fits = bool(self._answer_keys) and taken + 6 * gap <= (room_after_sign - needed if message else room)
-        for hint in (*self._caps, *self._hints):
-            hint.setVisible(fits)
+    def _paint_count(self, painter: QPainter, end: int) -> int:
+        """Draw up to ``end`` how many are answered; return where that begins [px]."""
+        before, after = round(14 * self._scale), round(4 * self._scale)
+        width = before + self._width(self._tabular, self._count) + after
+        place = self._placed(end - width, width).adjusted(before, 0, -after, 0)
+        self._write(painter, place, self._count, self._tabular, PARTICIPANT.text2)
+        return end - width
+
+    def _paint_keys(self, painter: QPainter, end: int, room: float) -> int:
+        """Draw the keys up to ``end`` where there is ``room`` for them; return where they begin [px]."""
+        gap, words = round(GAP * self._scale), self._words
+        hints = ((MOVE_KEYS, words.key_move), (self._answer_keys, words.key_answer))
+        caps = [round(key_size(key, self._scale)[0]) + 2 for key, _ in hints]
+        line = self._row.contentsRect()
+        high = round(key_size(MOVE_KEYS, self._scale)[1]) + 2
+        middle = line.top() + (line.height() - high) // 2 + high / 2
+        widths = [self._width(self._small, text) for _, text in hints]
+        if not self._answer_keys or sum(caps) + sum(widths) + 6 * gap > room:
+            return end + gap
+        for (key, text), cap, width in zip(hints, caps, widths, strict=True):
+            self._write(painter, self._placed(end - width, width), text, self._small, PARTICIPANT.text2)
+            end -= width + gap
+            draw_key(painter, self._placed(end - cap, cap).left() + 1, middle, key, self._scale)
+            end -= cap + gap
+        return end + gap
+
+    def _paint_message(self, painter: QPainter, end: int, *, kept: bool) -> None:
+        """Draw what is missing up to ``end``, with a second line that nothing is lost where ``kept``."""
+        side = round(MARK * self._scale)
+        left = self._row.contentsRect().left() + side + round(GAP * self._scale)
+        sign = self._placed(self._row.contentsRect().left(), side)
+        top = sign.top() + (sign.height() - side) // 2
+        size = MARK * self._scale
+        x = sign.right() + 1 - size if self.layoutDirection() == Qt.LayoutDirection.RightToLeft else sign.left()
+        draw_icon(painter, "warning", QRectF(x, top, size, size), PARTICIPANT.warn)
+        place = self._placed(left, end - left)
+        high = self._bounds(self._strong, self._message, end - left).height()
+        low = self._bounds(self._small, self._words.answers_kept, end - left).height() if kept else 0
+        place.setTop(place.top() + (place.height() - high - low + 1) // 2)
+        place.setHeight(high)
+        self._write(painter, place, self._message, self._strong, PARTICIPANT.text)
+        if kept:
+            place.translate(0, high)
+            place.setHeight(low)
+            self._write(painter, place, self._words.answers_kept, self._small, PARTICIPANT.text2)
+
+    def _write(self, painter: QPainter, place: QRect, words: str, face: QFont, ink: str) -> None:
+        painter.setFont(face)
+        painter.setPen(QColor(ink))
+        flags = int(beginning(self) | Qt.AlignmentFlag.AlignVCenter) | WRAPPED
+        painter.drawText(QRectF(place), flags, words)
+
+    def _placed(self, left: int, width: int) -> QRect:
+        """Return a place, as high as the foot, so far from where lines begin [px]."""
+        line = self._row.contentsRect()
+        return QStyle.visualRect(self.layoutDirection(), line, QRect(left, line.top(), width, line.height()))
+
+    def _width(self, face: QFont, words: str) -> int:
+        """Return the width of words on one line [px]."""
+        return self._bounds(face, words, HIGHEST).width()
+
+    def _bounds(self, face: QFont, words: str, width: int) -> QRect:
+        return QFontMetrics(face).boundingRect(0, 0, width, HIGHEST, int(beginning(self)) | WRAPPED, words)

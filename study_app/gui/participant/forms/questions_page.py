@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QLayout, QPushButton, QVBoxLayout, QWidget
 
 from study_app.gui.participant.forms.foot import Foot
 from study_app.gui.participant.forms.question_field import MARGIN, QuestionField, question_of, target_px
@@ -113,12 +113,8 @@ class QuestionsPage(PageWidget):
         self._head.addWidget(self._progress)
         self._head.addLayout(self._head_row)
         self._head.addWidget(self._intro)
-        line = QFrame(self)
-        line.setFixedHeight(1)
-        line.setStyleSheet(f"background: {PARTICIPANT.border};")
         whole.addLayout(self._head)
         whole.addLayout(self.questions, 1)
-        whole.addWidget(line)
         whole.addWidget(self.foot)
 
     @property
@@ -165,12 +161,17 @@ class QuestionsPage(PageWidget):
         title = self._title.sizeHint().height()
         head = self._head.heightForWidth(self.width()) - self._head_row.sizeHint().height() + title
         higher = max(0, round(target_px(self.words_scale)) - title) if tabs else 0
-        return self.height() - head - higher - self.foot.height() - 1
+        return self.height() - head - higher - self.foot.height()
 
     def focus_first(self) -> None:
         """Put the keyboard on the first question without an answer."""
+        self.go_to(self._first)
+
+    @property
+    def _first(self) -> QuestionField:
+        """The first question without an answer."""
         asked = self.asked
-        self.go_to(next((field for field in asked if not field.is_answered), asked[0]))
+        return next((field for field in asked if not field.is_answered), asked[0])
 
     def submit(self) -> None:
         """Confirm the answers, go to the next part, or name what is missing and go there."""
@@ -274,7 +275,7 @@ class QuestionsPage(PageWidget):
         """Bring the foot up to date."""
         asked = self.asked
         here = self.focusWidget()
-        question = question_of(here) if here is not None else None
+        question = question_of(here) if here is not None else self._first  # where the keyboard will be
         keys = "" if question is None else question.answer_keys
         self.foot.show_state(self.message, sum(field.is_answered for field in asked), len(asked), keys)
 
