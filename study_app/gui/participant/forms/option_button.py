@@ -18,7 +18,9 @@ from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
 CENTRE = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)
 MARK = 19.0
 ROOM = 14.0  # between edge and words
+TAKEN = MARK + 6 + ROOM  # of the width, by mark and room
 NO_WORDS = "–"
+GROWS = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
 Look: TypeAlias = Literal["words", "point", "off scale"]
 """Words that can be chosen, a point of a scale, or an answer off it, with an edge of dashes."""
 
@@ -28,6 +30,13 @@ def widest_word(words: str, scale: float) -> float:
     """Return the width of the widest word of an answer [px]; the points of all rows of a page are alike."""
     metrics = QFontMetricsF(font("chosen", scale=scale))
     return max((metrics.horizontalAdvance(word) for word in words.split()), default=0.0)
+
+
+@lru_cache(maxsize=1024)
+def size_of(words: str, scale: float) -> QSize:
+    """Return a size that can be hit, as wide as the longest word [px]."""
+    least = target_px(scale)
+    return QSize(round(max(least, widest_word(words, scale) + TAKEN * scale)), round(least))
 
 
 @lru_cache(maxsize=1024)
@@ -55,12 +64,11 @@ class OptionLook(Button):
         self.setAccessibleDescription(description)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the question holds the keyboard
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
+        self.setSizePolicy(GROWS)
 
     def set_scale(self, scale: float) -> None:
         """Grow with the page."""
         self._scale = scale
-        self.setFont(font("cell", scale=scale))
         self.updateGeometry()
         self.update()
 
@@ -76,20 +84,19 @@ class OptionLook(Button):
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Return a size that can be hit, as wide as the longest word."""
-        least = target_px(self._scale)
-        return QSize(round(max(least, widest_word(self._words, self._scale) + self._taken())), round(least))
+        return size_of(self._words, self._scale)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802
         """Return the same."""
         return self.sizeHint()
 
     def hasHeightForWidth(self) -> bool:  # noqa: N802
-        """Return that words wrap."""
-        return True
+        """Return that words wrap; points are short."""
+        return self._look != "point"
 
     def heightForWidth(self, width: int) -> int:  # noqa: N802
         """Return the height [px] that the words need where they wrap."""
-        needed = height_of(self._words, self._scale, max(1.0, width - self._taken()))
+        needed = height_of(self._words, self._scale, max(1.0, width - TAKEN * self._scale))
         return round(max(target_px(self._scale), needed + 12 * self._scale))
 
     def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
@@ -155,10 +162,6 @@ class OptionLook(Button):
         painter.setFont(face)
         painter.setPen(QColor(theme.on_accent))
         painter.drawText(QRectF(x_words - 1, 0, words + 2, body.height()), CENTRE, text)
-
-    def _taken(self) -> float:
-        """Return the width [px] that mark and room take."""
-        return (MARK + 6 + ROOM) * self._scale
 
 
 class RadioOption(OptionLook, QRadioButton):

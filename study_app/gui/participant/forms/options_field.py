@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent
+from PySide6.QtWidgets import QButtonGroup
 
 from study_app.gui.participant.forms.option_button import OptionLook
 from study_app.gui.participant.forms.question_field import QuestionField
@@ -30,10 +31,12 @@ class OptionsField(QuestionField):
     def hold(self, options: Sequence[OptionLook]) -> None:
         """Take the options, in the order of their digits."""
         self.options = options
+        self._group = QButtonGroup(self)
+        self._group.setExclusive(not self.several)
+        self._group.idClicked.connect(self._click)
+        self._group.idToggled.connect(self._toggle)
         for place, option in enumerate(options):
-            option.setAutoExclusive(not self.several)
-            option.clicked.connect(lambda _=False, place=place: self._click(place))
-            option.toggled.connect(lambda on, place=place: self._toggle(place, on=on))
+            self._group.addButton(option, place)
             option.entered.connect(lambda here, place=place: self.point(place if here else -1))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
@@ -63,11 +66,9 @@ class OptionsField(QuestionField):
 
     def clear(self) -> None:
         """Show no option as chosen."""
-        for option in self.options:
-            option.setAutoExclusive(False)
+        self._group.setExclusive(False)
         self._check()
-        for option in self.options:
-            option.setAutoExclusive(not self.several)
+        self._group.setExclusive(not self.several)
 
     def set_scale(self, scale: float) -> None:
         """Grow with the page."""
@@ -118,18 +119,17 @@ class OptionsField(QuestionField):
         event.accept()
 
     def _check(self) -> None:
+        self._group.blockSignals(True)
         for place, option in enumerate(self.options):
-            option.blockSignals(True)
             option.setChecked(place in self.chosen)
-            option.blockSignals(False)
-            option.update()
+        self._group.blockSignals(False)
 
     def _click(self, place: int) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
         if not self.several:
             self.choose(place, by_key=False)
 
-    def _toggle(self, place: int, *, on: bool) -> None:
+    def _toggle(self, place: int, on: bool) -> None:
         """Hear what is checked, by a click or by a screen reader, which does it without one."""
         if on != (place in self.chosen) and (on or self.several):
             self.choose(place, by_key=False)
