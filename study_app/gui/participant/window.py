@@ -15,6 +15,7 @@ from PySide6.QtGui import (
     QKeyEvent,
     QPainter,
     QPaintEvent,
+    QRegion,
     QResizeEvent,
     QScreen,
     QWheelEvent,
@@ -286,6 +287,7 @@ class ParticipantWindow(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
         """Fill what no page covers: nothing, or the frame of a pilot."""
         painter = QPainter(self)
+        painter.setClipRegion(QRegion(self.rect()) - QRegion(self._widget.geometry()))
         painter.fillRect(self.rect(), QColor(PARTICIPANT.warn if self.frame_px else PARTICIPANT.window))
         painter.end()
 
