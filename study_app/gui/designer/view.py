@@ -374,7 +374,7 @@ class DesignerPlace(Place):
 
     def focusNextPrevChild(self, forward: bool) -> bool:  # noqa: N802 - Qt's name
         """Let Tab go through the parts as they are seen."""
-        parts = [self.header, self.banner, *self.parts.in_order]
+        parts = [self.header, self.banner, self.nothing, *self.parts.in_order]
         return go_on(parts, super().focusNextPrevChild, forward=forward)
 
     def wants_narrow_rail(self) -> bool:

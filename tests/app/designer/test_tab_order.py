@@ -125,6 +125,19 @@ def test_tab_goes_through_problems_questions_and_the_banner_which_are_made_later
     assert len(set(seen)) == len(seen)
 
 
+def test_tab_goes_to_the_drafts_to_continue_where_no_study_is_open(qtbot: Any, designer: Any) -> None:
+    designer.controller.begin("demo", "mine")
+    designer.saving.leave()
+    designer.editing.opened = None
+    designer.controller.enter()
+    place = designer.place
+    qtbot.waitUntil(lambda: [one.isVisible() for one in place.nothing.drafts] == [True])
+    place.areas.focus_header()
+    press(qtbot, KEY.Key_Tab)
+    seen = passed(qtbot, designer.window.rail.isAncestorOf)
+    assert seen[1:-1] == [*place.nothing.drafts, place.nothing.new]
+
+
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
 def test_a_ring_shows_the_tab_with_the_keyboard_and_its_surface_the_chosen_one(dutch: Any, theme: Any) -> None:
     dutch.window.show_theme(theme)

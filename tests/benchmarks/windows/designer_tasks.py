@@ -203,7 +203,7 @@ def act_continued(kind: str, folder: Path) -> None:
 
     def act(user: User) -> None:
         user.press("Study designer")
-        user.press("Continue killed with its unsaved changes")
+        user.press("Continue Killed (killed.toml) with its unsaved changes")
         wait_until(lambda: user.sees("Save"), "the study")
         save(user, folder / "protocols" / "killed.toml")
         assert "before the kill" in (folder / "protocols" / "killed.toml").read_text()

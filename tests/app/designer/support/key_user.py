@@ -22,13 +22,15 @@ from study_app.gui.participant.window import ParticipantWindow
 from tests.app.designer.support.users import User, name_of, place_of, wait_until
 
 MOST_TABS = 120
+VIEWS = "View of the study"
+"""The tabs of the views, to which their key goes when it is pressed again."""
 COLUMN_PX = 480
 
 
 class KeyUser(User):
     """Uses keys alone."""
 
-    AREAS = (("Header", "ctrl+5"), ("Outline", "ctrl+1"), ("Form", "ctrl+2"), ("Views", "ctrl+3"))
+    AREAS = (("Header", "ctrl+5"), ("Outline", "ctrl+1"), ("Form", "ctrl+2"), ("Views of the study", "ctrl+3"))
 
     def reach(self, part: QWidget) -> None:
         """Go to a part: to its area by Ctrl and a digit, then by Tab."""
@@ -38,7 +40,7 @@ class KeyUser(User):
         for name, keys in self.AREAS:
             area = next((one for one in self.window.findChildren(QWidget) if one.accessibleName() == name), None)
             if area is not None and area.isAncestorOf(part) and not (focused and area.isAncestorOf(focused)):
-                self.key(keys)
+                self.key(keys, 2 if part.accessibleName() == VIEWS else 1)
         seen: list[str] = []
         keys = self._leads(self._focused(), part)
         for _ in range(MOST_TABS):
