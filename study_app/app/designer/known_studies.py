@@ -114,7 +114,7 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
     """
     in_order = [name for name in TEMPLATES if name in templates()]
     choices = [_template_choice(name) for name in dict.fromkeys((*in_order, *templates()))]
-    files = (*workspace().protocols.glob("*.toml"), *unsaved_studies())
+    files = (*workspace().protocols.glob("*.toml"), *unsaved_files(workspace().protocols))
     taken = {*shipped(), *(file.stem for file in files)}
     copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
     for name in copied:
