@@ -20,7 +20,6 @@ from study_app.protocol.questions.question import ItemView
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
-from tests.gui.drawn import drawn_by
 from tests.gui.small import LABELS, ManualClock, questionnaire
 
 pytestmark = pytest.mark.slow
@@ -238,11 +237,6 @@ def test_a_screen_reader_hears_that_a_statement_is_optional(qtbot: Any) -> None:
 def test_page_of_nine_statements_has_few_widgets(shown: Shown) -> None:
     """Each takes time when the page comes: 63 cells, 9 rows, their words, and what is around them."""
     assert len(shown.widget.findChildren(QWidget)) <= 63 + 9 + 9 + 8
-
-
-def test_statement_is_shown_as_it_is_written(qtbot: Any) -> None:
-    shown = Shown(qtbot, questionnaire(("It is <b>not</b> thick & cold.",)), (1366, 768))
-    assert "It is <b>not</b> thick & cold." in {one.text for one in drawn_by(shown.widget)}
 
 
 def place_in(row: StatementField, part: QWidget) -> QRect:
