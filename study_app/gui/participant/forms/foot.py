@@ -6,13 +6,14 @@ import math
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRect, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetrics, QFontMetricsF, QPainter, QPaintEvent
+from PySide6.QtGui import QAccessible, QColor, QFont, QFontMetrics, QFontMetricsF, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QStyle, QWidget
 
 from study_app.gui.participant.pages.key_caps import GoButton, draw_key, key_size
 from study_app.gui.participant.pages.page_widget import beginning, page_painter
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.widgets.accessible import give_role
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words
@@ -37,6 +38,7 @@ class Foot(QWidget):
         self._row = QHBoxLayout(self)
         self._row.addStretch(1)
         self._row.addWidget(self.button)
+        give_role(self, QAccessible.Role.StaticText)
 
     def set_scale(self, scale: float, margin: int, *, tight: bool) -> None:
         """Grow with the page."""
@@ -53,7 +55,10 @@ class Foot(QWidget):
         """Say what is missing, how many are answered, and which keys answer."""
         self._message, self._answer_keys = message, keys
         self._count = self._words.answered.format(done=done, of=of)
-        self.setAccessibleName(" ".join(filter(None, (message, self._count))))
+        kept = self._words.answers_kept if message else ""
+        hints = ((MOVE_KEYS, self._words.key_move), (keys, self._words.key_answer)) if keys else ()
+        self.setAccessibleName(" ".join(filter(None, (message, kept, self._count))))
+        self.setAccessibleDescription(", ".join(f"{key} {text}" for key, text in hints))
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802

@@ -33,8 +33,9 @@ class OptionsField(QuestionField):
         self.options = options
         self._group = QButtonGroup(self)
         self._group.setExclusive(not self.several)
-        self._group.idClicked.connect(self._click)
-        self._group.idToggled.connect(self._toggle)
+        # Not the methods themselves: Qt would forget the role of this widget (`give_role`).
+        self._group.idClicked.connect(lambda place: self._click(place))  # noqa: PLW0108
+        self._group.idToggled.connect(lambda place, on: self._toggle(place, on))  # noqa: PLW0108
         for place, option in enumerate(options):
             self._group.addButton(option, place)
             option.entered.connect(lambda here, place=place: self.point(place if here else -1))

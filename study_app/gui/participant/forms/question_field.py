@@ -219,7 +219,7 @@ class QuestionField(QWidget):
         if self.is_answered:
             state = f"{words.chosen}: {self.spoken()}"
         else:
-            state = words.please_answer if self.missing else words.no_answer_yet
+            state = (self.note or words.please_answer) if self.missing else words.no_answer_yet
         if self.note and not self.missing:
             state = f"{self.note}, {state}"
         self.setAccessibleDescription(state)

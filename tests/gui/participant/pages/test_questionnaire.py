@@ -164,7 +164,10 @@ def test_continue_names_and_marks_what_is_missing_and_goes_there(shown: Shown) -
     assert [row.view.number for row in shown.rows if row.missing] == [5, 8]
     assert shown.focus is shown.rows[4]
     assert len(shown.told) == told
-    assert "Please answer" in shown.rows[4].accessibleDescription()
+    assert "Please answer · press 1 to 7" in shown.rows[4].accessibleDescription()
+    foot = shown.widget.foot
+    assert "5 and 8. Everything you have answered is kept. 7 of 9 answered" in foot.accessibleName()
+    assert foot.accessibleDescription() == "↑ ↓ move, 1–7 answer"
     shown.press(KEY.Key_4)
     assert shown.widget.message == "One statement still needs an answer: 8."
     shown.click(7, 0)
