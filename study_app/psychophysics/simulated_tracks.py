@@ -170,7 +170,8 @@ def search_tracks(
     posterior = np.tile(search.grid.prior.reshape(1, *psi.shape[1:]), (tracks, 1, 1))
     if noise is not None:
         yes = (noise < observers.guess).sum(axis=1)[:, None, None]
-        posterior *= psi[0] ** yes * (1.0 - psi[0]) ** (noise.shape[1] - yes)
+        log_likelihood = yes * np.log(psi[0]) + (noise.shape[1] - yes) * np.log1p(-psi[0])
+        posterior *= np.exp(log_likelihood - log_likelihood.max(axis=(1, 2), keepdims=True))
     for trial in range(trials):
         posterior /= posterior.sum(axis=(1, 2), keepdims=True)
         if stop is not None and trial >= stop[1]:

@@ -15,14 +15,12 @@ from types import TracebackType
 from typing import Any, Final, ParamSpec, TypeVar
 
 from study_app.errors import WorkerError
-from study_app.workers.spawning import CONTEXT, ignore_interrupts
+from study_app.workers.spawning import CONTEXT, compute_in_one_thread, ignore_interrupts
 
 ATTEMPTS: Final = 3
 """A case that was under way in so many pools that broke is not tried again."""
 AHEAD: Final = 2
 """Cases handed to the pool for each process: the one it computes, and the next."""
-_ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""A process of the pool computes linear algebra in one thread: there are as many processes as cores."""
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -207,8 +205,7 @@ def _drop(case: _Case) -> None:
 def _start_process(watched: Connection) -> None:
     """Prepare a process of the pool before it imports what computes."""
     ignore_interrupts()
-    for name in _ONE_THREAD:
-        os.environ.setdefault(name, "1")
+    compute_in_one_thread()  # there are as many processes as cores
     threading.Thread(target=_exit_at_end_of, args=(watched,), name="end of program", daemon=True).start()
 
 

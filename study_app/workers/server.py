@@ -15,7 +15,7 @@ import psutil
 
 from study_app.errors import StudyError, naming_the_extra
 from study_app.workers.messages import Refused, Stopped
-from study_app.workers.spawning import ignore_interrupts
+from study_app.workers.spawning import compute_in_one_thread, ignore_interrupts
 
 Send: TypeAlias = Callable[[Any], object]
 """Sends an answer before the last one."""
@@ -39,11 +39,12 @@ def serve(orders: Connection, answers: Connection, task: str, *, background: boo
     task : str
         The function that carries out an order (see `Task`), as "package.module:function". It is imported here.
     background : bool
-        Whether this process gets the lowest priority, before it imports the task.
+        Whether this process gets the lowest priority and computes in one thread, before it imports the task.
     """
     ignore_interrupts()
     if background:
         psutil.Process().nice(getattr(psutil, "IDLE_PRIORITY_CLASS", 19))
+        compute_in_one_thread()
     waiting: SimpleQueue[Any] = SimpleQueue()
     # Orders are read at once: a full pipe would make the client's window wait.
     threading.Thread(target=_read, args=(orders, waiting), name="orders", daemon=True).start()

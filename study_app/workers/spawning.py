@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from multiprocessing.context import SpawnContext, SpawnProcess
@@ -34,3 +35,9 @@ CONTEXT: Final = _WorkerContext()
 def ignore_interrupts() -> None:
     """Leave Ctrl+C to the program that started this process; it ends its workers itself."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def compute_in_one_thread() -> None:
+    """Let the linear algebra of this process run in one thread; numpy must not be imported yet."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
