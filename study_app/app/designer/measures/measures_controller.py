@@ -20,6 +20,7 @@ from study_app.app.designer.measures.wanted import (
     wanted_of,
 )
 from study_app.app.designer.repair_search import RepairSearch
+from study_app.authoring.drafts import draft_of
 from study_app.authoring.edited_study import Study
 from study_app.authoring.measures.kept_participants import keep_participants, kept_participants
 from study_app.authoring.measures.observers import Measurable, Observed
@@ -144,6 +145,8 @@ class MeasuresController(QObject):
 
     def _forget(self) -> None:
         opened = self._editing.opened
+        if opened is not None and not opened.file.exists() and draft_of(opened.file) is None:
+            keep_participants(opened.file, None)  # a new study, whose file may have been that of another
         kept = None if opened is None else kept_participants(opened.file)
         self._participants = None if kept is None else _permitted(kept)
         self._lapses, self._sound = LAPSES, None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, Signal
+from PySide6.QtGui import QHideEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.measures.parts import Made, part_of
@@ -57,6 +58,14 @@ class CardGrid(Themed, QWidget):
     def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
         """Let each card be as high as it needs to be."""
         super().leaveEvent(event)
+        self._let_shrink()
+
+    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 - Qt's name
+        """Let each card be as high as it needs to be: the pointer's leaving is not told of what is hidden."""
+        super().hideEvent(event)
+        self._let_shrink()
+
+    def _let_shrink(self) -> None:
         for part in self.parts:
             part.setMinimumHeight(0)
 

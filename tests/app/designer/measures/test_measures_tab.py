@@ -20,7 +20,8 @@ from study_app.app.designer.measures.measures_worker import (
     Observing,
     start_measure_worker,
 )
-from study_app.authoring.measures.kept_participants import kept_participants
+from study_app.authoring.drafts import discard, drafted_files
+from study_app.authoring.measures.kept_participants import keep_participants, kept_participants
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.gui.designer.measures.card_grid import CardGrid
@@ -136,6 +137,17 @@ def test_the_number_of_participants_is_kept_for_each_study(qtbot: Any, designer:
     simulate("20")
     shows("20", "")
     assert kept_participants(file) is None  # from now on it follows the file
+
+
+def test_a_new_study_has_no_number_of_participants_of_one_that_was_discarded(
+    qtbot: Any, designer: Any, worker: Worker
+) -> None:
+    jnd(designer)
+    keep_participants(designer.editing.opened.file, 8)
+    designer.controller.open("kitchen")
+    discard(next(file for file in drafted_files() if file.stem == "thicker"))
+    jnd(designer)
+    qtbot.waitUntil(lambda: designer.place.measures.controls.participants.field.text() == "20")
 
 
 def test_a_verdict_says_whether_the_participants_are_enough(qtbot: Any, designer: Any, worker: Worker) -> None:
