@@ -30,9 +30,11 @@ def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
     Raises
     ------
     ValueError
-        A word is not a number, or has a comma that may be decimal or separate two numbers.
+        There is no word, or one is not a number, or has a comma that may be decimal or separate two numbers.
     """
-    words = [word for part in _APART.split(text) if (word := part.removesuffix(unit))] or [""]
+    words = [word for part in _APART.split(text) if (word := part.removesuffix(unit))]
+    if not words:
+        raise ValueError("There is no number")
     commas = len(words) == 1 or any("," in apart for apart in _APART.findall(text.strip(" ,;\n")))
     found: list[tuple[str, int | float]] = []
     for word in words:

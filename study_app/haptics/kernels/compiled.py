@@ -189,6 +189,4 @@ def entry_of(function: F, *arguments: Any) -> F:
     dispatcher: Any = function
     if not hasattr(dispatcher, "overloads"):  # it is not compiled: NUMBA_DISABLE_JIT
         return function
-    types = tuple(map(dispatcher.typeof_pyval, arguments))
-    dispatcher.compile(types)
-    return cast(F, dispatcher.overloads[types].entry_point)
+    return cast(F, dispatcher.compile(tuple(map(dispatcher.typeof_pyval, arguments))))
