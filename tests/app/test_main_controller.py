@@ -184,6 +184,10 @@ def test_back_leads_from_the_help_to_the_place_where_it_was_asked_for(visit: Mai
         assert window.here == "machine"
         assert window.focusWidget() is asked_in
     qtbot.keyClick(window, Qt.Key.Key_F1)
+    visit.help.open_page("lab")
+    qtbot.keyClick(visit.help.reader, Qt.Key.Key_Escape)
+    assert window.here == "machine", "Esc leads there at once"
+    qtbot.keyClick(window, Qt.Key.Key_F1)
     window.go("home")
     window.go("help")
     assert not visit.help.back.isEnabled(), "the place was left in another way"

@@ -55,7 +55,9 @@ class HelpPlace(Place):
         self.list.currentItemChanged.connect(self._chosen)
         self.reader.page_asked.connect(self.open_page)
         self.back.clicked.connect(self.go_back)
+        self.back.setToolTip("Back (Alt+←); Esc leads to where Help was opened")
         QShortcut(QKeySequence("Alt+Left"), self, self.go_back)
+        QShortcut(QKeySequence("Esc"), self, self._go_to_origin)
         QShortcut(QKeySequence(QKeySequence.StandardKey.Find), self, self.words.setFocus)
         self._show_rows(entries())
         self.open_page(FIRST_PAGE)
@@ -114,7 +116,12 @@ class HelpPlace(Place):
             self.back.setEnabled(bool(self._before or self._came_from))
             self.reader.show_page(name)
             self._select(name)
-        elif self._came_from:
+        else:
+            self._go_to_origin()
+
+    def _go_to_origin(self) -> None:
+        """Go to the place where help was asked for."""
+        if self._came_from:
             self.go_asked.emit(self._came_from)
 
     def leave(self) -> None:
