@@ -204,5 +204,18 @@ def test_levels_beyond_the_limit_of_the_measured_delay_are_refused_with_the_high
     )
 
 
+def test_a_damper_beyond_the_limit_of_the_measured_delay_is_refused_where_the_delay_of_its_force_varies() -> None:
+    text = DAMPERS.replace("damping_nspm = 16", "damping_nspm = 30")
+    text = text.replace('vary = "damping_nspm"\nlevels = [0.02, 0.6]', 'vary = "force_delay_ms"\nlevels = [2, 50]')
+    study = parse(text.encode(), "delays.toml")
+    assert verdicts(study)["Levels"] == "ok"
+    for delay_ticks, limit_nspm in ((2, "20.6"), (3, "14.8"), (4, "11.1")):
+        facts = replace(small.WELL, delay_ticks=delay_ticks)
+        assert refused(checks(facts, study)) == (
+            f'levels: "damper" gives 30 N·s/m at the hand; the slope limit (1000 Hz, kalman, {delay_ticks} ticks) is '
+            f"{limit_nspm}: damping_nspm = {limit_nspm}"
+        )
+
+
 def test_a_study_without_levels_of_a_damper_says_nothing_of_them() -> None:
     assert "Levels" not in verdicts()

@@ -124,14 +124,18 @@ def highest_damping(protocol: Protocol, block: Block) -> float:
 
 def beyond_slope_limit(protocol: Protocol, block: Block, delay_ticks: int) -> Fault | None:
     """Return that dampings of a block exceed the slope limit for a delay [ticks]; None if none does."""
-    highest_nspm = highest_damping(protocol, block)
+    highest_nspm, stimulus = highest_damping(protocol, block), stimulus_of(protocol, block)
     for standard, level, scene in ends(protocol, block):
         limit_nspm, loop = _loop(scene, delay_ticks)
         if _damping_nspm(scene) == highest_nspm > limit_nspm:
-            every = levels(protocol, block.id)
-            beyond = [one for one in every if one.damping_nspm > limit_nspm]
-            message = f"{_named(every, beyond, _GIVES)} {highest_nspm:g} N·s/m at the hand; {loop} is {limit_nspm:g}"
-            hint = _within_limit(stimulus_of(protocol, block), standard, level, limit_nspm)
+            if stimulus.vary in OF_LINK:
+                gives = f'"{condition_of(protocol, stimulus)}" gives'
+                hint = f"damping_nspm = {floored(limit_nspm, 1):g}"
+            else:
+                every = levels(protocol, block.id)
+                gives = _named(every, [one for one in every if one.damping_nspm > limit_nspm], _GIVES)
+                hint = _within_limit(stimulus, standard, level, limit_nspm)
+            message = f"{gives} {highest_nspm:g} N·s/m at the hand; {loop} is {limit_nspm:g}"
             return Fault(("stimuli", str(block.stimulus), "levels"), message, hint)
     return None
 

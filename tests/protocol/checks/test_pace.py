@@ -44,6 +44,7 @@ REACH = (
     'instruction = "Reach."',
 )
 EWMA = ("[liquids.damper]", '[scene.velocity]\nkind = "ewma"\n[liquids.damper]')
+DELAYED = ('vary = "damping_nspm"\nstandards = [8]\nlevels = [0.02, 0.6]', 'vary = "force_delay_ms"\nlevels = [2, 50]')
 VISCOUS = (
     'drag = { law = "linear", damping_nspm = 8 }',
     'density_kg_m3 = 1260\nviscosity_pa_s = 1\ndrag = { law = "haider-levenspiel" }',
@@ -76,6 +77,12 @@ def study(edits: Iterable[tuple[str, str]]) -> Protocol:
             "standard 32 at levels 0.34 and 0.6 is up to 9.7 N at 1.2 times the paced 0.157 m/s; device.force_limit_n "
             "is 8",
             "amplitude_mm = 20.7 or frequency_hz = 0.82",
+        ),
+        (
+            [DELAYED, ("damping_nspm = 8", "damping_nspm = 60"), ("amplitude_mm = 25", "amplitude_mm = 10")],
+            "stimuli.damping.levels",
+            '"damper" gives 60 N·s/m at the hand; the slope limit (1000 Hz, kalman, 1 tick) is 53',
+            "damping_nspm = 53",
         ),
         (
             [CONDITIONS, ("damping_nspm = 8", "damping_nspm = 45")],
