@@ -33,6 +33,14 @@ class UncaughtExceptions:
         """Restore the previous hook."""
         sys.excepthook = self.previous
 
+    def __enter__(self) -> None:
+        """Install."""
+        self.install()
+
+    def __exit__(self, *_: object) -> None:
+        """Remove."""
+        self.remove()
+
     def hook(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         """Handle an exception; its signature is that of ``sys.excepthook``."""
         if not self._handle(error):

@@ -10,6 +10,7 @@ from PySide6.QtCore import QEventLoop, QObject, QTimer
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 
 from study_app.app.devices_controller import DevicesController
+from study_app.app.exception_hooks import UncaughtExceptions
 from study_app.app.lab_and_designer import LabAndDesigner
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
@@ -50,7 +51,8 @@ def home(results: Path | None = None, *, then: Callable[[MainController], None] 
     """
     application = application_here()
     controller = MainController(results)
-    with collecting_here(), ended_from_outside(controller.end_by_signal):
+    uncaught = UncaughtExceptions(controller.show_bug)
+    with collecting_here(), ended_from_outside(controller.end_by_signal), uncaught:
         controller.open()
         then(controller)
         controller.loop.exec()
@@ -93,6 +95,7 @@ class MainController(QObject):
         self.live: LiveSession | None = None
         self.help: HelpPlace | None = None
         self._called_off: list[LiveSession] = []
+        self._bugs: set[str] = set()
         self.results_controller: ResultsController | None = None
         self.lab_and_designer.go_asked.connect(self.window.go)
         self.lab_and_designer.prepared.connect(self.window.prepared)
@@ -117,6 +120,15 @@ class MainController(QObject):
             self._ask_for_workspace()
         QTimer.singleShot(LOOK_AFTER_MS, self.devices, self.devices.look)
         QTimer.singleShot(LOOK_AFTER_MS, self.lab_and_designer, self.lab_and_designer.prepare_lab)
+
+    def show_bug(self, error: BaseException) -> bool:
+        """Show an exception that no slot caught, once, unless a session shows it; return that it is printed, too."""
+        sentence = f"{type(error).__name__}: {error}"
+        if self.live is None and self.window.isVisible() and sentence not in self._bugs:
+            self._bugs.add(sentence)
+            bug = f"{sentence}. This is a bug: please report it, with what the terminal shows."
+            self.window.show_message("The last action failed", bug)
+        return False
 
     def _ask_for_workspace(self) -> None:
         """Ask once which folder holds protocols and results; until it is answered the offered one is used."""

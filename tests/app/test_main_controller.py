@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import QLabel
 
-from study_app.app.main_controller import MainController
+from study_app.app.main_controller import MainController, home
 from study_app.app.session import live_session
 from study_app.app.session.termination import BY_SIGNAL_S
 from study_app.errors import DeviceLost, DeviceNotFound
@@ -191,3 +192,32 @@ def test_back_leads_from_the_help_to_the_place_where_it_was_asked_for(visit: Mai
     window.go("home")
     window.go("help")
     assert not visit.help.back.isEnabled(), "the place was left in another way"
+
+
+def test_an_exception_that_no_slot_catches_is_shown_once_and_printed(qtbot: Any, qapp: Any, tmp_path: Path) -> None:
+    seen: list[str] = []
+
+    def fail() -> None:
+        raise NameError("name 'unsaved' is not defined")
+
+    def look(visit: MainController) -> None:
+        if visit.window.notice is not None:
+            seen.append(visit.window.notice.findChildren(QLabel)[1].text())
+            visit.window.notice.accept()
+            visit.window.notice = None
+
+    def then(visit: MainController) -> None:
+        steps = iter((fail, lambda: look(visit), fail, lambda: look(visit), visit.window.close))
+
+        def step() -> None:
+            next(steps)()
+
+        timer = QTimer(visit.window, interval=10)
+        timer.timeout.connect(step)
+        timer.start()
+
+    with qtbot.captureExceptions() as printed:
+        home(tmp_path / "results", then=then)
+    assert len(printed) == 2
+    (sentence,) = seen
+    assert sentence.startswith("NameError: name 'unsaved' is not defined. This is a bug")
