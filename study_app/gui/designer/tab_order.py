@@ -27,7 +27,8 @@ def lead_by_tab(first: QWidget, parts: Sequence[QWidget]) -> None:
 def go_on(parts: Sequence[QWidget], by_qt: Callable[[bool], bool], *, forward: bool) -> bool:
     """Let Tab go through parts one after another, then to the beginning of the window, or Shift+Tab back.
 
-    Within a part the order is Qt's, ``by_qt``, except where Qt leaves the part before all of it was gone through.
+    Within a part the order is Qt's, ``by_qt``, except where Qt leaves the part before all of it was gone through, and
+    where Qt goes to the focus proxy of an editor past what comes before it, such as the entries of a list.
     """
     window = parts[0].window()
     shown = [(part, found) for part in parts if (found := _shown(part))]
@@ -39,13 +40,26 @@ def go_on(parts: Sequence[QWidget], by_qt: Callable[[bool], bool], *, forward: b
     rest = found[found.index(here) + 1 :] if forward else found[: found.index(here)][::-1]
     if rest:
         moved = by_qt(forward)
-        if part.isAncestorOf(window.focusWidget() or window):
+        there = window.focusWidget()
+        if there is not None and part.isAncestorOf(there):
+            if forward and (first := _first(here, there)) is not there:
+                first.setFocus(Qt.FocusReason.TabFocusReason)
             return moved
     to = rest[0] if rest else _entry(shown, at, window, forward=forward)
     if to is None:
         return by_qt(forward)
     to.setFocus(Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason)
     return True
+
+
+def _first(here: QWidget, there: QWidget) -> QWidget:
+    """Return the first stop of the editor that Tab came into by its focus proxy, else where Tab went."""
+    first, around = there, there.parentWidget()
+    while around is not None and not around.isAncestorOf(here):
+        if around.focusProxy() is not None:
+            first = _shown(around)[0]
+        around = around.parentWidget()
+    return first
 
 
 def _entry(

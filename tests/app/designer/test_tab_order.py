@@ -9,6 +9,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.gui.designer.tab_order import stops
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.viewmodels.designer.requests import ChangeLanguage
 
@@ -63,6 +64,24 @@ def test_tab_goes_through_the_parts_as_they_are_seen(qtbot: Any, dutch: Any, wid
     assert seen == [*place.pane.tabs.buttons, *tab.languages.buttons, tab.screens, tab.page]
     tab.page.left.emit()
     assert rail.isAncestorOf(passed(qtbot, lambda part: not place.isAncestorOf(part))[-1])
+
+
+@pytest.mark.parametrize(
+    "path", [("blocks", "liquids"), ("questionnaires", "liquid"), ("tasks", "reach"), ("liquids", "thin"), ("study",)]
+)
+def test_tab_goes_to_each_stop_of_a_form_once(
+    qtbot: Any, dutch: Any, editors: None, path: tuple[str | int, ...]
+) -> None:
+    del editors
+    dutch.select(path)
+    form = dutch.place.form
+    assert form.rows
+    QApplication.processEvents()
+    dutch.place.areas.focus_header()
+    seen = passed(qtbot, lambda part: part is dutch.place.pane.tabs.buttons[0])
+    assert [part.accessibleName() for part in seen if form.inside.isAncestorOf(part)] == [
+        part.accessibleName() for part in stops(form.inside) if part.isVisible() and part.isEnabled()
+    ]
 
 
 def test_shift_tab_goes_from_the_page_to_the_form_and_its_head(qtbot: Any, dutch: Any) -> None:
