@@ -210,7 +210,7 @@ def test_an_exception_that_no_slot_catches_is_shown_once_and_printed(qtbot: Any,
         steps = iter((fail, lambda: look(visit), fail, lambda: look(visit), visit.window.close))
 
         def step() -> None:
-            next(steps)()
+            next(steps, timer.stop)()
 
         timer = QTimer(visit.window, interval=10)
         timer.timeout.connect(step)
