@@ -34,7 +34,7 @@ def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
     """
     words = [word for part in _APART.split(text) if (word := part.removesuffix(unit))]
     if not words:
-        raise ValueError("There is no number")
+        raise ValueError("Enter at least one number")
     commas = len(words) == 1 or any("," in apart for apart in _APART.findall(text.strip(" ,;\n")))
     found: list[tuple[str, int | float]] = []
     for word in words:

@@ -54,7 +54,7 @@ def test_a_comma_between_digits_that_may_separate_them_is_refused(text: str) -> 
         typed_numbers(text)
 
 
-@pytest.mark.parametrize(("text", "why"), [("", "no number"), (" , ", "no number"), ("4 thick", "“thick” is not")])
+@pytest.mark.parametrize(("text", "why"), [("", "one number"), (" , ", "one number"), ("4 thick", "“thick” is not")])
 def test_a_list_without_a_number_is_refused(text: str, why: str) -> None:
     with pytest.raises(ValueError, match=why):
         typed_numbers(text)

@@ -28,7 +28,7 @@ class SeriesPrompts(QObject):
         self.editing.select(path)
         prompt = series_prompt(opened.study, path)
         if prompt is None or opened.read_only:
-            why = opened.read_only or "This element has no number field."
+            why = opened.read_only or "This element has no numeric field."
             self.place.message.emit("There can be no series of this element", why)
             return
         card = SeriesCard(prompt)

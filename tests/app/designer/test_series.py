@@ -137,7 +137,7 @@ def test_a_series_is_found_in_the_list_of_what_can_be_added(
 @pytest.mark.parametrize(
     ("name", "selected", "why"),
     [
-        ("kitchen", ("study",), "This element has no number field."),
+        ("kitchen", ("study",), "This element has no numeric field."),
         ("rek2024", ("conditions", "water"), "This study ships with the program. Make a copy to change it."),
     ],
 )
