@@ -160,7 +160,8 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
         force = force_n(delay_s)
         return float(force @ force - np.sum((force @ orthogonal) ** 2)) / len(force)
 
-    nearest_s = min(np.arange(0.0, MOST_DELAY_S, _NEAR * _STEP_S), key=residual_n2)  # no force varies within 1 ms
+    # Forces are smoothed over 4 ms (SIGMA_S), so the residual has one minimum within 1 ms of the coarse one.
+    nearest_s = min(np.arange(0.0, MOST_DELAY_S, _NEAR * _STEP_S), key=residual_n2)
     around_s = nearest_s + np.arange(1 - _NEAR, _NEAR) * _STEP_S
     delay_s = float(min(around_s[around_s >= 0.0], key=residual_n2))
     mass_kg, damping_nspm, friction_n, *_ = np.linalg.solve(triangle, force_n(delay_s) @ orthogonal)
