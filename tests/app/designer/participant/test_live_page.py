@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QImage
+from PySide6.QtGui import QCursor, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -277,6 +277,7 @@ def test_at_100_percent_the_page_is_that_of_a_session_pixel_by_pixel(
     size = live.page_size
     live.setFixedSize(size)
     QApplication.processEvents()
+    QCursor.setPos(0, 0)  # where an earlier test left it, it may be over an answer of the session's page
     session = ParticipantWindow(words("en"), clock=lambda: 0.0, windowed=True)
     session.resize(size)
     session.show()
