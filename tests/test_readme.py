@@ -47,6 +47,7 @@ def named_files(section: str) -> set[str]:
     return paths
 
 
+@pytest.mark.nightly
 @needs_servo
 def test_the_tree_names_every_file_of_a_study_and_no_other(section: str, tmp_path: Path) -> None:
     folder = rehearse("rek2024", participants=1, seed=1, results=tmp_path / "rek2024")

@@ -91,6 +91,7 @@ def test_its_answers_and_forces_are_those_of_a_rehearsal_today(rehearsal_of: Cal
             assert kept == pytest.approx(made, rel=1e-3), MAKE_AGAIN
 
 
+@pytest.mark.nightly
 def test_it_is_exported_and_drawn_by_code_and_not_touched(tmp_path: Path) -> None:
     before = files(SAMPLE.path)
     tables = export(SAMPLE.path, tmp_path / "tables")
@@ -105,6 +106,7 @@ def test_it_is_exported_and_drawn_by_code_and_not_touched(tmp_path: Path) -> Non
     assert all((study.aggregate(block)["n"] == 12).all() for block in study.blocks)
 
 
+@pytest.mark.nightly
 def test_a_copy_can_be_excluded_from_and_unblinded(copy: Path, tmp_path: Path) -> None:
     exclude(copy, "P003", 1, by="AB", reason="fell asleep")
     exclude(copy, "P004", 1, trial=2, by="AB", reason="the phone rang")

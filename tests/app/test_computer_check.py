@@ -15,6 +15,7 @@ from tests.compiled import needs_servo
 pytestmark = [pytest.mark.slow, needs_servo]
 
 
+@pytest.mark.nightly
 def test_the_machines_place_opens_it_and_it_measures_this_computer(visit: MainController, qtbot: Any) -> None:
     visit.window.go("machine")
     assert visit.machine.place is not None

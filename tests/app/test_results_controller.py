@@ -194,6 +194,7 @@ def test_tables_are_written_and_their_folder_opened(shown: Opened, tmp_path: Pat
     assert shown.place.writing is None
 
 
+@pytest.mark.nightly
 def test_what_cannot_be_written_is_said_in_the_dialog(shown: Opened, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("x")
     shown.click(shown.place.report)
@@ -367,6 +368,7 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
     qtbot.waitUntil(nobody_left, timeout=SOON_MS)
 
 
+@pytest.mark.nightly
 def test_a_process_that_ends_by_itself_is_told_and_begun_again(qtbot: QtBot, results: Path) -> None:
     opened = Opened(qtbot, results, start_analysis_worker)
     reader: Any = opened.controller.reader

@@ -152,6 +152,7 @@ class TestDeviceOfAnotherPackage:
         with open_device("toy-hand", options={"toy-mass": "250"}) as device:
             assert device.describe()["mass_kg"] == 0.25
 
+    @pytest.mark.nightly
     @needs_servo
     def test_runs_a_session_whose_results_and_report_are_written(self, tmp_path):
         study = tmp_path / "demo-toy-hand"

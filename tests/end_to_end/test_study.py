@@ -129,6 +129,7 @@ def test_answers_follow_what_was_seen(rehearsal_of: Callable[[str], Path]) -> No
         assert different[of["delay_200"]] > different[of["delay_0"]]
 
 
+@pytest.mark.nightly
 def test_a_rehearsed_study_can_be_exported_and_plotted(rehearsal_of: Callable[[str], Path], tmp_path: Path) -> None:
     folder = rehearsal_of("rek2024")
     written = [*export(folder, tmp_path / "tables"), *plot(folder, tmp_path / "figures")]
@@ -140,6 +141,7 @@ def test_the_thesis_study_leaves_62_responses() -> None:
     assert orders_of(load("rek2024")).answers == 62
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("rehearsed", besides("physical2", "slime"), indirect=True)
 def test_the_same_call_into_another_folder_gives_the_same_tables_but_for_wall_clock_times(
     rehearsed: tuple[str, StudyFolder], tmp_path: Path
@@ -245,6 +247,7 @@ rehearse("rek2024", participants=1, seed=1, results=sys.argv[1])
 """
 
 
+@pytest.mark.nightly
 def test_a_kill_during_part_2_leaves_every_earlier_answer_readable(tmp_path: Path) -> None:
     """What was told as kept before the kill is in the journal, in the table where its page was confirmed."""
     child = subprocess.Popen(

@@ -92,6 +92,7 @@ def run(environment: dict[str, str], *words: str, code: int = 0) -> subprocess.C
     return done
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @needs_servo
 def test_a_study_is_rehearsed_verified_and_replayed_without_them(environment: dict[str, str], tmp_path: Path) -> None:
@@ -119,6 +120,7 @@ def test_a_session_opens_its_windows_without_them(environment: dict[str, str], t
     assert (tmp_path / "results" / "data" / "sub-P001" / "ses-01" / "journal.jsonl").is_file()
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @needs_servo
 def test_every_place_opens_without_them_and_results_says_what_to_install(

@@ -12,6 +12,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="measure
 STROKES = MotionBox(speed_mps=0.6, acceleration_mps2=6)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", PRESETS)
 def test_non_newtonian_liquids_are_compared_with_their_law_added_mass_and_buoyancy(name):
     whole = tank(name, scale=3.0, effects=("non_newtonian", "added_mass", "buoyancy"), motion=STROKES)

@@ -214,6 +214,7 @@ def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: P
     assert words.in_text(f"{lines[-1]['n']} {max(numbers - {18.0})!r}")
 
 
+@pytest.mark.nightly
 def test_settings_without_a_servo_follow_too(protocol: Path, tmp_path: Path) -> None:
     study = rehearse_answers(protocol, participants=1, seed=2, results=tmp_path / "study")
     found = reproduced(session_of(study))

@@ -30,7 +30,7 @@ from study_app.user_folder import data_folder, settings_file
 from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting
 
 SEED = int(os.environ.get("LIQUID_STUDY_DAMAGE_SEED", "5"))
-CASES = 4 * int(os.environ.get("LIQUID_STUDY_DAMAGE_CASES", "12"))
+CASES = 4 * int(os.environ.get("LIQUID_STUDY_DAMAGE_CASES", "5"))
 AT = "2026-03-02T09:30:00.000+01:00"
 HASH = "0123456789abcdef" * 4
 LINE = json.dumps({"at": AT, "by": "AB", "reason": "x", "exclusion": asdict(Exclusion("P1", 1, None, "CD", "y", AT))})

@@ -56,12 +56,14 @@ def held_with_a_freeze(folder: Path, how: str) -> tuple[dict[str, str], dict[str
     return frozen, again
 
 
+@pytest.mark.nightly
 def test_a_process_that_is_stopped_in_a_trial_has_it_interrupted_and_presents_it_again(tmp_path: Path) -> None:
     frozen, _ = held_with_a_freeze(tmp_path, "felt")
     assert float(frozen["worst_gap_ms"]) > 1000 * FROZEN_S
     assert frozen["valid"] == "false"
 
 
+@pytest.mark.nightly
 def test_a_process_that_is_stopped_right_after_the_first_frame_has_the_trial_interrupted(tmp_path: Path) -> None:
     held_with_a_freeze(tmp_path, "frame")
 

@@ -59,7 +59,8 @@ def last_attempts(study: Path) -> list[tuple[str, ...]]:
     ("resume", "count"),
     [
         pytest.param("trial", 35, marks=pytest.mark.nightly),
-        ("block", 15),
+        ("block", 6),
+        pytest.param("block", 15, marks=pytest.mark.nightly),
         pytest.param("trial", 2000, marks=[pytest.mark.nightly, pytest.mark.timeout(4 * 3600)]),
     ],
 )

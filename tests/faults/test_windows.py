@@ -60,6 +60,7 @@ def in_tank(participant: ParticipantWindow) -> bool:
     return isinstance(participant.page, TaskPage)
 
 
+@pytest.mark.nightly
 def test_the_participants_window_that_is_closed_is_a_pause(tmp_path: Path, machines: list[Rig]) -> None:
     done: list[str] = []
 
@@ -79,6 +80,7 @@ def test_the_participants_window_that_is_closed_is_a_pause(tmp_path: Path, machi
     assert lines[-1]["status"] == "completed"
 
 
+@pytest.mark.nightly
 def test_escape_again_and_again_loses_nothing(tmp_path: Path) -> None:
     pressed: list[int] = []
 

@@ -19,6 +19,7 @@ HALF_AN_HOUR = 0.5
 pytestmark = [pytest.mark.slow, needs_servo]
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("qapp")
 def test_half_an_hour_under_load_drops_nothing_drifts_by_nothing_and_takes_no_memory() -> None:
     windows = lend("gui")

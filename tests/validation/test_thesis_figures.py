@@ -172,6 +172,7 @@ def test_the_force_is_drawn_per_axis_over_time():
     assert len({line.get_color() for line in lines.values()}) == 3
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_same_bytes_every_time_in_three_formats_with_the_caption_as_text(monkeypatch, tmp_path):
     monkeypatch.setattr(thesis_figures, "FIGURES", [figure_3, thesis_motions.figure_8])

@@ -48,6 +48,7 @@ def camera(*options: str) -> Iterator[Camera]:
         yield one
 
 
+@pytest.mark.nightly
 def test_a_camera_shows_the_frame_that_was_ready_at_a_moment_and_its_age() -> None:
     with camera("--seconds", "4", "--age-ms", "80") as one:
         time.sleep(1.0)
@@ -67,6 +68,7 @@ def test_the_age_of_frames_is_unknown_where_time_stamps_are_on_no_clock() -> Non
         assert one.newest.age_ns is None
 
 
+@pytest.mark.nightly
 @pytest.mark.flaky(reruns=4)  # on a busy machine the sender itself may be late by a frame, and stamps say so
 def test_frames_that_were_lost_on_the_way_have_numbers() -> None:
     with camera("--seconds", "4", "--lose", "5") as one:
@@ -79,6 +81,7 @@ def test_frames_that_were_lost_on_the_way_have_numbers() -> None:
     assert [b - a for a, b in pairwise(shown)] == [later.number - earlier.number for earlier, later in pairwise(held)]
 
 
+@pytest.mark.nightly
 def test_a_camera_that_stops_is_said_in_one_line_that_does_not_name_it() -> None:
     with camera("--seconds", "2") as one:
         one.thread.join(10)
@@ -87,6 +90,7 @@ def test_a_camera_that_stops_is_said_in_one_line_that_does_not_name_it() -> None
         assert one.source not in str(refused.value)  # the operator and the journal's readers are blind
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="this system cannot stop a process")
 def test_a_camera_that_sends_nothing_without_closing_is_said_in_words() -> None:
     with sending("--seconds", "20") as (one, process):

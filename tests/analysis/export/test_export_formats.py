@@ -251,6 +251,7 @@ def test_nothing_hidden_is_in_any_format_while_the_key_is_sealed(small: Results,
             assert word.encode() not in content, path.name
 
 
+@pytest.mark.nightly
 def test_the_same_results_give_the_same_tables_again(small: Results, to: Path, tmp_path: Path) -> None:
     half_answered(small)
     first, again = (export(small.folder, folder, extras=ALL) for folder in (to, tmp_path / "again"))
@@ -266,6 +267,7 @@ def test_a_study_without_anybody_who_counts_is_exported_too(small: Results, to: 
     assert len(sav(table(to, "small", "wide", "sav"))[0]) == 0
 
 
+@pytest.mark.nightly
 def test_the_command_takes_every_format(small: Results, to: Path) -> None:
     half_answered(small)
     asked = ["export", str(small.folder), "--to", str(to), "--wide", "--parquet", "--sav", "--psych-ds"]

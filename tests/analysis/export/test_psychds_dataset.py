@@ -59,6 +59,7 @@ def without_report(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("study_app.analysis.report.write_report.asks", lambda _study: False)
 
 
+@pytest.mark.nightly
 def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path, tmp_path: Path) -> None:
     stand_in, to = tmp_path / "validator", tmp_path / "out"
     stand_in.write_text('#!/bin/sh\ntest -f "$1/dataset_description.json" && exit $(cat "$0.code")\n')
@@ -141,6 +142,7 @@ def test_footage_that_changes_while_it_is_copied_leaves_nothing(tmp_path: Path) 
     assert (to / "materials" / "waves.mp4").read_bytes() == FOOTAGE
 
 
+@pytest.mark.nightly
 def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path, tmp_path: Path) -> None:
     (tmp_path / "protocols" / "gone.toml").symlink_to(tmp_path / "nowhere.toml")  # another study, not there any more
     export(kitchen, tmp_path / "out", extras=["psych-ds"])

@@ -17,6 +17,7 @@ from tests.analysis.figures.drawn import by_person, gids, panel, segments, words
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.nightly
 def test_plot_writes_both_figures_in_three_forms_with_captions(rek: Results, tmp_path: Path) -> None:
     twelve(rek, people=3)
     written = plotting.plot(rek.folder, tmp_path / "new" / "out")
@@ -131,6 +132,7 @@ def test_the_same_results_give_the_same_bytes_in_another_process_too(rek: Result
     assert {path.name: path.read_bytes() for path in (tmp_path / "second").iterdir()} == first
 
 
+@pytest.mark.nightly
 def test_plotting_logs_nothing(rek: Results, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     by_person(rek, [4])
     with caplog.at_level(logging.WARNING):

@@ -48,6 +48,7 @@ def rehearsed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("toy")
 def test_a_finding_that_is_one_file_stands_in_every_output(rehearsed: Path, tmp_path: Path) -> None:
     report(rehearsed, tmp_path, failed=pytest.fail)
@@ -73,6 +74,7 @@ def test_a_finding_that_is_one_file_stands_in_every_output(rehearsed: Path, tmp_
     assert '# highest answers of "liquids"' in (tmp_path / "report.R").read_text("utf-8")
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("toy")
 def test_the_window_of_results_shows_its_figure(rehearsed: Path) -> None:
     told: list[object] = []

@@ -97,6 +97,7 @@ def test_figures_mark_catch_trials_by_crosses(study: Study, staircase: LevelsFou
     assert _crosses(levels_drawn) == len({(one.participant, one.standard) for one in staircase.own_thresholds})
 
 
+@pytest.mark.nightly
 def test_a_block_of_one_standard_has_a_band_around_each_function(
     study: Study, staircase: LevelsFound, opened: pd.DataFrame
 ) -> None:

@@ -137,6 +137,7 @@ def test_the_export_has_the_exponents_of_the_report(thickness: Path, tmp_path: P
     assert not [path for path in files if "settings" in path.name]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.usefixtures("figures_of_the_page")
 def test_r_computes_the_same_exponents(thickness: Path, tmp_path: Path) -> None:

@@ -75,6 +75,7 @@ def test_r_finds_a_criterion_that_was_changed(reported_adaptive: Path, tmp_path:
     assert "numbers that differ: 1" in done.stdout
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("design", ["2ifc", "3ifc", "4ifc", "abx", "oddity", "samedifferent", "yesno"])
 @pytest.mark.parametrize("settings", [ONE, ROVING])
 def test_r_computes_d_prime_of_every_design(design: str, settings: tuple, tmp_path: Path) -> None:  # type: ignore[type-arg]

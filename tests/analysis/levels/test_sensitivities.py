@@ -72,6 +72,7 @@ def test_yes_no_takes_false_alarms_from_the_noise_trials() -> None:
     assert one.criterion == pytest.approx(-0.294, abs=1e-3)
 
 
+@pytest.mark.nightly
 def test_same_different_is_differencing_where_standards_rove_and_independent_otherwise() -> None:
     d_prime, k = 1.8, 1.4
     high, low = different_rate(d_prime, k), different_rate(0, k)
@@ -102,6 +103,7 @@ def test_designs_without_a_criterion_have_d_prime_from_the_share_correct(design:
     assert sum(one.shares.values()) == pytest.approx(1)
 
 
+@pytest.mark.nightly
 def test_conditions_have_a_sensitivity_each_and_the_group_has_students_interval() -> None:
     shares = {"P001": 0.6, "P002": 0.75, "P003": 0.9}
     frames = [

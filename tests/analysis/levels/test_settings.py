@@ -193,6 +193,7 @@ def read(folder: Path, name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @needs_servo
 def test_export_has_a_table_of_settings_and_the_level_of_each_track(study: Path, tmp_path: Path) -> None:

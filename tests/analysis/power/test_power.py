@@ -90,6 +90,7 @@ def curves(found: Powers, question: str, item: str | None = None) -> dict[str | 
     return {one.setting: one for one in found.curves if (one.question, one.item) == (question, item)}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("workers", [1, 2])
 def test_the_counts_do_not_depend_on_the_executor(counted: tuple[int, Counts], workers: int) -> None:
     with open_executor(Workers(workers)) as executor:
@@ -240,6 +241,7 @@ def test_the_interval_is_wilsons() -> None:
     assert interval(0.0, 20) == (0.0, pytest.approx(0.1611, abs=1e-4))
 
 
+@pytest.mark.nightly
 def test_tables_and_figures_are_written_and_say_simulated(found: Powers, tmp_path: Path) -> None:
     written = write(found, tmp_path / "power")
     assert {path.name for path in written} == {
@@ -309,6 +311,7 @@ def test_sizes_that_make_no_sense_are_refused(sizes: str) -> None:
     assert result.exit_code == 2
 
 
+@pytest.mark.nightly
 def test_the_command_ended_by_the_user_writes_what_it_has(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, counted: tuple[int, Counts]
 ) -> None:

@@ -100,6 +100,7 @@ def study(monkeypatch: pytest.MonkeyPatch) -> Protocol:
     )
 
 
+@pytest.mark.nightly
 def test_question_of_a_new_kind_runs_a_session_and_a_report(
     study: Protocol, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

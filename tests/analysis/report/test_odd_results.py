@@ -20,6 +20,7 @@ from tests.analysis.report.read_report import numbers, read, rows, run_in_r
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("figures_of_the_page")]
 
 
+@pytest.mark.nightly
 def test_of_five_it_says_what_cannot_be_shown_and_what_a_delay_can_mean(rek: Results, tmp_path: Path) -> None:
     twelve(rek, people=5).open()
     report(rek.folder, tmp_path / "report")
@@ -33,6 +34,7 @@ def test_of_five_it_says_what_cannot_be_shown_and_what_a_delay_can_mean(rek: Res
     assert "nothing was asked about delays between them" in told
 
 
+@pytest.mark.nightly
 def test_one_participant_all_equal_and_missing_answers_give_a_report_that_says_so(rek: Results, tmp_path: Path) -> None:
     rek.add("P001", lambda _condition, _item: 4)
     rek.open()
@@ -149,6 +151,7 @@ def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(
     assert not (tmp_path / "report").exists()
 
 
+@pytest.mark.nightly
 def test_missing_answers_are_counted_where_they_are_and_what_is_one_way_is_said_so(
     rek: Results, tmp_path: Path
 ) -> None:

@@ -112,6 +112,7 @@ def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_pa
         assert not [word for word in HIDDEN if word in content], path.name
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("figures_of_the_page")
 def test_the_exclusions_and_what_was_not_completed_are_listed(rek: Results, tmp_path: Path) -> None:
     twelve(rek, people=6)

@@ -80,6 +80,7 @@ def test_what_progress_raises_is_no_failure(opened: Results) -> None:
         evaluate(load_study(opened.folder), progress=stop)
 
 
+@pytest.mark.nightly
 def test_a_report_with_failures_is_written_and_ends_with_three(
     opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -107,6 +108,7 @@ def test_a_report_with_failures_is_written_and_ends_with_three(
     assert not {"report.R", "motion.csv", "liquids.png"} & names
 
 
+@pytest.mark.nightly
 def test_an_export_to_share_says_which_sections_of_its_report_failed(
     opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -158,6 +158,7 @@ def test_exported_tables_have_the_site(opened: Path, tmp_path: Path) -> None:
     plot(opened, tmp_path / "plots")
 
 
+@pytest.mark.nightly
 def test_the_report_compares_sites_and_r_agrees(opened: Path, tmp_path: Path) -> None:
     report(opened, tmp_path, failed=pytest.fail)
     page = read(tmp_path)
@@ -241,6 +242,7 @@ def test_two_settings_are_compared_by_their_differences() -> None:
     assert first.verdict == "suggested"
 
 
+@pytest.mark.nightly
 def test_the_mixed_model_has_the_site_as_a_factor() -> None:
     from study_app.analysis.findings.other_assumptions import FINDING as OTHERS
 
@@ -284,6 +286,7 @@ def test_thresholds_are_compared_between_sites_at_each_standard() -> None:
     assert list(site_thresholds(study(delays([0]), []), [found], 1)) == []
 
 
+@pytest.mark.nightly
 def test_a_merged_study_of_levels_is_reported_sealed_and_opened(tmp_path: Path) -> None:
     (tmp_path / "adaptive.toml").write_text(text_of_damper("adaptive", ADAPTIVE, (4, 8)))
     folders = {

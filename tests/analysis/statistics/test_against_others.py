@@ -105,6 +105,7 @@ def test_scipy_page_is_our_untied_p() -> None:
     assert ours.p < theirs.pvalue  # ties as they are, not the larger p of ranks that all differ
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore")
 def test_psignifit() -> None:
     psignifit = vendor("psignifit")

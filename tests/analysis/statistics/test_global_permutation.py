@@ -22,6 +22,7 @@ def test_one_statement_is_friedmans_test() -> None:
     assert both[0].effect == pytest.approx(both[1].effect)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_exact_p_is_that_of_relabelling_whole_participants() -> None:
     values = made_up(3, 4, 3)

@@ -50,6 +50,7 @@ def test_the_smallest_p_of_so_many_pairs(n: int, smallest: float) -> None:
     assert ("cannot reach p ≤ 0.05" in result.note) == (n < 6)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @given(pairs=levels)
 @settings(max_examples=25, deadline=None)

@@ -73,6 +73,7 @@ def test_a_circle_has_the_length_of_its_circumference() -> None:
     assert path_length_m(np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)) == pytest.approx(2 * np.pi, 1e-5)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @needs_servo
 def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_told(tmp_path: Path) -> None:

@@ -50,6 +50,7 @@ def test_more_lapses_lower_the_function_and_raise_the_error() -> None:
     assert many.error > few.error
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_thresholds_beyond_the_levels_are_not_measurable_and_none_below_the_error_of_a_trial() -> None:
     found = measurable(plan_of(60), 0.02, least=0.1)

@@ -79,7 +79,9 @@ def test_a_link_slower_than_any_stable_loop_gives_no_positions_until_it_recovers
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [1, 2, 3])
+@pytest.mark.parametrize(
+    "delay", [pytest.param(1, marks=pytest.mark.nightly), 2, pytest.param(3, marks=pytest.mark.nightly)]
+)
 @pytest.mark.parametrize(("lost", "twice"), [(0.02, 0.0), (0.1, 0.0), (0.0, 0.05), (0.03, 0.03)])
 def test_lost_and_doubled_replies_are_told_from_late_ones(delay, lost, twice):
     link = Link(lost, twice)

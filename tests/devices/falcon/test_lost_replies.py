@@ -134,6 +134,7 @@ class TestLostAndLate:
         assert 5 < withheld.count("x") < 60
         assert max(map(len, withheld.split())) <= 2
 
+    @pytest.mark.nightly
     @pytest.mark.slow
     @settings(max_examples=60)
     @given(

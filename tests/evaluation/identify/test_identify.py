@@ -33,6 +33,7 @@ from tests.haptics.scenes import COMPILED
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")]
 
 
+@pytest.mark.nightly
 def test_known_parameters_of_a_wake_are_found_again_in_noise():
     names = ["drag_coefficient", "length", "scaling"]
     start = override_all(TANK, {"drag_coefficient": 0.8, "length": 40, "scaling": 2000})
@@ -83,6 +84,7 @@ def test_a_viscosity_an_order_away_and_an_added_mass():
     assert found.distinguishable
 
 
+@pytest.mark.nightly
 def test_a_local_wake_whose_force_has_plateaus_over_its_length():
     """A search that does not look about after its first descent ends on one of them, at 627."""
     local_wake = LocalWake(length=650, scaling=700)

@@ -200,6 +200,7 @@ def copy_of_package(to: Path) -> Path:
     return to / "study_app"
 
 
+@pytest.mark.nightly
 @about_compiled_code
 def test_a_package_that_moved_finds_what_it_compiled(tmp_path: Path) -> None:
     own = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
@@ -209,6 +210,7 @@ def test_a_package_that_moved_finds_what_it_compiled(tmp_path: Path) -> None:
     assert started(second, own) == (made, 1)
 
 
+@pytest.mark.nightly
 @about_compiled_code
 def test_a_cache_that_came_with_the_program_is_begun_with_unless_it_is_for_another_processor(tmp_path: Path) -> None:
     package = copy_of_package(tmp_path / "a")

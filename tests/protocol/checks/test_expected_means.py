@@ -112,6 +112,7 @@ def test_the_spread_of_an_exponent_is_that_of_a_least_squares_slope() -> None:
     assert expected_mean(plan.with_trials(144)).spread == pytest.approx(exact / 2, rel=0.06)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_spread_is_that_of_exponents_from_simulated_answers() -> None:
     protocol = load("thickness")

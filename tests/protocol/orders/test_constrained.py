@@ -196,6 +196,7 @@ def test_the_chain_ends_close_to_all_orders_being_equally_likely(codes: int, rep
     assert sum(abs(chance - 1 / len(now)) for chance in now) / 2 < 1e-4
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("codes", "repetitions", "constraint", "bound"),

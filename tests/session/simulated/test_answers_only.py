@@ -82,6 +82,7 @@ def test_everybody_answers_every_statement_and_nothing_is_said_to_have_been_meas
     assert set(study.trials["outcome"]) == {"complete"}
 
 
+@pytest.mark.nightly
 def test_export_plot_unblind_and_reproduce_take_it(twelve: Path, tmp_path: Path) -> None:
     for session in StudyFolder(twelve).sessions():
         assert reproduced(session.path).differences == []

@@ -166,6 +166,7 @@ def test_on_a_disk_that_fills_a_table_keeps_its_rows(
         assert path.read_bytes() == dict(table_files(store.place, store.lines, None))[path]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_page_takes_as_long_after_5000_pages_as_at_the_beginning(start: Start, summary: dict[str, Any]) -> None:
     took_s = np.empty(PAGES)

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.slow
 FINISHED = "data/sub-P007/ses-01"
 UNFINISHED = "data/sub-P008/ses-01"
 SEED = int(os.environ.get("LIQUID_STUDY_DAMAGE_SEED", "5"))
-CASES = int(os.environ.get("LIQUID_STUDY_DAMAGE_CASES", "12"))  # of a file, for each kind of damage
+CASES = int(os.environ.get("LIQUID_STUDY_DAMAGE_CASES", "5"))  # of a file, for each kind of damage
 FILES = (
     f"{FINISHED}/journal.jsonl",
     f"{UNFINISHED}/journal.jsonl",

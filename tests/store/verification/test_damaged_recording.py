@@ -19,7 +19,7 @@ from study_app.store.verification.verify_study import verify
 pytestmark = pytest.mark.slow
 
 SEED = int(os.environ.get("LIQUID_STUDY_DAMAGE_SEED", "5"))
-CASES = int(os.environ.get("LIQUID_STUDY_DAMAGE_CASES", "12"))
+CASES = int(os.environ.get("LIQUID_STUDY_DAMAGE_CASES", "5"))
 TOLD = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
 
 

@@ -103,6 +103,7 @@ def test_an_empty_name_to_write_to_is_refused(command: str) -> None:
     assert "is empty: name a file or folder" in done.output
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="has no such device")
 @pytest.mark.parametrize(

@@ -107,6 +107,7 @@ def test_a_rehearsal_with_recordings_beside_it_is_never_called_unsound(tmp_path:
     assert verify(tmp_path / "study").sound
 
 
+@pytest.mark.nightly
 @needs_fork
 def test_answers_that_are_written_beside_it_are_never_called_unsound(tmp_path: Path) -> None:
     looks, _, errors = look_beside(tmp_path / "study", (answer_only, ()))

@@ -93,6 +93,7 @@ def contents(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and path.name not in left_out}
 
 
+@pytest.mark.nightly
 def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, results: Path) -> None:
     own = personal(study)
     assert len(own) > 30
@@ -177,6 +178,7 @@ def test_another_persons_session_of_that_id_is_left(study: Path, tmp_path: Path)
     assert (other / "data" / f"sub-{PERSON}").is_dir()
 
 
+@pytest.mark.nightly
 def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, results: Path, tmp_path: Path) -> None:
     shared = tmp_path / "disk" / "shared"
     export(study, tmp_path / "out", extras=["psych-ds"])

@@ -258,6 +258,7 @@ def test_a_model_of_what_was_solved_without_convection_has_no_error(stored):
     assert judged.push == pytest.approx(1, abs=0.1)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @COMPILED
 def test_tables_and_figure_tell_what_was_found(stored, fits):
@@ -313,6 +314,7 @@ def without_solver(monkeypatch):
     monkeypatch.setattr(solver, "steady_table", stand_ins.steady)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_solver")
 def test_tables_are_the_same_bytes_with_one_worker_two_and_a_cluster(tmp_path, all_workers):
@@ -325,6 +327,7 @@ def test_tables_are_the_same_bytes_with_one_worker_two_and_a_cluster(tmp_path, a
     assert all(one == held[0] for one in held)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_solver")
 def test_an_interrupted_solution_keeps_its_tables_and_continues(tmp_path, capsys):

@@ -53,6 +53,7 @@ def test_a_value_that_jumps_is_found_out(monkeypatch: Any) -> None:
     assert f"unstable: planted=1 {HELD}" in report([found])
 
 
+@pytest.mark.nightly
 def test_the_command_prints_what_it_found() -> None:
     result = CliRunner().invoke(commands, ["stability", "--estimation", "3", "--workers", "1"])
     assert result.exit_code == 0, result.output

@@ -45,6 +45,7 @@ def test_the_servo_is_compared_with_and_without_streams() -> None:
     assert not [one for one in threading.enumerate() if one.name.startswith("outlet")]
 
 
+@pytest.mark.nightly
 @needs_servo
 @slow
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no virtual ports")

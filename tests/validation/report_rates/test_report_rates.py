@@ -97,6 +97,7 @@ def test_settings_that_are_alike_are_answered_alike_on_average(
             assert np.ptp(means, axis=0).max() > 1
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("participants", [5, 15])
 def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, participants: int) -> None:

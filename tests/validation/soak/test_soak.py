@@ -76,6 +76,7 @@ def test_liquids_without_a_wake_are_soaked_too():
     assert found.drift.comparisons == 0
 
 
+@pytest.mark.nightly
 def test_two_real_seconds_tick_in_a_thread_of_their_own(scenes):
     found = soak(scenes, 2 / 3600, virtual=False)
     assert found.findings == ()
@@ -311,6 +312,7 @@ def test_an_unknown_protocol_is_told_before_anything_runs(run_soak):
     assert 'did you mean "rek2024"' in complaint
 
 
+@pytest.mark.nightly
 @pytest.mark.timeout(900)  # a new process, perhaps with everything to compile, on a busy machine
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_ctrl_c_ends_with_the_report_so_far(tmp_path):

@@ -58,6 +58,7 @@ def test_the_line_of_a_case_reproduces_it_and_other_cases_keep_theirs() -> None:
     assert not any(name in str(Case()) for name in OF_DEVICE)
 
 
+@pytest.mark.nightly
 def test_the_group_has_each_lag_and_filter() -> None:
     (cases,) = (group.cases for group in groups() if group.name == "velocity measured by the device")
     assert len(cases) == len(set(cases)) == DEVICE_CASES >= 300

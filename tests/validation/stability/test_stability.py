@@ -227,6 +227,7 @@ def test_smoothing_halves_the_power_of_40_hz():
         assert out[200:-200].std() == pytest.approx(math.sqrt(0.5) * trace.position_m[200:-200].std(), rel=0.02)
 
 
+@pytest.mark.nightly
 @compiled
 def test_the_files_hold_every_case_and_the_lines_that_reproduce_the_failing_ones(swept, tmp_path):
     few = stability.Swept(swept.off[:60], swept.on[:60], 1.0)
@@ -288,6 +289,7 @@ def test_the_command_judges_one_case_in_words():
     assert on.startswith("safety on: stable")
 
 
+@pytest.mark.nightly
 @compiled
 def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     judged = stability.judge(parse(UNSTABLE), safe=False)
@@ -313,6 +315,7 @@ def test_the_command_judges_only_the_groups_that_are_named():
     assert all("non-Newtonian" in line for line in lines)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("words", "said"),
     [

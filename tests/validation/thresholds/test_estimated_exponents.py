@@ -68,6 +68,7 @@ def test_studies_without_estimation_at_a_pace_have_no_exponent() -> None:
     assert planted_exponent("x", protocol.model_copy(update={"tasks": {"stir": task}})) is None
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @needs_servo
 def test_the_whole_program_recovers_it() -> None:

@@ -95,6 +95,7 @@ def test_the_figure_draws_every_threshold(found: Compared) -> None:
     assert of["threshold-95"].get_ydata()[0] == found.rated[1].found.effect
 
 
+@pytest.mark.nightly
 def test_the_command_writes_table_and_figure_the_same_each_time(tmp_path: Path) -> None:
     for to in ("one", "two"):
         result = CliRunner().invoke(commands, ["delay-thresholds", "--people", "8", "--to", str(tmp_path / to)])

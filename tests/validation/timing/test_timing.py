@@ -192,6 +192,7 @@ class FakeWindows:
         return work()
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_race_times_every_loop_in_every_class_it_is_granted():
     lines = []
@@ -207,6 +208,7 @@ def test_a_race_times_every_loop_in_every_class_it_is_granted():
     assert not any(thread.name in {"servo", "timed"} for thread in threading.enumerate())
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_without_qt_its_timer_is_left_out_and_said_so():
     raced = timing(0.5, "none", None, spin_us=100)

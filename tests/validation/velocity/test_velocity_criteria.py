@@ -78,6 +78,7 @@ def test_whole_forces_are_those_of_physical2_at_scale_3_without_buoyancy():
         assert scene.liquids[0].effects
 
 
+@pytest.mark.nightly
 @compiled
 @pytest.mark.slow
 @pytest.mark.parametrize("part", [name for name in PARTS if name != "cost"])

@@ -97,6 +97,7 @@ def test_people_beyond_the_bound_are_counted_whatever_the_mean() -> None:
     assert (found.beyond.interval.low, found.beyond.interval.high) == pytest.approx((0.0103, 0.2700), abs=1e-4)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(("spread", "step"), [(0.5, 1.0), (1.0, 1.0), (1.5, 0.5), (0.7, 0.0)])
 def test_so_many_participants_as_are_told_give_the_verdict_in_80_percent(spread: float, step: float) -> None:

@@ -27,6 +27,7 @@ LAPSES = ((0.0, 0.01, 0.02, 0.03, 0.05, 0.06), (0.3, 0.3, 0.2, 0.15, 0.05, 0.0))
 """A density that has the weights of the analysis' lapse rates, as a function of the rate."""
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("family", "stimulus", "design", "levels", "each", "planted"),
     [

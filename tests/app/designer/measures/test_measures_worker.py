@@ -36,6 +36,7 @@ class Serial(Executor):
         return future
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_share_of_studies_is_that_of_the_command_power() -> None:
     protocol = template("viscosity-jnd").protocol

@@ -113,6 +113,7 @@ def kept(qtbot: Any, designer: Any) -> Path:
     return Path(study)
 
 
+@pytest.mark.nightly
 def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, folders: Path) -> None:
     threads = {thread.name for thread in threading.enumerate()}
     likert.editing.select(("blocks", "delays"))
@@ -177,6 +178,7 @@ def stop_of(participant: ParticipantWindow) -> CompactStop:
     return stop
 
 
+@pytest.mark.nightly
 def test_stop_above_the_page_closing_the_window_a_failure_and_leaving_the_place_stop(
     qtbot: Any, likert: Any, folders: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -223,6 +223,7 @@ else:
 """
 
 
+@pytest.mark.nightly
 def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any, qtbot: Any) -> None:
     def other(words: str, then: str) -> None:
         command = [sys.executable, "-c", OTHER, str(designer.results), words, then]

@@ -117,6 +117,7 @@ def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
     assert len(freed_in) == 3
 
 
+@pytest.mark.nightly
 def test_what_made_a_collection_take_long_is_passed_over_until_a_session_has_ended(
     qtbot: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

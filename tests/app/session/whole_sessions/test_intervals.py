@@ -147,6 +147,7 @@ class Adjusting(Person):
             QTest.keyClick(participant, Qt.Key.Key_Right)  # nothing is set yet
 
 
+@pytest.mark.nightly
 def test_levels_are_set_by_keys_alone(tmp_path: Path) -> None:
     results = tmp_path / "results" / "levels"
     person = Adjusting()

@@ -46,6 +46,7 @@ def run(study, results, lines):
     )
 
 
+@pytest.mark.nightly
 def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, port):
     ours, name = port
     workstation.save(MachineSettings(lsl_markers=True, lsl_samples="single-blind", triggers=f"serial:{name}"))
@@ -100,6 +101,7 @@ def test_a_port_that_is_unplugged_stops_no_session_and_is_said_once(short_demo, 
     assert verify(results).sound
 
 
+@pytest.mark.nightly
 def test_a_port_that_is_not_there_is_said_before_and_the_session_runs(short_demo, results):
     workstation.save(MachineSettings(triggers="serial:/nowhere/ttyUSB7"))
     lines: list[str] = []

@@ -67,6 +67,7 @@ def run(study: Path, results: Path) -> Callable[[], int]:
     return begin
 
 
+@pytest.mark.nightly
 def test_footage_is_shown_recorded_and_sealed(study: Path, run: Any, results: Path) -> None:
     write_clip(study.parent / NAME, frames=20, size=(320, 180))
     assert run() == 0
@@ -147,6 +148,7 @@ class Operator(Person):
             QTest.mouseClick(operator.banner.reconnect, Qt.MouseButton.LeftButton)
 
 
+@pytest.mark.nightly
 def test_footage_that_stops_is_opened_again_by_the_operator(
     study: Path, results: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

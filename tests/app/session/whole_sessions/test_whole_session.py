@@ -29,7 +29,7 @@ from tests.compiled import needs_servo
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp", "nobody_stays", "quick_preflight")]
 
 
-@pytest.mark.parametrize("device", ["scripted", "falcon-emulated"])
+@pytest.mark.parametrize("device", [pytest.param("scripted", marks=pytest.mark.nightly), "falcon-emulated"])
 def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_demo, results, device):
     """A machine that starves the emulator's Python code loses the device and ends the session: then again."""
     folder = results / "data" / "sub-P001" / "ses-01"
@@ -135,6 +135,7 @@ def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, wrong, ref
     assert not results.exists()
 
 
+@pytest.mark.nightly
 def test_the_receipt_says_what_is_set_for_the_machine_and_words_are_as_large_as_it_asks(short_demo, results):
     workstation.save(MachineSettings(viewing_distance_mm=1200, screen_width_mm=150))
     scales = []

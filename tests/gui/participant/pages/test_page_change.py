@@ -95,6 +95,7 @@ def change(window: ParticipantWindow, page: Page) -> list[QImage]:
     return watcher.pictures
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_screen_shows_the_old_page_and_then_the_new_one(window: ParticipantWindow) -> None:
     for page in SEQUENCE:

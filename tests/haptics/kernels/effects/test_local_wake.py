@@ -47,6 +47,7 @@ PATHS = {
 }
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="seconds of motion are for compiled code")
 @pytest.mark.parametrize("name", PATHS)
@@ -153,6 +154,7 @@ def test_a_current_carries_it_along(seed, current, exponent):
     assert vectors(simulate(flowing, river), "wake") == pytest.approx(still, abs=1e-9)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @settings(max_examples=examples(40), deadline=None)
 @given(
