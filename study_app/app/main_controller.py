@@ -230,7 +230,6 @@ class MainController(QObject):
         """Show the study, or the pilot, that was saved on home's cards."""
         if self._home_place is not None:
             self._home_place.show_studies()
-            self._home_place.show_sessions()
 
     def end(self) -> None:
         """Let go of what the places hold, and wait for what is under way in other threads: a device may be opening.

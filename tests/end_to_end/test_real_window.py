@@ -85,7 +85,7 @@ def begin_session(program: Program, qtbot) -> None:
     qtbot.addWidget(plan)
     plan.resize(*program.size(home))
     plan.show()
-    qtbot.waitExposed(plan)
+    qtbot.waitUntil(lambda: bool(plan.findChildren(StudyCard)))
     QApplication.processEvents()
     card = next(card for card in plan.findChildren(StudyCard) if card.facts.protocol.study.name == "rek2024")
     program.click(home, place_in(plan, card.new))
@@ -124,7 +124,7 @@ def answer_nine_items(program: Program, felt: str, qtbot) -> None:
     plan.resize(*program.size(felt))
     plan.show_page(questionnaire())
     plan.show()
-    qtbot.waitExposed(plan)
+    qtbot.waitUntil(lambda: bool(plan.findChildren(StudyCard)))
     QApplication.processEvents()
     page = plan.widget
     assert isinstance(page, QuestionnaireWidget)

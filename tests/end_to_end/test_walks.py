@@ -60,6 +60,8 @@ def plan(program: Visitor, qtbot: Any) -> MainController:
     made = MainController()
     qtbot.addWidget(made.window)
     laid_out(made.window, (HOME.width(), HOME.height()))
+    qtbot.waitUntil(lambda: bool(made.window.findChildren(StudyCard)))
+    laid_out(made.window, (HOME.width(), HOME.height()))
     return made
 
 

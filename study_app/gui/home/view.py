@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
 
-from PySide6.QtCore import QEvent, QTimer, Signal
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QVBoxLayout, QWidget
 
@@ -80,9 +80,10 @@ class HomePlace(Place):
         self.dialog: NewSessionDialog | RehearsalDialog | SessionPage | None = None
         self._opened: list[str] = []
         self._facts: tuple[Facts, ...] = ()
-        self._files = file_states(())
+        self._files: frozenset[tuple[Path, int, int]] | None = None  # as the studies were read from them last
         self._studies = Background(self)
-        self._studies.done.connect(self._show_changed)
+        self._studies.done.connect(self._show_studies)
+        self._studies.failed.connect(self._show_unread)
         self._reader = Background(self)
         self._reader.done.connect(self._show_read)
         self.banner = ResumeBanner()
@@ -93,6 +94,7 @@ class HomePlace(Place):
         self.open_protocol = ActionButton("file", "Open protocol …")
         self.new_study = ActionButton("plus", "New study …")
         self.folder = Elided("label", "text2")
+        self.waiting = label("Reading studies …", "card", "text2")
         self._lay_out()
         self.open_protocol.clicked.connect(self._open_protocol)
         self.new_study.clicked.connect(lambda: self.new_asked.emit(""))
@@ -102,7 +104,6 @@ class HomePlace(Place):
         self.device.devices_asked.connect(lambda: self.go_asked.emit("devices"))
         self.device.display_asked.connect(lambda: self.go_asked.emit("machine"))
         self.lab.lab_asked.connect(lambda: self.go_asked.emit("lab"))
-        self.show_studies()
         self.show_machine(DEFAULTS, looking(DEFAULTS.device))
 
     def show_machine(self, settings: MachineSettings, device: DeviceShown) -> None:
@@ -112,10 +113,10 @@ class HomePlace(Place):
         self.device.show_screens(_screens(settings))
 
     def enter(self) -> None:
-        """Read the results folder again, once the window stands; screens and protocols may have come and gone."""
+        """Read protocols and results again, once the window stands; screens may have come and gone, too."""
         self.device.show_screens(_screens(self.machine))
-        QTimer.singleShot(0, self, self.show_sessions)
         QTimer.singleShot(0, self, self.read_changes)
+        QTimer.singleShot(0, self, self.show_sessions)
 
     def event(self, event: QEvent) -> bool:
         """Look for changed protocols when one comes back to the window, as from a text editor."""
@@ -125,17 +126,8 @@ class HomePlace(Place):
 
     def read_changes(self) -> None:
         """Read the protocols again, outside the window's thread, where a file has changed."""
-        files = file_states(self._opened)
-        if files != self._files:
-            self._files = files
-            opened = tuple(self._opened)
-            self._studies.run(lambda: (opened, read_studies(opened)))
-
-    def _show_changed(self, read: tuple[tuple[str, ...], tuple[Facts, ...]]) -> None:
-        opened, facts = read
-        if opened == tuple(self._opened) and facts != self._facts:
-            self._show_facts(facts)
-            self.show_sessions()
+        if file_states(self._opened) != self._files:
+            self.show_studies()
 
     def _lay_out(self) -> None:
         titles = QVBoxLayout()
@@ -149,6 +141,7 @@ class HomePlace(Place):
         head.addWidget(self.open_protocol)
         head.addWidget(self.new_study)
         self._below = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._below.setContentsMargins(0, 0, 0, 0)
         self._below.setSpacing(18)
         self._below.addWidget(self.sessions, 1)
         self._beside = QBoxLayout(QBoxLayout.Direction.TopToBottom)
@@ -157,35 +150,56 @@ class HomePlace(Place):
         self._beside.addWidget(self.lab)
         self._beside.addStretch()
         self._below.addLayout(self._beside)
+        self.below = QWidget()
+        self.below.setLayout(self._below)
         inside = QWidget()
         page = QVBoxLayout(inside)
         page.setContentsMargins(28, 20, 28, 12)
         page.setSpacing(14)
         page.addLayout(head)
         page.addWidget(self.banner)
+        page.addWidget(self.waiting, 1, Qt.AlignmentFlag.AlignCenter)
         page.addWidget(self.grid)
-        page.addLayout(self._below, 1)
+        page.addWidget(self.below, 1)
         self.area = scrolled(inside)
         row = QVBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self.area)
+        for part in self._shown_with_cards():
+            part.hide()
+
+    def _shown_with_cards(self) -> tuple[QWidget, ...]:
+        """Return what the cards, and a scroll bar beside them, would move."""
+        return self.open_protocol, self.new_study, self.below
 
     @property
     def reading(self) -> bool:
-        """Whether the results folder is being read."""
-        return self._reader.busy
+        """Whether the protocols or the results folder are being read."""
+        return self._studies.busy or self._reader.busy
 
     def show_results(self, results: Path) -> None:
         """Show the protocols of the workspace and the sessions of another folder from now on."""
         self.results = results
         self.show_studies()
-        self.show_sessions()
 
     def show_studies(self) -> None:
-        """Show a card for each protocol at hand."""
+        """Read the protocols at hand, outside the window's thread; show a card for each, and the sessions."""
         self.folder.show_text(f"Workspace: {workspace().folder}")
         self._files = file_states(self._opened)
-        self._show_facts(read_studies(self._opened))
+        self._studies.run(partial(read_studies, tuple(self._opened)))
+
+    def _show_studies(self, read: tuple[Facts, ...]) -> None:
+        self.waiting.hide()
+        if read != self._facts:
+            self._show_facts(read)
+        for part in self._shown_with_cards():
+            part.show()
+        self.show_sessions()
+
+    def _show_unread(self, error: Exception) -> None:
+        self._show_studies(self._facts)
+        what = f"{type(error).__name__}: {error}"
+        self.message.emit("The studies could not be read", f"{what}. The terminal shows the details.")
 
     def _show_facts(self, shown: tuple[Facts, ...]) -> None:
         self._facts = shown
@@ -224,8 +238,9 @@ class HomePlace(Place):
             QWidget.setTabOrder(before, after)
 
     def show_sessions(self) -> None:
-        """Read the results folder again, outside the window's thread."""
-        self._reader.run(partial(_read, self.results, self._facts))
+        """Read the results folder again, outside the window's thread, once the studies are read."""
+        if not self._studies.busy:
+            self._reader.run(partial(_read, self.results, self._facts))
 
     def _show_read(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
         results, found, stopped = read
@@ -291,7 +306,6 @@ class HomePlace(Place):
             self._opened.insert(0, chosen)
         self.protocol_opened.emit(Path(chosen))
         self.show_studies()
-        self.show_sessions()
 
     def _arrange(self) -> None:
         stacked = self.width() < STACKED_BELOW

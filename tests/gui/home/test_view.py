@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QPoint, QSize, Qt
 from PySide6.QtGui import QAccessible, QFontMetrics
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
 from study_app.authoring.drafts import Draft, keep
 from study_app.devices.descriptor import NONE, Backend
+from study_app.gui.home import view
 from study_app.gui.home.main_window import LEAST, MainWindow
 from study_app.gui.home.study_cards import BrokenCard, StudyCard
 from study_app.gui.home.view import HomePlace
@@ -190,6 +193,7 @@ def test_the_pen_edits_a_study_or_copies_one_that_ships(home, qtbot, tmp_path, m
     (tmp_path / "protocols" / "mine.toml").write_text(text, encoding="utf-8")
     (tmp_path / "protocols" / "broken.toml").write_text("format = 1\n", encoding="utf-8")
     home.show_studies()
+    qtbot.waitUntil(lambda: not home.reading)
     asked = []
     home.edit_asked.connect(lambda source: asked.append(("edit", source)))
     home.new_asked.connect(lambda source: asked.append(("new", source)))
@@ -201,16 +205,16 @@ def test_the_pen_edits_a_study_or_copies_one_that_ships(home, qtbot, tmp_path, m
     assert asked == [("edit", "mine"), ("new", "demo"), ("edit", "broken"), ("new", "")]
 
 
-def test_a_protocol_opened_from_elsewhere_gets_a_card(home, tmp_path, monkeypatch):
+def test_a_protocol_opened_from_elsewhere_gets_a_card(home, qtbot, tmp_path, monkeypatch):
     own = tmp_path / "own.toml"
     own.write_bytes(source_bytes("demo").replace(b'name = "demo"', b'name = "own"'))
     chosen = [(str(own), ""), (str(tmp_path / "broken.toml"), "")]
     (tmp_path / "broken.toml").write_text("format = 1\n")
     monkeypatch.setattr("study_app.gui.home.view.QFileDialog.getOpenFileName", lambda *_arguments: chosen.pop(0))
     home.open_protocol.click()
-    assert study_cards(home)[0].facts.protocol.study.name == "own"
+    qtbot.waitUntil(lambda: study_cards(home)[0].facts.protocol.study.name == "own")
     home.open_protocol.click()
-    assert isinstance(home.grid.cards[0], BrokenCard)
+    qtbot.waitUntil(lambda: isinstance(home.grid.cards[0], BrokenCard))
 
 
 def own_study(folder, title="Own"):
@@ -290,6 +294,51 @@ def test_a_card_says_that_a_draft_was_not_saved_and_its_pen_opens_it(qtbot, tmp_
     qtbot.waitUntil(hidden)
 
 
+def test_the_window_is_painted_before_the_studies_are_read_and_nothing_moves_when_they_come(
+    qtbot, results, monkeypatch
+):
+    go_on, read = threading.Event(), view.read_studies
+    monkeypatch.setattr(view, "read_studies", lambda opened: go_on.wait(10) and read(opened))
+    window = MainWindow({"home": lambda: HomePlace(results)})
+    qtbot.addWidget(window)
+    home = window.place("home")
+    with qtbot.waitExposed(window):
+        window.show()
+    qtbot.waitUntil(lambda: home.reading)
+    QApplication.processEvents()
+
+    def places():
+        """Return where each text and button stands that is shown."""
+        parts = [*home.findChildren(QLabel), *home.findChildren(QPushButton)]
+        return {part: part.mapTo(window, QPoint()) for part in parts if part.isVisible()}
+
+    before = places()
+    del before[home.waiting]
+    assert home.grid.cards == []
+    go_on.set()
+    qtbot.waitUntil(lambda: not home.reading)
+    QApplication.processEvents()
+    after = places()
+    assert {part: after[part] for part in before} == before
+    assert home.waiting not in after
+    assert study_cards(home)[0].new in after
+    assert home.lab.open in after
+    window.activateWindow()
+    window.rail.switch.setFocus()
+    window.focusNextChild()
+    assert window.focusWidget() is home.open_protocol
+    assert cell(home, 0, "Answers") == "0 of 8"
+
+
+def test_studies_that_cannot_be_read_are_named_and_the_sessions_stay(qtbot, results, monkeypatch):
+    monkeypatch.setattr(view, "read_studies", lambda _opened: 1 // 0)
+    monkeypatch.setattr(threading, "excepthook", lambda _what: None)
+    home = open_home(qtbot, results)
+    assert home.main.notice.windowTitle() == "The studies could not be read"
+    assert home.below.isVisible()
+    assert len(home.sessions.shown) == 1
+
+
 def test_cards_stay_where_no_file_has_changed(home, qtbot):
     cards = home.grid.cards
     home.enter()
@@ -338,7 +387,6 @@ def test_a_small_window_cuts_nothing_off_sideways(home, qtbot):
 
 
 def test_no_button_is_dead(home):
-    home.show_studies()
     for button in home.main.findChildren(QPushButton):
         assert button.receivers("2clicked(bool)") or button.receivers("2clicked()"), button.text()
 
@@ -366,7 +414,6 @@ def test_the_preferred_device_is_shown_as_it_was_found_and_sessions_begin_with_i
 
 def test_tab_goes_through_home_as_it_is_read(home, qtbot):
     home.window().activateWindow()
-    home.show_studies()
     qtbot.waitUntil(lambda: all(card.isVisible() for card in home.grid.cards))
     home.open_protocol.setFocus()
     names = []
