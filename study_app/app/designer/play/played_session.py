@@ -26,10 +26,18 @@ STOPPED: Final = "stopped while it was played in the study designer"
 class PlayedSession(LiveSession):
     """A session that is played from the designer; ``over`` comes once, as of every session."""
 
+    _shown = False
+
+    @property
+    def began(self) -> bool:
+        """Whether its window was shown."""
+        return self._shown
+
     def open_windows(self, made: object) -> Iterator[None]:
         """Open the participant's window alone, and go on without a question."""
         yield from super().open_windows(made)
         assert self.bridge is not None  # noqa: S101 - just made
+        self._shown = True
         participant, runner = self.bridge.participant, self.bridge.runner
         participant.installEventFilter(self)
         participant.event.connect(self._hear)

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication
 
 from study_app.app.designer.participant.shown_step import StepPosition
 from study_app.app.designer.play import playing
+from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.termination import Patience
 from study_app.authoring.new_study import template
 from study_app.errors import DeviceLost
@@ -203,6 +204,27 @@ def test_stop_above_the_page_closing_the_window_a_failure_and_leaving_the_place_
     press_f5(qtbot, likert)
     pilots.end(Patience(10.0))  # while it is prepared
     assert not pilots.under_way
+    assert not list(folders.iterdir())
+
+
+def test_a_pilot_that_is_stopped_before_its_window_is_shown_has_not_begun(
+    qtbot: Any, likert: Any, folders: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    strip, start, stopped = likert.place.header.strip, SessionBridge.start, []
+
+    def stop() -> None:
+        stopped.append((window(ParticipantWindow), likert.controller.playing.under_way))
+        qtbot.mouseClick(strip.buttons["stop"], Qt.MouseButton.LeftButton)
+
+    def start_and_stop(bridge: SessionBridge) -> None:
+        start(bridge)
+        QTimer.singleShot(0, stop)
+
+    monkeypatch.setattr(SessionBridge, "start", start_and_stop)
+    player = play_to_the_end(qtbot, likert)
+    assert stopped == [(None, True)]
+    assert not player.pages
+    assert strip.state is None
     assert not list(folders.iterdir())
 
 
