@@ -61,7 +61,7 @@ def page_widget(
             under = _picture(old)
             return PauseWidget(page, words, clock, under=under, parent=parent, text_scale=text_scale, by_mouse=by_mouse)
         case TroublePage() | EndPage():
-            return NoticeWidget(page, words, clock, parent, text_scale=text_scale)
+            return NoticeWidget(page, words, clock, parent, text_scale=text_scale, by_mouse=by_mouse)
 
 
 def _picture(widget: QWidget) -> QPixmap | None:

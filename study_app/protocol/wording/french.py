@@ -103,9 +103,10 @@ FRENCH = Words(
     trouble_body="La force est coupée et vos réponses sont conservées. La personne responsable s'en occupe ; "
     "vous n'avez rien à faire.",
     end_title="Merci",
-    end_body="La séance est terminée. Vous pouvez lâcher l'appareil.",
+    end_body="La séance est terminée.",
     ended_early_title="La séance a pris fin",
-    ended_early_body="Vous pouvez lâcher l'appareil. Merci pour votre temps.",
+    ended_early_body="Merci pour votre temps.",
+    let_go="Vous pouvez lâcher l'appareil.",
     close="Fermer",
     window_title="Étude",
     preparing="Un instant, la séance se prépare …",

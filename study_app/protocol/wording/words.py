@@ -108,6 +108,7 @@ class Words:
     end_body: str
     ended_early_title: str
     ended_early_body: str
+    let_go: str  # after either, where the mouse is not the device
     close: str
 
     # before the first page

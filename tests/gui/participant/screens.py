@@ -14,9 +14,9 @@ from tests.gui.small import ManualClock
 class Opened:
     """A window on a screen, and what it told."""
 
-    def __init__(self, qtbot: Any, *, captures_pointer: bool = False) -> None:
+    def __init__(self, qtbot: Any, *, captures_pointer: bool = False, language: str = "en") -> None:
         self.window = ParticipantWindow(
-            words("en"), clock=ManualClock(), windowed=True, captures_pointer=captures_pointer
+            words(language), clock=ManualClock(), windowed=True, captures_pointer=captures_pointer
         )
         qtbot.addWidget(self.window)
         self.events: list[Any] = []

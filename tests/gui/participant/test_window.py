@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from html import unescape
 from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from study_app.gui.participant.pages.notices import NoticeWidget, PauseWidget
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.pages.text_page import TextWidget
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.gui.participant.window import LEAST_SIZE, ParticipantWindow
-from study_app.protocol.wording.languages import words
+from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import EndPage, Page, PausePage, TroublePage
 from study_app.session.transitions.events import (
     Chosen,
@@ -50,6 +51,21 @@ def test_page_value_becomes_its_widget_and_fills_the_window(opened: Opened, page
     assert opened.window.page is page
     assert opened.window.widget.geometry() == opened.window.rect()
     assert opened.window.widget.isVisible()
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("mouse", [False, True])
+def test_the_last_page_asks_to_let_go_of_the_device_unless_that_is_the_mouse(
+    qtbot: Any, language: str, mouse: bool
+) -> None:
+    said, shown = words(language), Opened(qtbot, captures_pointer=mouse, language=language)
+    for page in (EndPage(said.end_title, said.end_body), EndPage(said.ended_early_title, said.ended_early_body)):
+        shown.window.show_page(page)
+        lines = unescape(" ".join(line.text() for line in shown.window.widget.findChildren(QLabel)))
+        assert page.paragraph in lines
+        assert (said.let_go in lines) is not mouse
+    shown.window.may_close = True
+    shown.window.close()
 
 
 @pytest.mark.slow

@@ -80,7 +80,10 @@ class PauseWidget(ReadingPage):
 
 
 class NoticeWidget(ReadingPage):
-    """Something broke, or the session is over: a calm sentence; the last page can be closed."""
+    """Something broke, or the session is over: a calm sentence; the last page can be closed.
+
+    Where the mouse is the device, the last page does not ask to let go of it.
+    """
 
     def __init__(
         self,
@@ -90,10 +93,12 @@ class NoticeWidget(ReadingPage):
         parent: QWidget | None = None,
         *,
         text_scale: float = 1.0,
+        by_mouse: bool = False,
     ) -> None:
         ended = isinstance(page, EndPage)
         icon, colour = ("check", PARTICIPANT.ok) if ended else ("info", PARTICIPANT.warn)
-        column = (icon, page.title, (page.paragraph,), colour)
+        said = f"{page.paragraph} {words.let_go}" if ended and not by_mouse else page.paragraph
+        column = (icon, page.title, (said,), colour)
         button = (words.close, words.space_key) if ended else None
         super().__init__(column, words, clock, button=button, parent=parent, text_scale=text_scale)
 
