@@ -19,7 +19,7 @@ from study_app.app.workstation_controller import WorkstationController, screen_n
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import place
-from study_app.gui.home.main_window import MainWindow
+from study_app.gui.home.main_window import MainWindow, bug_words
 from study_app.gui.home.view import HomePlace
 from study_app.gui.home.workspace import WorkspaceDialog
 from study_app.gui.widgets.background import wait_for_jobs
@@ -123,10 +123,9 @@ class MainController(QObject):
 
     def show_bug(self, error: BaseException) -> bool:
         """Show an exception that no slot caught, once, unless a session shows it; return that it is printed, too."""
-        sentence = f"{type(error).__name__}: {error}"
-        if self.live is None and self.window.isVisible() and sentence not in self._bugs:
-            self._bugs.add(sentence)
-            bug = f"{sentence}. This is a bug: please report it, with what the terminal shows."
+        bug, said = bug_words(error), error is self.window.not_opened
+        if self.live is None and self.window.isVisible() and not said and bug not in self._bugs:
+            self._bugs.add(bug)
             self.window.show_message("The last action failed", bug)
         return False
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QDialog, QLabel
 
 from study_app.app.main_controller import MainController, home
 from study_app.app.session import live_session
@@ -192,6 +192,34 @@ def test_back_leads_from_the_help_to_the_place_where_it_was_asked_for(visit: Mai
     window.go("home")
     window.go("help")
     assert not visit.help.back.isEnabled(), "the place was left in another way"
+
+
+def test_a_place_that_cannot_be_made_is_told_of_once_and_the_help_of_a_key_is_too(
+    qtbot: Any, tmp_path: Path, monkeypatch: Any
+) -> None:
+    seen: list[list[str]] = []
+    monkeypatch.setattr("study_app.gui.help.view.HelpPlace", lambda: 1 // 0)
+
+    def look(visit: MainController) -> None:
+        seen.append([notice.windowTitle() for notice in visit.window.findChildren(QDialog) if notice.isVisible()])
+        for notice in visit.window.findChildren(QDialog):
+            notice.reject()
+
+    def then(visit: MainController) -> None:
+        go = partial(visit.window.go, "help")
+        steps = iter((go, partial(look, visit), visit.show_help, partial(look, visit), visit.window.close))
+
+        def step() -> None:
+            next(steps, timer.stop)()
+
+        timer = QTimer(visit.window, interval=10)
+        timer.timeout.connect(step)
+        timer.start()
+
+    with qtbot.captureExceptions() as printed:
+        home(tmp_path / "results", then=then)
+    assert len(printed) == 2
+    assert seen == [["“Help” could not be opened"]] * 2
 
 
 def test_an_exception_that_no_slot_catches_is_shown_once_and_printed(qtbot: Any, qapp: Any, tmp_path: Path) -> None:

@@ -10,10 +10,12 @@ from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 from shiboken6 import isValid
 
-from study_app.gui.home.navigation import Rail
+from study_app.errors import StudyError
+from study_app.gui.home.navigation import DESTINATIONS, Rail
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme, apply_theme_within
-from study_app.gui.widgets.dialogs import Notice
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.dialogs import Notice, Question
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place, last_focused
 
@@ -21,6 +23,11 @@ FULL = QSize(1440, 900)
 LEAST = QSize(1024, 640)
 NARROW_BELOW = 1400
 NONE: Mapping[str, Callable[[], Iterator[None] | None]] = MappingProxyType({})
+
+
+def bug_words(error: BaseException) -> str:
+    """Return what is said of an exception that is a bug."""
+    return f"{type(error).__name__}: {error}. This is a bug: please report it, with what the terminal shows."
 
 
 def _waiting_place() -> Place:
@@ -62,7 +69,8 @@ class MainWindow(QMainWindow):
         self.setWindowTitle("Liquid Study")
         self.setMinimumSize(LEAST)
         self.theme = theme
-        self.notice: Notice | None = None
+        self.notice: Question | None = None
+        self.not_opened: BaseException | None = None  # why a place could not be opened: a notice has said so
         self._had_keyboard: QWidget | None = None
         self._makers = makers
         self._prepares = dict(prepares)  # of places that are not filled yet
@@ -99,9 +107,14 @@ class MainWindow(QMainWindow):
         return self._here
 
     def place(self, name: str) -> Place:
-        """Return a place, made on first use."""
+        """Return a place, made on first use; what making it raises is said, too."""
         if name not in self._places:
-            made = self._made.pop(name, None) or self._makers[name]()
+            try:
+                made = self._made.pop(name, None) or self._makers[name]()
+            except Exception as error:
+                self._asked = self._here
+                self._say_not_opened(name, error)
+                raise
             made.message.connect(self.show_message)
             made.go_asked.connect(self.go)
             self._places[name] = made
@@ -182,10 +195,23 @@ class MainWindow(QMainWindow):
 
     def not_prepared(self, error: BaseException) -> None:
         """Say what failed, at the first place, if one waits for a place; asked for again, it is prepared again."""
-        if self._asked in self._prepares:
-            self.go(next(iter(self._makers)))
-            what = f"{type(error).__name__}: {error}"
-            self.show_message("This page could not be opened", f"{what}. The terminal shows the details.")
+        name, first = self._asked, next(iter(self._makers))
+        if name in self._prepares:
+            self._asked = first
+            self._show(first, self.place(first))  # what waits for the place waits for a second try
+            self._say_not_opened(name, error)
+
+    def _say_not_opened(self, name: str, error: BaseException) -> None:
+        """Say why a place could not be opened, and offer to try again."""
+        if not self.isVisible():
+            return
+        self.not_opened = error
+        word = next(place.word for place in DESTINATIONS if place.name == name)
+        what = f"{error}." if isinstance(error, StudyError) else bug_words(error)
+        notice = Question(self, self.theme, f"“{word}” could not be opened", what)
+        notice.add_buttons("Close", ActionButton("", "Try again", role="primary"))
+        notice.accepted.connect(lambda: self.go(name))
+        self._show_notice(notice)
 
     def _now(self) -> Place:
         """Return the place one is at, or the line that stands there until it is prepared."""
@@ -210,7 +236,9 @@ class MainWindow(QMainWindow):
 
     def show_message(self, title: str, sentence: str) -> None:
         """Say what went wrong, with one button."""
-        notice = Notice(self, self.theme, title, sentence)
+        self._show_notice(Notice(self, self.theme, title, sentence))
+
+    def _show_notice(self, notice: Question) -> None:
         notice.finished.connect(notice.deleteLater)
         self.notice = notice
         notice.show()

@@ -7,6 +7,7 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QVBoxLayout
 
+from study_app.errors import StoreError
 from study_app.gui.home.main_window import FULL, LEAST, MainWindow
 from study_app.gui.home.navigation import DESTINATIONS, FOCUS_RING, NARROW_RAIL, WIDE_RAIL
 from study_app.gui.theme.theme import DARK, font
@@ -223,9 +224,40 @@ def test_a_place_whose_step_fails_says_so_and_a_second_entry_tries_again(qtbot, 
     assert [str(error) for _, error, _ in raised] == ["a file is missing"], "the terminal shows the details"
     assert window.here == "home"
     assert "a file is missing" in " ".join(one.text() for one in window.notice.findChildren(QLabel))
-    window.go("lab")
+    window.notice.go_on.click()
     qtbot.waitUntil(lambda: window.stack.currentWidget() is window._places.get("lab"))
     assert tried == (["make", "make", "fill"] if fails == "make" else ["make", "fill", "fill"])
+    window.close()
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (StoreError("the folder cannot be read"), "the folder cannot be read."),
+        (KeyError("a name"), "KeyError: 'a name'. This is a bug: please report it, with what the terminal shows."),
+    ],
+)
+def test_a_place_that_cannot_be_made_says_why_and_is_tried_again(qtbot, error, said):
+    fails = [error]
+
+    def make():
+        if fails:
+            raise fails.pop()
+        return Place()
+
+    window = MainWindow({"home": Place, "results": make, "lab": Place}, prepares={"lab": lambda: None})
+    qtbot.addWidget(window)
+    window.show()
+    window.go("lab")
+    with qtbot.captureExceptions() as raised:
+        qtbot.mouseClick(window.rail.buttons["results"], Qt.MouseButton.LeftButton)
+    assert [one for _, one, _ in raised] == [error], "the terminal shows the details"
+    assert window.here == "lab"
+    assert [one.text() for one in window.notice.findChildren(QLabel)] == ["“Results” could not be opened", said]
+    assert window.notice.go_on.text() == "Try again"
+    window.notice.go_on.click()
+    assert window.here == "results"
+    assert not window.notice.isVisible()
     window.close()
 
 
