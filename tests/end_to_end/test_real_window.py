@@ -124,7 +124,7 @@ def answer_nine_items(program: Program, felt: str, qtbot) -> None:
     plan.resize(*program.size(felt))
     plan.show_page(questionnaire())
     plan.show()
-    qtbot.waitUntil(lambda: bool(plan.findChildren(StudyCard)))
+    qtbot.waitExposed(plan)
     QApplication.processEvents()
     page = plan.widget
     assert isinstance(page, QuestionnaireWidget)
