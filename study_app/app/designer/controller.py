@@ -27,6 +27,7 @@ from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.app.designer.versions.renaming import Renaming
 from study_app.authoring.drafts import draft_of
 from study_app.authoring.edited_study import read
+from study_app.authoring.kept_settings import forget_settings
 from study_app.authoring.names import renamed
 from study_app.authoring.new_study import NO_ANSWERS, Answers, answered, template
 from study_app.authoring.study_facts import facts
@@ -151,6 +152,7 @@ class DesignerController(QObject):
             self.place.refuse_new(f"{error}.")
             return
         self.saving.leave()
+        forget_settings(opened.file)
         opened.note_edit(0.0)
         self._take(opened)
         self.saving.leave()

@@ -11,7 +11,7 @@ from typing import Any
 
 from study_app.protocol.groups.group import SEQUENCES, sequences_in
 from study_app.protocol.source.document import Path, entries, names
-from study_app.protocol.source.problems import ONE_LANGUAGE, Fault, did_you_mean
+from study_app.protocol.source.problems import ALIKE, ONE_LANGUAGE, Fault, did_you_mean
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 REFERENCES = {
@@ -173,7 +173,7 @@ def _alike(found: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
         texts = entry if isinstance(entry, Mapping) else {"": entry}
         read = {(language, _read(text)) for language, text in texts.items() if isinstance(text, str)}
         if read & seen:
-            yield Fault(path, f"reads as an earlier {kind} does", "people could not tell the two apart: change one")
+            yield Fault(path, f"{ALIKE} {kind} does", "people could not tell the two apart: change one")
         seen |= read
 
 

@@ -19,6 +19,7 @@ Schema = Mapping[str, Any]
 
 
 ONE_LANGUAGE: Final = "is in one language, the study in several"
+ALIKE: Final = "reads as an earlier"
 
 
 class Fault(NamedTuple):
@@ -37,6 +38,15 @@ class Fault(NamedTuple):
     def in_one_language(self) -> bool:
         """Whether it is a plain text in a study of several languages."""
         return self.message == ONE_LANGUAGE
+
+    @property
+    def reads_alike(self) -> bool:
+        """Whether it is a text that repeats another one."""
+        return self.message.startswith(ALIKE)
+
+    def concerns(self, language: str, first: str) -> bool:
+        """Return whether it is seen where texts are shown in a language; ``first`` is that of plain texts."""
+        return self.missing_language in ("", language) and not (self.in_one_language and language == first)
 
     def located(self, places: Places) -> Problem:
         """Return the problem with its line; in the place that people read, entries count from 1."""

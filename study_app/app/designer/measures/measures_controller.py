@@ -20,9 +20,8 @@ from study_app.app.designer.measures.wanted import (
     wanted_of,
 )
 from study_app.app.designer.repair_search import RepairSearch
-from study_app.authoring.drafts import draft_of
 from study_app.authoring.edited_study import Study
-from study_app.authoring.measures.kept_participants import keep_participants, kept_participants
+from study_app.authoring.kept_settings import keep_setting, kept_participants
 from study_app.authoring.measures.observers import Measurable, Observed
 from study_app.authoring.measures.planned import Detectable, GroupPrecision
 from study_app.authoring.measures.valid_part import valid_part
@@ -145,8 +144,6 @@ class MeasuresController(QObject):
 
     def _forget(self) -> None:
         opened = self._editing.opened
-        if opened is not None and not opened.file.exists() and draft_of(opened.file) is None:
-            keep_participants(opened.file, None)  # a new study, whose file may have been that of another
         kept = None if opened is None else kept_participants(opened.file)
         self._participants = None if kept is None else _permitted(kept)
         self._lapses, self._sound = LAPSES, None
@@ -204,7 +201,7 @@ class MeasuresController(QObject):
             return
         asked = _permitted(number)
         self._participants = None if asked == participants_of(valid_part(opened.study).protocol) else asked
-        keep_participants(opened.file, self._participants)
+        keep_setting(opened.file, "participants", self._participants)
         self.show()
 
     def _take_threshold(self, number: float) -> None:

@@ -21,6 +21,7 @@ from study_app.app.designer.participant.shown_step import (
 from study_app.app.designer.participant.sound_part import last_valid, sound_part
 from study_app.app.workstation_controller import screen_number, settings_here, text_scale_on
 from study_app.authoring.edited_study import Study
+from study_app.authoring.kept_settings import keep_setting, kept_language
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
 from study_app.gui.designer.pane.right_pane import PanePage
@@ -32,6 +33,7 @@ from study_app.protocol.forms.show_if import Value
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.source.document import Path, value_at
+from study_app.protocol.wording.languages import language_name
 from study_app.session.pages import DesignPage, TaskPage
 from study_app.session.simulated.preview import preview
 from study_app.session.simulated.programmed_ball import ProgrammedBall
@@ -45,6 +47,7 @@ from study_app.viewmodels.designer.participant_page import (
     moment_words,
     step_words,
 )
+from study_app.viewmodels.sessions import counted
 
 NO_ANSWERS: Final[Mapping[str, Value]] = {}
 
@@ -131,8 +134,10 @@ class ParticipantPreview(QObject):
             self.show_language(languages[(languages.index(self.tab.view.language) + 1) % len(languages)])
 
     def show_language(self, language: str) -> None:
-        """Show the pages in another language."""
+        """Show the pages in another language, also when the study is opened again."""
         self._language = language
+        if self.editing.opened is not None:
+            keep_setting(self.editing.opened.file, "language", language)
         self._show()
 
     def go(self, by: int) -> None:
@@ -191,7 +196,9 @@ class ParticipantPreview(QObject):
 
     def _begin(self) -> None:
         self._found = self._moment = self._protocol = self._study = self._valid = None
-        self._selected, self._answers, self._language = (), {}, ""
+        opened = self.editing.opened
+        self._selected, self._answers = (), {}
+        self._language = "" if opened is None else kept_language(opened.file)
         self._side = "questions"
         self._after_form.start()
 
@@ -316,17 +323,26 @@ class ParticipantPreview(QObject):
         return name if isinstance(name, str) else None
 
     def _note(self, study: Study, found: Found) -> str:
-        """Return what is not shown as it is written."""
-        if not study.problems:
+        """Return what is not shown as it is written, in the language of the page."""
+        first = found.shown.protocol.study.languages[0]
+        faults = [fault for fault in study.faults if fault.concerns(self._language, first)]
+        count = len(study.problems) - len(study.faults) + len(faults)
+        if not count:
             return "This page is in no session." if found.session == STANDALONE else ""
         title = title_of(study.document, self._selected)
-        own = [fault for fault in study.faults if fault.path[: len(self._selected)] == self._selected]
+        own = [fault for fault in faults if fault.path[: len(self._selected)] == self._selected]
+        lacks = [fault for fault in faults if fault.missing_language or fault.in_one_language]
         if own and self._protocol is not None:
             if not self._holds(self._protocol, study):
                 return f"{title} cannot be shown: {own[0].message}"
-            value = "an initial" if self._valid is None else "the last valid"
-            return f"{title} has a problem ({own[0].message}): {value} value is shown."
-        count, values = len(study.problems), "only valid parts" if self._valid is None else "the last valid values"
+            if own[0] in lacks:
+                return f"{title} lacks a text in {language_name(self._language)}: that of another language is shown."
+            value = "an initial value" if self._valid is None else "the last valid value"
+            value = "the text as it is written" if own[0].reads_alike else value
+            return f"{title} has a problem ({own[0].message}): {value} is shown."
+        if len(lacks) == count:
+            return f"{counted(count, 'text')} missing in {language_name(self._language)}: shown in another language."
+        values = "only valid parts" if self._valid is None else "the last valid values"
         return f"{count} problem{'s' * (count > 1)} elsewhere: {values} are shown."
 
     def _holds(self, protocol: Protocol, study: Study) -> bool:

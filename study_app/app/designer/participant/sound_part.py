@@ -26,13 +26,15 @@ ROUNDS: Final = 12
 MOST_EARLIER: Final = 5
 """So many kept versions are looked at for one without faults."""
 _NOTHING: Final = object()
+_MARK: Final = "\u200b"
 
 
 def sound_part(study: Study, before: Mapping[str, Any]) -> Protocol | None:
     """Return the protocol of a study, of a faulty one that of its sound part; None where too little is sound.
 
-    A text that a language lacks is that of another language. Any other faulty value is the one that ``before`` has, as
-    is what a name names. Without one it has an initial value, or is left out with what cannot be without it.
+    A text that a language lacks is that of another language, and one that repeats another text stays. Any other faulty
+    value is the one that ``before`` has, as is what a name names. Without one it has an initial value, or is left out
+    with what cannot be without it.
 
     Parameters
     ----------
@@ -83,12 +85,14 @@ def _mended(
     left_out: set[Path] = set()
     found: Any = document
     for fault in faults:
-        value, sound = _at(found, fault.path), _at(before, fault.path)
+        value, sound = _at(found, fault.path), _at(before, _path_before(found, fault.path, before))
         named = named_at(before, fault.path) if is_unknown_name(fault) and sound == value else None
         if fault.in_one_language and isinstance(value, str):
             found = with_value(found, fault.path, dict.fromkeys(languages, value))
         elif (lacking := fault.missing_language) and isinstance(value, Mapping) and value:
             found = with_value(found, fault.path, {**value, lacking: next(iter(value.values()))})
+        elif fault.reads_alike:
+            found = with_value(found, fault.path, _told_apart(value, fault.path))
         elif named is not None and _at(found, named[:1]) is not _NOTHING:
             found = with_value(found, named, _at(before, named))
         elif sound is not _NOTHING and sound != value:
@@ -106,6 +110,27 @@ def _mended(
     for path in sorted((path for path in left_out if path), key=str, reverse=True):
         found = without_value(found, path)
     return dict(found)
+
+
+def _told_apart(text: Any, path: Path) -> Any:
+    """Return a text that looks the same and reads as no other: each place has its number of zero-width spaces."""
+    marks = _MARK * (1 + max((step for step in path if isinstance(step, int)), default=0))
+    return {code: f"{one}{marks}" for code, one in text.items()} if isinstance(text, Mapping) else f"{text}{marks}"
+
+
+def _path_before(document: Any, path: Path, before: Any) -> Path:
+    """Return where an element of a document was before: a question is found by its id, not by its number."""
+    found: list[str | int] = []
+    for step in path:
+        document = _at(document, (step,))
+        name = document.get("id") if isinstance(document, Mapping) and path[-1] != "id" else None
+        if isinstance(step, int) and name is not None:
+            entries_before = before if isinstance(before, list | tuple) else ()
+            same = (at for at, one in enumerate(entries_before) if isinstance(one, Mapping) and one.get("id") == name)
+            step = next(same, len(entries_before))  # noqa: PLW2901 - the step of the other document
+        found.append(step)
+        before = _at(before, (step,))
+    return tuple(found)
 
 
 def _first_value(document: Any, path: Path) -> Any:

@@ -21,7 +21,7 @@ from study_app.app.designer.measures.measures_worker import (
     start_measure_worker,
 )
 from study_app.authoring.drafts import discard, drafted_files
-from study_app.authoring.measures.kept_participants import keep_participants, kept_participants
+from study_app.authoring.kept_settings import keep_setting, kept_participants
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.gui.designer.measures.card_grid import CardGrid
@@ -143,7 +143,7 @@ def test_a_new_study_has_no_number_of_participants_of_one_that_was_discarded(
     qtbot: Any, designer: Any, worker: Worker
 ) -> None:
     jnd(designer)
-    keep_participants(designer.editing.opened.file, 8)
+    keep_setting(designer.editing.opened.file, "participants", 8)
     designer.controller.open("kitchen")
     discard(next(file for file in drafted_files() if file.stem == "thicker"))
     jnd(designer)

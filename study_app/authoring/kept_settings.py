@@ -1,0 +1,56 @@
+"""How a study is looked at: the language of the preview, and the simulated participants where the file plans others.
+
+These settings are kept with drafts and versions in the user's data folder; they change no protocol.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+from study_app.authoring.versions.contents import file_key, write_whole
+from study_app.errors import StoreError
+from study_app.store.journals.parsing import parse_json
+from study_app.user_folder import data_folder
+
+Setting: TypeAlias = Literal["participants", "language"]
+
+
+def kept_participants(file: Path) -> int | None:
+    """Return how many participants a study is simulated with; None where no number is kept that can be read."""
+    number = _kept(file).get("participants")
+    return number if isinstance(number, int) and not isinstance(number, bool) else None
+
+
+def kept_language(file: Path) -> str:
+    """Return the language in which a study's pages are shown; "" where none is kept."""
+    return str(_kept(file).get("language", ""))
+
+
+def keep_setting(file: Path, name: Setting, value: int | str | None) -> None:
+    """Keep a setting for a study's file, None for the usual one; where it cannot be written, it is not kept."""
+    others = {key: one for key, one in _kept(file).items() if key not in {"file", name}}
+    if value is not None:
+        others[name] = value
+    with contextlib.suppress(StoreError, OSError):
+        write_whole(_kept_file(file), json.dumps({"file": str(file.resolve()), **others}).encode())
+
+
+def forget_settings(file: Path) -> None:
+    """Forget the settings of another study that had this file."""
+    with contextlib.suppress(OSError):
+        _kept_file(file).unlink(missing_ok=True)
+
+
+def _kept(file: Path) -> dict[str, Any]:
+    try:
+        kept: Any = parse_json(_kept_file(file).read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return kept if isinstance(kept, dict) else {}
+
+
+def _kept_file(file: Path) -> Path:
+    return data_folder() / "measures" / f"{file_key(file)}.json"
