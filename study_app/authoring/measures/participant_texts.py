@@ -60,6 +60,12 @@ def copied_texts(study: Study) -> dict[str, int]:
     return {code: count for code, count in counted.items() if count}
 
 
+def own_texts(study: Study) -> dict[str, tuple[int, int]]:
+    """Return for each language how many texts it has that are not copied, and how many it should have."""
+    copied = copied_texts(study)
+    return {code: (there - copied.get(code, 0), wanted) for code, (there, wanted) in texts_by_language(study).items()}
+
+
 def is_copied(texts: Mapping[str, Any], code: str, first: str) -> bool:
     """Return whether a text in a language is still that of the first language, or of a new question."""
     return bool(texts.get(code)) and texts[code] in (texts.get(first), new_text(ITEMS))

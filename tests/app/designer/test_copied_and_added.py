@@ -74,7 +74,7 @@ def test_a_language_is_added_everywhere_filled_in_and_taken_away(qtbot: Any, des
     assert missing
     assert study.document["pages"]["welcome"]["title"].keys() == {"en"}
     field = designer.row("study", "languages").field
-    assert f"{len(missing)} missing" in field.row.entries[1].note
+    assert field.row.entries[1].note == f"0 of {len(missing)} texts"
     qtbot.mouseClick(field.copies["ar"], LEFT)
     assert designer.editing.opened.study.faults == ()
     designer.editing.select(("pages", "welcome"))

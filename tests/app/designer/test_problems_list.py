@@ -9,6 +9,7 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.authoring.measures.participant_texts import texts_by_language
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.source.files import shipped_file
@@ -118,7 +119,8 @@ def test_a_text_that_is_missing_hides_no_force_and_is_counted_the_same_everywher
     assert all(line.force.endswith(" N") for line in lines)
     designer.editing.select(("study",))
     languages = designer.row("study", "languages").field.row.entries
-    assert [entry.note for entry in languages] == ["every text", "1 missing"]
+    texts = texts_by_language(designer.editing.opened.study)["en"][1]
+    assert [entry.note for entry in languages] == [f"{texts} of {texts} texts", f"{texts - 1} of {texts} texts"]
     assert facts(designer.editing.opened.study).missing == {"nl": 1}
     assert [problem.message for problem in designer.place.view.problems] == ["Is missing in Dutch"]
 

@@ -10,7 +10,7 @@ from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.series import NUMBERS, series_start
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
-from study_app.authoring.measures.participant_texts import is_copied, missing_texts
+from study_app.authoring.measures.participant_texts import is_copied, missing_texts, own_texts
 from study_app.authoring.names import named_at
 from study_app.authoring.outline import title_of
 from study_app.protocol.groups.group import sequences_in
@@ -346,11 +346,10 @@ def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:
 
 def _entries(study: Study, row: Row) -> Iterator[Entry]:
     if row.path == STUDY_LANGUAGES:
-        lacking = missing_texts(study)
+        lacking, own = missing_texts(study), own_texts(study)
         for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
-            missing = lacking.get(str(code), 0)
-            note = f"{missing} missing" if missing else "every text"
-            yield Entry((*row.path, at), language_name(str(code)), note, missing)
+            note = "{} of {} texts".format(*own.get(str(code), (0, 0)))
+            yield Entry((*row.path, at), language_name(str(code)), note, lacking.get(str(code), 0))
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))
         for key in keys:

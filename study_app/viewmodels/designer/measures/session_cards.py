@@ -9,7 +9,7 @@ from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.forces import forces
-from study_app.authoring.measures.participant_texts import copied_texts, revealing, texts_by_language
+from study_app.authoring.measures.participant_texts import copied_texts, own_texts, revealing, texts_by_language
 from study_app.authoring.measures.planned import Detectable
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.outline import title_of
@@ -207,9 +207,9 @@ def effects_card(study: Study, protocol: Protocol, name: str) -> LinesCard:
 def texts_card(study: Study) -> TextsCard:
     """Return how many texts each language has, and the texts that reveal a condition."""
     lines = []
-    copied, counts = copied_texts(study), texts_by_language(study)
+    counts, with_own = texts_by_language(study), own_texts(study)
     for code, (there, wanted) in counts.items():
-        own = there - copied.get(code, 0)
+        own = with_own[code][0]
         verdict: Verdict = ("ok", "check", "complete") if own == wanted else ("bad", "warning", "texts are missing")
         if own < there == wanted:
             verdict = (
@@ -266,8 +266,11 @@ def warnings_card(
     """
     sentences: list[Verdict] = [("warn", "warning", _sentence(one)) for one in (*facts.warnings, *more)]
     if more and planned is not None:
-        of_check = f"This precision is the expected one, of the {planned} participants that the file plans."
-        of_card = f" The number above counts simulated studies of {simulated} participants that are as precise."
+        of_check = f"The warning uses the expected precision for the {planned} participants that the file plans."
+        of_card = (
+            f" The number above is the share of simulated studies with {simulated} participants that reach the "
+            "planned precision."
+        )
         sentences.append(("neutral", "info", of_check if simulated is None else of_check + of_card))
     return LinesCard("Warnings", "of check", (), tuple(sentences)) if sentences else None
 

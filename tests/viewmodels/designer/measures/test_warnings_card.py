@@ -22,11 +22,11 @@ def test_warnings_are_sentences_and_places_of_the_file_stay_as_they_are() -> Non
 @pytest.mark.parametrize(
     ("simulated", "said"),
     [
-        (None, "This precision is the expected one, of the 20 participants that the file plans."),
+        (None, "The warning uses the expected precision for the 20 participants that the file plans."),
         (
             12,
-            "This precision is the expected one, of the 20 participants that the file plans. The number above counts "
-            "simulated studies of 12 participants that are as precise.",
+            "The warning uses the expected precision for the 20 participants that the file plans. The number above is "
+            "the share of simulated studies with 12 participants that reach the planned precision.",
         ),
     ],
 )
