@@ -142,7 +142,7 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
         protocol = load(source)
     except ProtocolError as error:
         count = len(error.problems)
-        others = f" (and {count - 1} more: liquid-study check {source})" if count > 1 else ""
+        others = f". Open it in the designer to see all {count} problems." if count > 1 else ""
         return BrokenFacts(source, f"{error.problems[0]}{others}", _draft_words_of(source))
     language = operator_language(protocol)
     extent = extent_of(protocol)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from study_app.errors import ProtocolError
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.session.resume import REHEARSED_SCREENS
@@ -166,6 +167,13 @@ def test_a_broken_protocol_names_its_first_problem(tmp_path):
     facts = study_facts(str(broken))
     assert isinstance(facts, BrokenFacts)
     assert "line 2" in facts.problem
+    broken.write_text("format = 1\n")
+    facts = study_facts(str(broken))
+    with pytest.raises(ProtocolError) as refused:
+        load(facts.source)
+    count = len(refused.value.problems)
+    assert count > 1
+    assert facts.problem.endswith(f". Open it in the designer to see all {count} problems.")
 
 
 def test_sessions_that_need_care_stand_first_then_the_newest(tmp_path):

@@ -97,7 +97,7 @@ class BrokenCard(Card):
         self.pen.clicked.connect(lambda: self.edit.emit(facts))
         row.addWidget(self.pen)
         self.column.addLayout(row)
-        self.draft = _say_draft(self, facts.draft)
+        self.draft = _say_draft(self, facts.draft, of_draft=isinstance(facts, DraftFacts))
         words = "This file cannot be used." if isinstance(facts, BrokenFacts) else "This study was never saved."
         self.column.addWidget(label(words, "strong", "warn"))
         said = label(_why(facts), "label", "text2", wraps=True)
@@ -106,9 +106,10 @@ class BrokenCard(Card):
         self.setMinimumHeight(LEAST_HEIGHT)
 
 
-def _say_draft(card: Card, words: str) -> QLabel:
-    """Add a line about the draft of a study, where there is one."""
-    made = label(words, "small", "warn")
+def _say_draft(card: Card, words: str, *, of_draft: bool = False) -> QLabel:
+    """Add a line about the draft of a study, where there is one; everything else on a card is of the saved file."""
+    saved = words and f"{words}. This card shows the saved file."
+    made = label(words if of_draft else saved, "small", "warn", wraps=True)
     card.column.addWidget(made)
     made.setVisible(bool(words))
     return made
