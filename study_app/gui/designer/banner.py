@@ -14,7 +14,7 @@ from study_app.viewmodels.designer.designer_view import Banner
 
 
 class BannerCard(Card):
-    """Draws a `Banner`; ``asked`` carries the action of a button."""
+    """Draws a `Banner`; ``asked`` carries the action of a button. It waits while another line is shown in its place."""
 
     asked = Signal(str)
 
@@ -22,14 +22,21 @@ class BannerCard(Card):
         super().__init__(padding=10, gap=6)
         self.words = label("", "label", wraps=True)
         self.buttons: list[ActionButton] = []
+        self._there = self._waits = False
         self._row = QHBoxLayout()
         self._row.addWidget(self.words, 1)
         self.column.addLayout(self._row)
         self.hide()
 
+    def wait(self, *, waits: bool) -> None:
+        """Hide while another line is shown; one line at a time leaves the parts their room."""
+        self._waits = waits
+        self.setVisible(self._there and not waits)
+
     def show_banner(self, banner: Banner | None) -> None:
         """Show another banner; None hides it."""
-        self.setVisible(banner is not None)
+        self._there = banner is not None
+        self.wait(waits=self._waits)
         if banner is None:
             self.words.clear()
             return

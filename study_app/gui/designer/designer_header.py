@@ -167,14 +167,14 @@ class DesignerHeader(QWidget):
         button.setEnabled(on)
 
     def _make_room(self) -> None:
-        """Hide the title, the draft and the version, in this order, where the name of the study has no room else."""
+        """Hide the title, then the version, where the name of the study has no room else; the draft is always seen."""
         state = self.state
         named = min(NAME_MOST_PX, self.study.fontMetrics().horizontalAdvance(self.study.currentText()) + NAME_EDGES_PX)
         more = max(0, named - self.study.minimumWidth())
         self.title.show()
         self.draft.setVisible(bool(state.chosen and state.draft))
         self.version.setVisible(bool(state.chosen and state.version.words))
-        for part in (self.title, self.draft, self.version):
+        for part in (self.title, self.version):
             self._row.invalidate()
             part.setVisible(part.isVisibleTo(self) and self._row.minimumSize().width() + more <= self.width())
 

@@ -118,6 +118,7 @@ class DesignerPlace(Place):
         header.redo_asked.connect(redo)
         header.save_asked.connect(save)
         header.keys_asked.connect(self.keys.switch)
+        header.strip.changed.connect(lambda shown: self.banner.wait(waits=shown))
         self.nothing.new.clicked.connect(self.new_asked)
         self.nothing.study_asked.connect(self.study_asked)
         self.nothing.study_asked.connect(self.areas.focus_form)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from PySide6.QtWidgets import QApplication
+import pytest
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.designer.designer_header import DesignerHeader
 from study_app.gui.widgets.cards import SHADOW
 from study_app.viewmodels.designer.designer_view import HeaderState, StudyChoice
+from study_app.viewmodels.designer.versions.standing import VersionChip
 
 
 def test_the_list_of_studies_is_at_the_edge_where_the_title_has_no_room(qtbot: Any) -> None:
@@ -38,3 +40,21 @@ def test_the_name_of_the_study_comes_before_the_title_of_the_place(qtbot: Any) -
     header.resize(1600, 60)
     QApplication.processEvents()
     assert header.title.isVisible()
+
+
+@pytest.mark.parametrize("width", [900, 1100, 1246])
+def test_the_state_of_the_draft_is_seen_beside_a_long_title(qtbot: Any, width: int) -> None:
+    around = QWidget()
+    qtbot.addWidget(around)
+    header = DesignerHeader()
+    header.setParent(around)
+    header.resize(width, 60)
+    around.resize(width, 60)
+    around.show()
+    study = StudyChoice("Preference between drinking liquids of different thickness, pilot A", "a.toml", "a")
+    problems = ("bad", "warning", "24 problems")
+    version = VersionChip("neutral", "ring", "Not run yet")
+    header.show_state(HeaderState((study,), "a", problems, "Draft kept 22:51", can_save=True, version=version))
+    QApplication.processEvents()
+    assert header.draft.isVisible()
+    assert header.save.geometry().right() <= width

@@ -12,6 +12,7 @@ from study_app.authoring.versions.contents import kept_content
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.sessions.folder_lock import open_alone
+from study_app.viewmodels.designer.play import under_way
 from study_app.viewmodels.designer.requests import ChangeLanguage, SetText, SetValue
 
 pytestmark = pytest.mark.slow
@@ -165,3 +166,17 @@ def test_saving_says_that_the_study_cannot_be_run_until_it_is_edited(drafted: An
     drafted.saving.save()
     assert not drafted.place.banner.isVisible()
     assert drafted.file.read_text() == drafted.text
+
+
+def test_one_line_at_a_time_is_shown_above_the_parts(drafted: Any) -> None:
+    place = drafted.place
+    drafted.file.write_text(drafted.file.read_text() + "# outside\n")
+    drafted.saving.look_again()
+    assert place.banner.isVisible()
+    place.header.strip.show_state(under_way("Welcome", "Scripted hand"))
+    drafted.editing.announce()
+    assert place.header.strip.isVisible()
+    assert not place.banner.isVisible()
+    place.header.strip.show_state(None)
+    assert place.banner.isVisible()
+    assert place.banner_words.text().startswith("Another program changed this file")

@@ -19,9 +19,10 @@ ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
 
 
 class PlayStrip(Card):
-    """Signals: ``asked`` (action), ``left`` when it goes that had the keyboard."""
+    """Signals: ``asked`` (action), ``changed`` (whether there is one), ``left`` when it goes that had the keyboard."""
 
     asked = Signal(str)
+    changed = Signal(bool)
     left = Signal()
 
     def __init__(self) -> None:
@@ -55,6 +56,7 @@ class PlayStrip(Card):
             remove_widget(part)
         self.buttons = {}
         self.setVisible(state is not None)
+        self.changed.emit(state is not None)
         if state is None:
             if had_focus:
                 self.left.emit()
