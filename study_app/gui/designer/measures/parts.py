@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import font
@@ -19,6 +19,7 @@ from study_app.viewmodels.designer.measures.number_cards import (
     Line,
     LinesCard,
     NumberCard,
+    Segment,
     SessionCard,
     TextsCard,
     Verdict,
@@ -101,25 +102,41 @@ class NumberPart(Card):
 
 
 class Strip(Themed, QWidget):
-    """The steps of a session side by side, as wide as they are long; the one that is looked at in accent."""
+    """The steps of a session side by side, as wide as they are long; the one that is looked at in accent.
+
+    ``open_asked`` carries the path of the step that is clicked.
+    """
+
+    open_asked = Signal(object)
 
     def __init__(self) -> None:
         super().__init__()
-        self.segments: tuple[tuple[str, float, bool], ...] = ()
+        self.segments: tuple[Segment, ...] = ()
         self.setFixedHeight(14)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
 
-    def show_segments(self, segments: tuple[tuple[str, float, bool], ...]) -> None:
+    def show_segments(self, segments: tuple[Segment, ...]) -> None:
         """Show other steps."""
         self.segments = segments
-        self.setAccessibleName("Session, in order: " + ", ".join(words for words, _, _ in segments))
-        self.setToolTip("\n".join(words for words, _, _ in segments))
+        listed = [words for words, *_ in segments]
+        self.setAccessibleName("Session, in order: " + ", ".join(listed))
+        self.setToolTip("\n".join((*listed, "Click a step to open it")))
         self.update()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        """Ask to open the step that is clicked."""
+        x = 0.0
+        for _, share, _, path in self.segments:
+            x += share * self.width()
+            if event.position().x() < x:
+                self.open_asked.emit(path)
+                return
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the steps."""
         painter, x = QPainter(self), 0.0
         painter.setPen(Qt.PenStyle.NoPen)
-        for _, share, chosen in self.segments:
+        for _, share, chosen, _ in self.segments:
             width = share * self.width()
             painter.setBrush(QColor(self.theme.accent if chosen else self.theme.ctl))
             painter.setOpacity(1.0 if chosen else 0.45)
@@ -167,6 +184,7 @@ class SessionPart(Made):
         self.add(numbers)
         if shown.segments:
             self.strip = Strip()
+            self.strip.open_asked.connect(self.open_asked)
             self.strip.show_segments(shown.segments)
             self.add(self.strip)
             notes = QWidget()

@@ -14,6 +14,8 @@ EARLIER: Final = "These numbers are of the last valid state: solve the problems 
 NO_FORCES: Final = "Not known until the problems of device and scene are solved."
 Verdict: TypeAlias = tuple[Tone, str, str]
 """Tone, icon and words."""
+Segment: TypeAlias = tuple[str, float, bool, Path]
+"""Words, share of the time, whether it is looked at, and the element."""
 Ticks: TypeAlias = tuple[tuple[float, str], ...]
 Values: TypeAlias = tuple[float, ...]
 
@@ -45,8 +47,8 @@ class SessionCard:
         Numbers with their words.
     aside : str
         The shortest and the longest session.
-    segments : tuple of (str, float, bool)
-        Each step with its share of the time, and whether it is the one that is looked at.
+    segments : tuple of (str, float, bool, path)
+        Each step with its share of the time, whether it is the one that is looked at, and its element.
     notes : tuple of (str, str)
         What is written under the bar: left and right.
     verdicts : tuple of (str, str, str)
@@ -56,7 +58,7 @@ class SessionCard:
     title: str
     figures: tuple[tuple[str, str], ...]
     aside: str = ""
-    segments: tuple[tuple[str, float, bool], ...] = ()
+    segments: tuple[Segment, ...] = ()
     notes: tuple[str, ...] = ()
     verdicts: tuple[Verdict, ...] = ()
 

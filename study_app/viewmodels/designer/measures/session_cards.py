@@ -67,7 +67,7 @@ def session_card(study: Study, facts: Facts, path: Path, parts: int | None = Non
     whole = max(1e-9, sum(facts.steps_s.values()))
     chosen = str(path[1]) if len(path) > 1 else ""
     segments = tuple(
-        (f"{_title(study, step)} {minutes(duration)}", duration / whole, step == chosen)
+        (f"{_title(study, step)} {minutes(duration)}", duration / whole, step == chosen, _path(study, step))
         for step, duration in facts.steps_s.items()
     )
     longest = sorted(facts.steps_s, key=lambda step: -facts.steps_s[step])[:2]
@@ -276,9 +276,12 @@ def warnings_card(
 
 
 def _title(study: Study, name: str, section: str = "") -> str:
+    return title_of(study.document, _path(study, name, section))
+
+
+def _path(study: Study, name: str, section: str = "") -> Path:
     sections = (section,) if section else ("blocks", "pages", "questionnaires")
-    inside = next((one for one in sections if name in study.document.get(one, {})), "blocks")
-    return title_of(study.document, (inside, name))
+    return next((one for one in sections if name in study.document.get(one, {})), "blocks"), name
 
 
 def _sentence(words: str) -> str:

@@ -66,7 +66,7 @@ def test_a_block_of_statements_shows_session_balance_power_and_force() -> None:
     ).cards
     assert isinstance(session, SessionCard)
     assert ("ok", "check", "One page, no scrolling at 1366 × 768") in session.verdicts
-    assert sum(share for _, share, _ in session.segments) == pytest.approx(1.0)
+    assert sum(share for _, share, *_ in session.segments) == pytest.approx(1.0)
     assert isinstance(balance, BalanceCard)
     assert balance.verdict == ("ok", "check", "balanced, 2 rounds of 6")
     assert {count for line in balance.positions for count in line} == {4}
