@@ -51,7 +51,7 @@ class FactsRow(QScrollArea):
         """Take the height of the cards, as far as the window has room for them, or the page above leaves it."""
         self._window_px, self._left_px = window_px, left_px
         most = MOST if window_px >= HIGH_FROM else max(LEAST, round(SHARE * window_px))
-        most = max(most, left_px)
+        most = left_px if left_px > 0 else most
         needed = max(
             self._inside.totalHeightForWidth(self.viewport().width()), self._inside.totalMinimumSize().height()
         )

@@ -13,8 +13,8 @@ from study_app.gui.designer.pane.measure_cards import FactsRow
 from study_app.gui.designer.segments import Segments
 from study_app.gui.widgets.cards import SHADOW
 
-FACTS_FROM, FACTS_FROM_OWN = 740, 560
-"""The height of the window and of the pane from which there is room for facts [px]."""
+FACTS_FROM, FACTS_FROM_OWN, FACTS_LEAST = 740, 560, 110
+"""The height of the window and of the pane from which there is room for facts, and what they need themselves [px]."""
 QWIDGETSIZE_MAX = (1 << 24) - 1
 GAP = 24
 
@@ -130,6 +130,9 @@ class RightPane(QWidget):
         room = not self.isVisible() or self.height() >= FACTS_FROM_OWN
         facts = page is not None and page.with_facts and height >= FACTS_FROM and room
         most = QWIDGETSIZE_MAX if page is None or not facts else page.most_px()
-        self._stack.setMaximumHeight(most)
-        self.facts.make_room(height, self.height() - self._stack.y() - most - self._column.spacing())
+        left = self.height() - self._stack.y() - most - self._column.spacing()
+        if most < QWIDGETSIZE_MAX and self.isVisible() and left < FACTS_LEAST:
+            facts = False  # the page is shown as wide as the pane
+        self._stack.setMaximumHeight(most if facts else QWIDGETSIZE_MAX)
+        self.facts.make_room(height, left)
         self.facts.setVisible(facts)
