@@ -11,7 +11,7 @@ from study_app.authoring.changes.fragments import pasted
 from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import filled_in, languages_of, with_language, without_language
 from study_app.authoring.changes.moves import moved
-from study_app.authoring.changes.series import first_edits, members, next_edits, number_row
+from study_app.authoring.changes.series import check_made, first_edits, members, next_edits, number_row
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of, row_at
 from study_app.authoring.names import deletions, free_name, named_at, references_to, replaced, with_references
@@ -141,6 +141,7 @@ def series(study: Study, asked: MakeSeries) -> Step:
         more = _beside(now, more, made[-1], copy)
         now, _ = now.edited(*more)
         edits, made = (*edits, *more), [*made, copy]
+    check_made(study, now, asked.path, made)
     words = f"Make {counted(len(made), singular(path[0]))} of {title_of(study.document, asked.path)}"
     said = ", ".join(title_of(now.document, one) for one in made)
     return Step(words, edits, path, several=tuple(made), said=said)

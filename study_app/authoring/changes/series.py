@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -11,6 +11,7 @@ from study_app.authoring.additions import duplicated
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import Row, label_of, refused_at, row_at, rows, why_not
 from study_app.authoring.names import references_to, renamed
+from study_app.authoring.outline import title_of
 from study_app.authoring.writer.edits import Edit, Insert, Set
 from study_app.authoring.writer.refused import Refused
 from study_app.haptics.model.liquid import MAX_ID
@@ -54,13 +55,13 @@ def number_rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
     return tuple(_numbers(document, path, _DEEPEST)) if table else ()
 
 
-def series_start(document: Mapping[str, Any], path: Path) -> Path | None:
-    """Return the element that a series begins with: the one at ``path``, of a section its last one with a number."""
+def series_starts(document: Mapping[str, Any], path: Path) -> tuple[Path, ...]:
+    """Return the elements that a series can begin with: the one at ``path``, of a section each one with a number."""
     row = row_at(document, path) if len(path) == 1 else None
     inside = (
         [(*path, name) for name in names(document, str(path[0]))] if row is not None and row.kind == "tables" else []
     )
-    return next((one for one in reversed(inside or [path]) if number_rows(document, one)), None)
+    return tuple(one for one in inside or [path] if number_rows(document, one))
 
 
 def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
@@ -128,6 +129,34 @@ def next_edits(study: Study, previous: Path, row: Row, member: Member) -> tuple[
     ends = {place[:-1]: place[-1] for place in listing if isinstance(place[-1], int)}
     listed = (Insert((*place, at + 1), copy[1]) for place, at in ends.items() if isinstance(at, int))
     return (*edits, *_given(member, copy, previous, row), *listed), copy
+
+
+def check_made(before: Study, after: Study, original: Path, made: Sequence[Path]) -> None:
+    """Refuse a series that adds problems to a study.
+
+    A problem that the element had before, such as a text that is missing, may be that of its copies, too.
+
+    Parameters
+    ----------
+    before, after : Study
+        The study without and with the series.
+    original : tuple of str or int
+        The element before it became the first one of the series.
+    made : sequence of path
+        The elements of the series.
+
+    Raises
+    ------
+    Refused
+        A problem is new.
+    """
+    known = {(fault.path, fault.message) for fault in before.faults}
+    for fault in after.faults:
+        of_made = fault.path[:2] in made
+        if not ({(fault.path, fault.message), (original + fault.path[2:], fault.message) if of_made else None} & known):
+            inside = (label_of(step) for step in fault.path[2:] if isinstance(step, str))
+            where = ", ".join((title_of(after.document, fault.path[:2]), *inside))
+            raise Refused(f"this series would make a problem. {where}: {fault.message}")
 
 
 def _given(member: Member, path: Path, before: Path, row: Row) -> Iterator[Edit]:

@@ -10,12 +10,12 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.outline_rows import ElementPath
 from study_app.viewmodels.designer.prompts import DeletePrompt, SeriesPlan, SeriesPrompt
 from study_app.viewmodels.designer.requests import DeleteElement, MakeSeries
 
 HIGHEST = 560
-LEAST_PLAN_PX, PLAN_PX, LINE_PX = 62, 190, 18
+PLAN_PX = 98
+"""The room for what a series makes, or for why it cannot be made: the buttons below it stay where they are."""
 
 
 class Prompt(Card):
@@ -92,17 +92,32 @@ class DeleteCard(Prompt):
 class SeriesCard(Prompt):
     """Which number of an element differs in a series, its values, and what will be made.
 
-    ``typed`` carries the number and the values so far.
+    ``typed`` carries what would be made so far, ``make_asked`` what is to be made; ``chosen`` the path of another
+    element.
     """
 
-    typed = Signal(object, str)
+    typed = Signal(object)
+    make_asked = Signal(object)
+    chosen = Signal(object)
 
     def __init__(self, asked: SeriesPrompt) -> None:
+        title = asked.title if asked.fields else f"a {asked.title}"
+        it = asked.title if asked.fields else f"The {asked.title}"
         super().__init__(
-            f"Series of {asked.title}",
-            f"{asked.title} gets the first value; each other value makes a copy, listed in the same blocks.",
+            f"Series of {title}",
+            f"{it} gets the first value; each other value makes a copy, listed in the same blocks.",
         )
         self.asked, self.plan = asked, SeriesPlan()
+        self.elements = Choice()
+        self.elements.setFont(font("label"))
+        self.elements.setAccessibleName("Element of which a series is made")
+        self.elements.setPlaceholderText(f"Choose a {asked.title} …")
+        self.elements.setMinimumWidth(180)
+        self.elements.addItems([words for _, words in asked.among])
+        paths = [path for path, _ in asked.among]
+        self.elements.setCurrentIndex(paths.index(asked.path) if asked.path in paths else -1)
+        self.elements.activated.connect(lambda at: self.chosen.emit(paths[at]))
+        self.elements.setVisible(bool(paths))
         self.number = Choice()
         self.number.setFont(font("label"))
         self.number.setAccessibleName("Number that differs")
@@ -113,18 +128,24 @@ class SeriesCard(Prompt):
         self.values.setPlaceholderText("Values, such as 0 60 120 240")
         line = QHBoxLayout()
         line.setSpacing(10)
-        line.addWidget(self.number)
+        for part in (self.elements, self.number):
+            line.addWidget(part)
         line.addWidget(self.values, 1)
         self.column.addLayout(line)
         self.refusal = label("", "label", "bad", wraps=True)
-        self.column.addWidget(self.refusal)
         self.lines = label("", "label")
-        self.lines.setAlignment(Qt.AlignmentFlag.AlignTop)
+        said = QWidget()
+        column = QVBoxLayout(said)
+        column.setContentsMargins(0, 0, 0, 0)
+        for text in (self.refusal, self.lines):
+            text.setAlignment(Qt.AlignmentFlag.AlignTop)
+            column.addWidget(text, 1)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.area.setWidget(self.lines)
-        self.column.addWidget(self.area, 1)
+        self.area.setFixedHeight(PLAN_PX)
+        self.area.setWidget(said)
+        self.column.addWidget(self.area)
         self.make = ActionButton("bars", "", role="primary", height=40)
         self.make.clicked.connect(self._make)
         self.buttons.addWidget(self.make)
@@ -132,8 +153,10 @@ class SeriesCard(Prompt):
         self.values.textEdited.connect(lambda _text: self._type())
         self.values.returnPressed.connect(self._make)
         self.number.activated.connect(lambda _at: self._type())
+        self.number.setEnabled(bool(asked.fields))
+        self.values.setEnabled(bool(asked.fields))
         self.show_plan(self.plan)
-        self.first: QWidget = self.values
+        self.first: QWidget = self.values if asked.fields else self.elements
 
     def show_plan(self, plan: SeriesPlan) -> None:
         """Show what will be made, or why it cannot be."""
@@ -142,22 +165,23 @@ class SeriesCard(Prompt):
         self.refusal.setVisible(bool(plan.refusal))
         self.values.setAccessibleDescription(plan.refusal)
         self.lines.setText("\n".join(plan.lines))
-        self.area.setVisible(bool(plan.lines))
-        wanted = LINE_PX * len(plan.lines) + 8
-        self.area.setMinimumHeight(min(LEAST_PLAN_PX, wanted))  # a low window leaves no room for more
-        self.area.setMaximumHeight(min(PLAN_PX, wanted))
+        self.lines.setVisible(bool(plan.lines))
         self.make.show_action("bars", plan.make)
         self.make.setEnabled(bool(plan.lines))
 
-    def _type(self) -> None:
-        self.typed.emit(self._field, self.values.text())
+    def take_values(self, values: str) -> None:
+        """Take values that were typed for another element."""
+        self.values.setText(values)
+        self._type()
 
-    @property
-    def _field(self) -> ElementPath:
-        return self.asked.fields[self.number.currentIndex()][0]
+    def _type(self) -> None:
+        self.typed.emit(self._request())
+
+    def _request(self) -> MakeSeries:
+        return MakeSeries(self.asked.path, self.asked.fields[self.number.currentIndex()][0], self.values.text())
 
     def _make(self) -> None:
         if self.plan.lines:
-            self.answered.emit(MakeSeries(self.asked.path, self._field, self.values.text()))
+            self.make_asked.emit(self._request())
         elif not self.plan.refusal:
             self.show_plan(SeriesPlan(refusal="Type the values, such as 0 60 120 240."))

@@ -43,7 +43,7 @@ class DesignerPlace(Place):
 
     Signals: ``entered``, ``left``; ``asked`` (a request); ``selected`` (path) and ``back_asked``; ``study_asked``
     (source), ``new_asked``, ``begin_asked`` (source, name, answers); ``undo_asked``, ``redo_asked``, ``save_asked``;
-    ``add_asked``, ``series_asked`` (path), ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``;
+    ``add_asked``, ``series_asked``, ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``;
     ``repair_asked`` (row, words); ``find_changed``; ``banner_asked`` (action); ``id_typed`` (path, id).
     """
 
@@ -286,7 +286,7 @@ class DesignerPlace(Place):
     def _take_asked(self, asked: object) -> None:
         """Hand on a request; those of the place itself are done here."""
         if isinstance(asked, AskSeries):
-            self.series_asked.emit(asked.path)
+            self.series_asked.emit(asked)
         elif isinstance(asked, GoTo):
             self._go_to(asked.element, asked.field)
         else:
@@ -323,7 +323,7 @@ class DesignerPlace(Place):
     def _series(self) -> None:
         if self.view.form is not None:
             self.flush()
-            self.series_asked.emit(self.view.form.path)
+            self.series_asked.emit(AskSeries(self.view.form.path))
 
     def _delete(self) -> None:
         path, also = self._several()

@@ -12,6 +12,7 @@ from study_app.authoring.outline import title_of
 from study_app.authoring.writer.refused import Refused
 from study_app.number_text import exact_text
 from study_app.protocol.source.document import Path
+from study_app.viewmodels.designer.requests import AskSeries
 from study_app.viewmodels.sessions import counted
 
 
@@ -50,16 +51,19 @@ class SeriesPrompt:
     Attributes
     ----------
     path : tuple of str or int
-        The element.
+        The element, () where it is still to be chosen.
     title : str
-        What it is called.
+        What it is called; of one to be chosen its kind, such as "condition".
     fields : tuple of (path, str)
         Its numbers, each with its words and unit.
+    among : tuple of (path, str)
+        The elements that it is chosen from, each with its title; () where there is one only.
     """
 
     path: Path
     title: str
     fields: tuple[tuple[Path, str], ...]
+    among: tuple[tuple[Path, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +85,17 @@ class SeriesPlan:
     make: str = "Make the series"
 
 
-def series_prompt(study: Study, path: Path) -> SeriesPrompt | None:
-    """Return what a series of an element is asked for with; None of what has no numbers."""
-    fields = tuple((row.path, _in_words(row)) for row in number_rows(study.document, path))
-    return SeriesPrompt(path, title_of(study.document, path), fields) if fields else None
+def series_prompt(study: Study, asked: AskSeries) -> SeriesPrompt | None:
+    """Return what a series is asked for with; None where no element has a number."""
+    document = study.document
+    among = [path for path in dict.fromkeys(asked.among) if number_rows(document, path)]
+    path = among[0] if len(among) == 1 else asked.path
+    fields = tuple((row.path, _in_words(row)) for row in number_rows(document, path))
+    choices = tuple((one, title_of(document, one)) for one in among) if len(among) > 1 else ()
+    if not fields and not choices:
+        return None
+    title = title_of(document, path) if fields else singular(among[0][0])
+    return SeriesPrompt(path if fields else (), title, fields, choices)
 
 
 def series_plan(study: Study, path: Path, field: Path, values: str) -> SeriesPlan:
@@ -95,13 +106,19 @@ def series_plan(study: Study, path: Path, field: Path, values: str) -> SeriesPla
         row = number_row(study.document, path, field)
         made = members(study, path, row, values)
     except Refused as refusal:
-        return SeriesPlan(refusal=f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.")
+        return refused_plan(refusal)
     first = made[0].title if made[0].titles or made[0].name != path[1] else title_of(study.document, path)
     lines = (
         f"{first if at == 0 else one.title}: {exact_text(one.value)} {row.unit}".rstrip() + f"  ·  {one.name}"
         for at, one in enumerate(made)
     )
     return SeriesPlan(tuple(lines), make=f"Make {counted(len(made), singular(path[0]))}")
+
+
+def refused_plan(refusal: Refused) -> SeriesPlan:
+    """Return the plan of a series that cannot be made."""
+    words = str(refusal).rstrip(".")
+    return SeriesPlan(refusal=f"{words[:1].upper()}{words[1:]}.")
 
 
 def _in_words(row: Row) -> str:

@@ -193,9 +193,13 @@ class Several:
 
 @dataclass(frozen=True, slots=True)
 class AskSeries:
-    """Ask for the values of a series of an element; a step of the place, not of the study."""
+    """Ask for the values of a series; a step of the place, not of the study.
+
+    ``path`` is the element, () where it is to be chosen, ``among`` what it is chosen from.
+    """
 
     path: Path
+    among: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

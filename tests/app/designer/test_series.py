@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 
 from study_app.gui.designer.prompts import SeriesCard
 from study_app.viewmodels.designer.prompts import series_plan
-from study_app.viewmodels.designer.requests import MakeSeries
+from study_app.viewmodels.designer.requests import AskSeries, MakeSeries
 
 pytestmark = pytest.mark.slow
 
@@ -84,15 +84,21 @@ def test_values_are_refused_in_the_card_and_enter_then_makes_nothing(qtbot: Any,
 
 
 def test_another_number_is_chosen_and_the_series_made_by_the_mouse(qtbot: Any, water: Any) -> None:
+    water.select(("liquids", "thin"))
     qtbot.mouseClick(water.place.form.head.series, LEFT)
     shown = card(water)
-    shown.number.setCurrentIndex(shown.number.findText("Force loss"))
+    shown.number.setCurrentIndex(shown.number.findText("Viscosity [Pa·s]"))
     shown.number.activated.emit(shown.number.currentIndex())
-    qtbot.keyClicks(shown.values, "0, 0.25")
+    qtbot.keyClicks(shown.values, "1, 2.5")
     qtbot.mouseClick(shown.make, LEFT)
-    conditions = document(water)["conditions"]
-    assert conditions["thin_0_25"]["force_loss"] == 0.25
-    assert "delay_ms" not in conditions["thin_0_25"] or conditions["thin_0_25"]["delay_ms"] == 0
+    liquids = document(water)["liquids"]
+    assert liquids["thin_2_5"]["viscosity_pa_s"] == 2.5
+    assert liquids["thin_2_5"]["density_kg_m3"] == liquids["thin"]["density_kg_m3"]
+
+
+def test_a_number_of_another_format_is_refused(qtbot: Any, water: Any) -> None:
+    water.editing.ask(MakeSeries(CONDITION, (*CONDITION, "force_loss"), "0, 0.25"))
+    assert "Thin, Force loss: belongs to format 2" in water.place.form.own.text()
 
 
 def test_a_series_is_offered_in_the_list_of_conditions_and_at_headings(qtbot: Any, designer: Any) -> None:
@@ -101,19 +107,71 @@ def test_a_series_is_offered_in_the_list_of_conditions_and_at_headings(qtbot: An
     designer.select(LISTED[:2])
     assert head.series.isVisible()  # of blocks
     field = designer.row(*LISTED).field
-    for chosen, name in (((0,), "thin"), ((), "thick")):
+    for chosen, path in (((0,), CONDITION), ((1,), ("conditions", "thick")), ((), ()), ((0, 1), ())):
         field = designer.row(*LISTED).field
         field.choose(chosen)
         qtbot.mouseClick(field.series, LEFT)
-        assert card(designer).asked.path == ("conditions", name)
+        assert card(designer).asked.path == path
         designer.place.close_prompt()
         designer.select(LISTED[:2])
     designer.select(LISTED[2:])
     qtbot.mouseClick(head.series, LEFT)
-    assert card(designer).asked.path == ("conditions", list(document(designer)["conditions"])[-1])
+    assert [path for path, _ in card(designer).asked.among] == [
+        ("conditions", name) for name in document(designer)["conditions"]
+    ]
+    assert card(designer).asked.path == ()
     for path in (("study",), ("scene",)):
         designer.select(path)
         assert not head.series.isVisible()
+
+
+def test_a_series_of_a_list_asks_which_condition_it_is_of(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(LISTED[:2])
+    qtbot.mouseClick(designer.row(*LISTED).field.series, LEFT)
+    shown = card(designer)
+    assert shown.elements.hasFocus()
+    assert shown.elements.currentIndex() == -1
+    assert not shown.values.isEnabled()
+    assert not shown.make.isEnabled()
+    for path in (CONDITION, ("conditions", "thick")):
+        qtbot.keyClick(card(designer).elements, Qt.Key.Key_Down)
+        assert card(designer).elements.hasFocus()
+        assert designer.editing.selected == card(designer).asked.path == path
+    qtbot.keyClicks(card(designer).values, "0 60")
+    qtbot.keyClick(card(designer).elements, Qt.Key.Key_Up)
+    assert card(designer).asked.path == CONDITION
+    assert card(designer).values.text() == "0 60"
+    qtbot.waitUntil(lambda: "differ in liquid and in delay" in card(designer).refusal.text())  # of the block
+
+
+def test_a_series_that_would_make_a_problem_is_refused_while_it_is_typed(qtbot: Any, water: Any) -> None:
+    water.editing.ask(MakeSeries(CONDITION, (*CONDITION, "delay_ms"), "0 60"))
+    before = water.text
+    water.place.series_asked.emit(AskSeries(CONDITION))
+    values = card(water).values
+    qtbot.keyClicks(values, "0 60")
+    qtbot.keyClick(values, Qt.Key.Key_Return)  # before the keys rest
+    assert '"thin_60" presents the same as "thin_60_2"' in card(water).refusal.text()
+    assert not card(water).make.isEnabled()
+    qtbot.keyClick(values, Qt.Key.Key_Return)
+    assert water.text == before
+    qtbot.keyClick(values, Qt.Key.Key_Backspace)
+    qtbot.keyClicks(values, "1")
+    assert card(water).refusal.text() == ""
+    assert card(water).make.text() == "Make 2 conditions"
+
+
+def test_the_button_of_a_series_stays_where_it_is_while_values_are_typed(qtbot: Any, water: Any) -> None:
+    water.place.series_asked.emit(AskSeries(CONDITION))
+    shown = card(water)
+    bottoms = set()
+    for typed in ("", "0", "0 60 120", "0 6x", " ".join(map(str, range(0, 240, 10)))):
+        shown.values.selectAll()
+        qtbot.keyClicks(shown.values, typed) if typed else None
+        qtbot.wait(20)
+        bottoms.add(shown.make.mapTo(shown.window(), shown.make.rect().bottomRight()).toTuple())
+    assert len(bottoms) == 1
 
 
 @pytest.mark.parametrize("word", ["series", "levels", "delays"])
@@ -180,7 +238,7 @@ def test_blocks_of_a_series_get_letters_titles_and_places_in_the_session(designe
 
 def test_a_long_series_leaves_its_buttons_free_in_a_low_window(qtbot: Any, water: Any) -> None:
     water.window.resize(1024, 640)
-    water.place.series_asked.emit(CONDITION)
+    water.place.series_asked.emit(AskSeries(CONDITION))
     shown = card(water)
     qtbot.keyClicks(shown.values, " ".join(map(str, range(0, 240, 10))))
     qtbot.wait(50)

@@ -60,10 +60,10 @@ class ConditionsField(EntriesField):
         self.box.addLayout(below)
 
     def _ask_for_series(self) -> None:
-        """Ask for a series of the selected condition, of the last one where none or several are."""
-        at = self.chosen[0] if len(self.chosen) == 1 else len(self.row.entries) - 1
-        if target := self.row.entries[at].target:
-            self.asked.emit(AskSeries(target))
+        """Ask for a series of the selected condition; where none or several are, which one is asked, too."""
+        among = [entry.target for entry in self.row.entries if entry.target]
+        path = self.row.entries[self.chosen[0]].target if len(self.chosen) == 1 else None
+        self.asked.emit(AskSeries(path or (), tuple(among)))
 
     def entry_row(self, entry: Entry, words: str, *, grip: bool) -> EntryRow:
         """Return the row of a condition."""
