@@ -93,7 +93,7 @@ class Steps:
             return replace(move_to(study, MoveTo(asked.entries, asked.to)), select=None, several=())
         if isinstance(asked, DuplicateEntries):
             step = duplicate(study, DuplicateElement(asked.entries[0], asked.entries[1:]))
-            return replace(step, select=None, several=())
+            return replace(step, select=None, several=(), fresh=False)
         if isinstance(asked, RenameElement):
             edits = renamed(study.document, asked.path, asked.name)
             after = asked.path if isinstance(asked.path[-1], int) else (*asked.path[:-1], asked.name)

@@ -126,7 +126,7 @@ def duplicate(study: Study, asked: DuplicateElement) -> Step:
         edits = (*edits, *made)
         now, _ = now.edited(*made)
     words = f"Duplicate {_titles(study, (asked.path, *asked.also))}"
-    return Step(words, edits, copies[0] if len(copies) > 1 else copies[-1], several=tuple(copies))
+    return Step(words, edits, copies[0], several=tuple(copies), fresh=len(copies) == 1)
 
 
 def series(study: Study, asked: MakeSeries) -> Step:

@@ -338,14 +338,14 @@ class DesignerPlace(Place):
             self.asked.emit(MoveElement(path, by, also))
 
     def show_step(self, several: tuple[ElementPath, ...], said: str, *, fresh: bool) -> None:
-        """Select the elements of a step together, say what it did, and lead to the first text of a new element."""
+        """Select the elements of a step together, say what it did, and lead to the first text of a new one."""
         if len(several) > 1:
             self.outline.select_several(several)
         if said:
             say(self, said)
         if fresh:
             self.parts.show_side("form")
-            self.form.focus_first_text()
+            self.form.focus_first_text(filled=bool(several))  # a copy has its texts
 
     def _ask_for_repair(self, row: ProblemRow, words: str) -> None:
         self.flush()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
 
@@ -84,8 +84,10 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
     shown, words = outline(study), find.strip()
     fields = found_in_elements(study, words)
     rows: list[OutlineRow] = []
+    titles = _titles((*shown.parts, *shown.session, *shown.study))
     for heading, elements in zip(SECTIONS, (shown.session, shown.parts, shown.study), strict=True):
-        inner = [_row(study, element, times_s, in_session=heading == SECTIONS[0]) for element in elements]
+        named = [replace(one, title=titles[one.path]) for one in elements]
+        inner = [_row(study, element, times_s, in_session=heading == SECTIONS[0]) for element in named]
         if words:
             inner = [row for row in inner if len(row.path) > 1 or heading == SECTIONS[2]]
             inner = [kept for row in inner if (kept := _found(study, row, words, fields.get(row.path))) is not None]
@@ -93,6 +95,15 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
         if inner:
             rows += [OutlineRow((), heading, note=total, name=heading), *inner]
     return tuple(rows)
+
+
+def _titles(elements: Sequence[Element]) -> dict[Path, str]:
+    """Return what each element is called; after a title that an earlier one of its section has stands its id."""
+    first: dict[tuple[Path, str], Path] = {}
+    for one in elements:
+        first.setdefault((one.path[:-1], one.title), one.path)
+    mine = {one.path: first[one.path[:-1], one.title] == one.path for one in elements}
+    return {one.path: one.title if mine[one.path] else f"{one.title} ({one.id})" for one in elements}
 
 
 def _found(study: Study, row: OutlineRow, words: str, field: FoundField | None) -> OutlineRow | None:

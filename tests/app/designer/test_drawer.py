@@ -84,6 +84,21 @@ def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: 
     assert ("blocks", "liquids") not in expanded(small)
 
 
+def test_a_copy_closes_the_drawer_and_has_the_keyboard_in_its_first_text(qtbot: Any, small: Any) -> None:
+    small.editing.select(("blocks", "liquids"))
+    open_drawer(qtbot, small)
+    qtbot.keyClick(small.place.outline.tree, KEY.Key_D, CONTROL)
+    QApplication.processEvents()
+    assert small.editing.selected == ("blocks", "liquids_2")
+    assert not small.place.outline.isVisible()
+    text = QApplication.focusWidget()
+    assert small.row("blocks", "liquids_2", "title").isAncestorOf(text)
+    assert text.selectedText() == text.text() == "Baseline settings"
+    titles = {row.path: row.title for row in small.place.outline.rows}
+    assert titles["blocks", "liquids"] == "Baseline settings"
+    assert titles["blocks", "liquids_2"] == "Baseline settings (liquids_2)"
+
+
 @pytest.mark.parametrize("part", ["words", "tree"])
 def test_esc_closes_the_drawer(qtbot: Any, small: Any, part: str) -> None:
     open_drawer(qtbot, small)

@@ -330,13 +330,16 @@ class FormCard(Card):
         if self.rows:
             self.focus(self.rows[0].row.row.path)
 
-    def focus_first_text(self) -> None:
-        """Give the keyboard to the first empty text, else to the first text, marked, else to the first row."""
+    def focus_first_text(self, *, filled: bool) -> None:
+        """Give the keyboard to the first text, marked, before it to an empty one unless all are filled in.
+
+        A form without texts gives it to its first row.
+        """
         texts = [part for row in self.rows for part in row.field.findChildren(QWidget)]
         lines = [part for part in texts if isinstance(part, TypedLine | TypedText)]
         words = [part for part in lines if isinstance(part.parent(), LanguagesField)]
-        found = next((part for part in lines if not part.words() and not part.placeholderText()), None)
-        found = found or next(iter(words), None)
+        empty = (part for part in lines if not filled and not part.words() and not part.placeholderText())
+        found = next(iter((*empty, *words)), None)
         if found is None:
             self.focus_first()
             return
