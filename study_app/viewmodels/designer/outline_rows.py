@@ -1,4 +1,4 @@
-"""The rows of the outline: the session in order, the parts of the study, and the study itself."""
+"""The rows of the outline: the study itself, its session in order, its parts, and its settings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ ICONS: Final = {
 """The icon of each section; a section that is not listed has a ring."""
 PAGES: Final[Mapping[Any, str]] = {"consent": "pen", "break": "pause", "debrief": "flag"}
 """The icon of a page by its kind, where it is not that of every page."""
-SECTIONS: Final = ("Session, in order", "Parts it is made of", "The study itself")
+SECTIONS: Final = ("Session, in order", "Parts it is made of", "Settings")
+"""The headings; above them is the study itself, with its title, description and languages."""
+SESSION, PARTS, SETTINGS = SECTIONS
 FIRST: Final = ("study",)
 """What is selected where nothing else is."""
 
@@ -85,15 +87,17 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
     fields = found_in_elements(study, words)
     rows: list[OutlineRow] = []
     titles = _titles((*shown.parts, *shown.session, *shown.study))
-    for heading, elements in zip(SECTIONS, (shown.session, shown.parts, shown.study), strict=True):
+    settings = [one for one in shown.study if one.path != FIRST]
+    own = [one for one in shown.study if one.path == FIRST]
+    for heading, elements in (("", own), (SESSION, shown.session), (PARTS, shown.parts), (SETTINGS, settings)):
         named = [replace(one, title=titles[one.path]) for one in elements]
-        inner = [_row(study, element, times_s, in_session=heading == SECTIONS[0]) for element in named]
+        inner = [_row(study, element, times_s, in_session=heading == SESSION) for element in named]
         if words:
-            inner = [row for row in inner if len(row.path) > 1 or heading == SECTIONS[2]]
+            inner = [row for row in inner if len(row.path) > 1 or heading in {"", SETTINGS}]
             inner = [kept for row in inner if (kept := _found(study, row, words, fields.get(row.path))) is not None]
-        total = minutes(sum(times_s.values())) if times_s and heading == SECTIONS[0] else ""
+        total = minutes(sum(times_s.values())) if times_s and heading == SESSION else ""
         if inner:
-            rows += [OutlineRow((), heading, note=total, name=heading), *inner]
+            rows += [*([OutlineRow((), heading, note=total, name=heading)] if heading else []), *inner]
     return tuple(rows)
 
 

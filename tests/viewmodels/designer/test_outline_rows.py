@@ -25,8 +25,10 @@ def test_the_session_comes_in_order_with_its_times(study: Study) -> None:
     rows = outline_rows(study, times)
     headings = [row.title for row in rows if not row.path]
     assert headings == list(SECTIONS)
+    assert [row.path or row.title for row in rows[:3]] == [("study",), SECTIONS[0], ("pages", "consent")]
+    assert [row.path for row in rows].count(("study",)) == 1
     end = next(at for at, row in enumerate(rows) if row.title == SECTIONS[1])
-    steps = [row for row in rows[1:end] if row.depth == 1]
+    steps = [row for row in rows[2:end] if row.depth == 1]
     assert [row.path[-1] for row in steps] == list(study.document["sequence"])
     assert all(row.note for row in steps)
     counts = {row.title: row.note for row in rows[end:] if row.depth == 1}
