@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QRectF, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout
 
 from study_app.gui.participant.pages.screen_reader import say
+from study_app.gui.theme.theme import RADIUS_CARD
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
-from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.designer_view import Banner
@@ -21,9 +23,12 @@ class BannerCard(Card):
     def __init__(self) -> None:
         super().__init__(padding=10, gap=6)
         self.words = label("", "label", wraps=True)
+        self.sign = Icon("info", "accent", 20)
         self.buttons: list[ActionButton] = []
         self._there = self._waits = False
         self._row = QHBoxLayout()
+        self._row.setSpacing(10)
+        self._row.addWidget(self.sign)
         self._row.addWidget(self.words, 1)
         self.column.addLayout(self._row)
         self.hide()
@@ -32,6 +37,15 @@ class BannerCard(Card):
         """Hide while another line is shown; one line at a time leaves the parts their room."""
         self._waits = waits
         self.setVisible(self._there and not waits)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint a tinted surface with an accent edge, unlike the cards of the study."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QColor(self.theme.accent))
+        painter.setBrush(QColor(self.theme.selected))
+        body = QRectF(self.rect()).adjusted(SHADOW, SHADOW - 1, -SHADOW, -SHADOW - 1).adjusted(0.5, 0.5, -0.5, -0.5)
+        painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
 
     def show_banner(self, banner: Banner | None) -> None:
         """Show another banner; None hides it."""
@@ -48,7 +62,7 @@ class BannerCard(Card):
             remove_widget(button)
         self.buttons = []
         for action, words in banner.actions:
-            made = ActionButton("", words, height=36)
+            made = ActionButton("", words, role="primary" if action == "copy" else "", height=36)
             made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
             apply_theme_within(made, self.theme)
             self._row.addWidget(made)

@@ -14,6 +14,7 @@ from study_app.viewmodels.designer.prompts import DeletePrompt, SeriesPlan, Seri
 from study_app.viewmodels.designer.requests import DeleteElement, MakeSeries
 
 HIGHEST = 560
+PLACES_PX = 200
 PLAN_PX = 98
 """The room for what a series makes, or for why it cannot be made: the buttons below it stay where they are."""
 
@@ -57,16 +58,14 @@ class DeleteCard(Prompt):
         column.setContentsMargins(0, 0, 0, 0)
         for words in asked.references:
             column.addWidget(label(words, "label"))
-        column.addStretch()
         area = QScrollArea()
         area.setWidgetResizable(True)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         area.setWidget(inside)
-        area.setMinimumHeight(min(200, 26 * count + 8))
-        self.column.addWidget(area, 1)
+        area.setFixedHeight(min(PLACES_PX, inside.sizeHint().height()))
+        self.column.addWidget(area)
         if asked.together:
-            words = f"Delete them too deletes, besides: {', '.join(asked.together)}."
-            self.column.addWidget(label(words, "label", wraps=True))
+            self.column.addWidget(label(f"Also deletes: {', '.join(asked.together)}.", "label", wraps=True))
         self.all = ActionButton("trash", "Delete them too", role="danger", height=40)
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(asked.path, "all", also=asked.also)))
         self.gaps = ActionButton("", "Leave the gaps", height=40)

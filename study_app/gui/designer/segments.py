@@ -54,7 +54,7 @@ class _Segment(Themed, QAbstractButton):
         body = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         if self.isChecked():
             painter.setPen(QPen(QColor(t.accent if self.isEnabled() else t.ctl), 1.2))
-            painter.setBrush(QColor(t.surface))
+            painter.setBrush(QColor(t.surface if self.isEnabled() else t.sunk))
             painter.drawRoundedRect(body, RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
         painter.setPen(QColor(t.text if self.isChecked() else t.text2))
         painter.setFont(font("label", weight=600 if self.isChecked() else 500))

@@ -97,9 +97,9 @@ class DesignerPlace(Place):
         column = QVBoxLayout(main)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(10)
-        column.addWidget(self.header)
-        column.addWidget(self.banner)
-        column.addWidget(self.nothing, 1)
+        column.addWidget(self.nothing, 1)  # first, as Tab goes
+        column.insertWidget(0, self.header)
+        column.insertWidget(1, self.banner)
         column.addWidget(self.parts, 1)
         self.stack = QStackedWidget()
         self.stack.addWidget(main)
@@ -169,6 +169,7 @@ class DesignerPlace(Place):
                 "back": self.back_asked.emit, "duplicate": self._duplicate, "series": self._series,
                 "rename": self._rename,
                 "up": lambda: self._move_by(-1), "down": lambda: self._move_by(1),
+                "new": lambda: None if self.stack.currentIndex() else self._ask(self.new_asked),
                 "save": save, "undo": undo, "redo": redo, "keys": self.keys.switch,
             },
         )  # fmt: skip
@@ -375,7 +376,7 @@ class DesignerPlace(Place):
 
     def focusNextPrevChild(self, forward: bool) -> bool:  # noqa: N802 - Qt's name
         """Let Tab go through the parts as they are seen."""
-        parts = [self.header, self.banner, self.nothing, *self.parts.in_order]
+        parts = [self.nothing, self.header, self.banner, *self.parts.in_order]
         return go_on(parts, super().focusNextPrevChild, forward=forward)
 
     def wants_narrow_rail(self) -> bool:

@@ -171,7 +171,7 @@ QPushButton[role='stop']:focus {{ border: 3px solid {t.text}; }}
 
 def _fields(t: Theme) -> str:
     field = "QLineEdit, QComboBox, QSpinBox, QPlainTextEdit"
-    focused = ", ".join(f"{name}:focus" for name in field.split(", "))
+    focused, disabled = (", ".join(f"{name}:{state}" for name in field.split(", ")) for state in ("focus", "disabled"))
     return f"""
 {field} {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl}; border-radius: {RADIUS_CONTROL}px;
   padding: 7px 12px; min-height: 24px; selection-background-color: {t.accent}; selection-color: {t.on_accent}; }}
@@ -183,6 +183,7 @@ QPlainTextEdit[dense='true']:focus, QPlainTextEdit[dense='true'][state='refused'
 QLineEdit[state='changed'], QComboBox[state='changed'] {{ border: 2px solid {t.accent}; padding: 2px 5px; }}
 QPlainTextEdit[state='refused'] {{ border: 2px solid {t.bad}; }}
 QLineEdit[state='refused'] {{ border: 2px solid {t.bad}; padding: 2px 5px; }}
+{disabled}, QLineEdit:read-only {{ background: {t.sunk}; color: {t.text2}; border-color: {t.sunk}; }}
 QComboBox {{ combobox-popup: 0; }}
 QComboBox::drop-down {{ border: none; width: 28px; }}
 QComboBox QAbstractItemView {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};

@@ -154,7 +154,7 @@ def test_the_question_before_a_delete_says_what_goes(designer: Any) -> None:
     designer.place.form.head.delete.click()
     said = [one.text() for one in designer.place.prompt.findChildren(QLabel)]
     assert "Condition Practice: Liquid" in said
-    assert "Delete them too deletes, besides: Block Practice, Condition Practice." in said
+    assert "Also deletes: Block Practice, Condition Practice." in said
     designer.place.prompt.all.click()
     assert "practice" not in designer.editing.opened.study.document["blocks"]
     assert not designer.editing.opened.study.faults
@@ -165,5 +165,5 @@ def test_the_question_before_a_delete_names_elements_and_no_places_of_lists(desi
     designer.select(("liquids", "thick"))
     designer.place.form.head.delete.click()
     said = [one.text() for one in designer.place.prompt.findChildren(QLabel)]
-    (besides,) = (words for words in said if words.startswith("Delete them too deletes"))
-    assert besides == "Delete them too deletes, besides: Condition Thick."
+    (besides,) = (words for words in said if words.startswith("Also deletes"))
+    assert besides == "Also deletes: Condition Thick."

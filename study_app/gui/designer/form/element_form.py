@@ -286,8 +286,9 @@ class FormCard(Card):
                 made.field.choose(self._chosen[1])
         made.field.came.connect(lambda: self._come(made))
         made.field.setEnabled(not self.read_only or row.row.kind in {"list", "tables", "references", "reference"})
-        if made.remove is not None:
-            made.remove.setEnabled(not self.read_only)
+        for part in (made.remove, made.keys):
+            if part is not None:
+                part.setEnabled(not self.read_only)
         for entry in made.field.findChildren(EntryRow):
             entry.grip = entry.grip and not self.read_only
         self._made.append(made)

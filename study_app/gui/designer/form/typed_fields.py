@@ -210,8 +210,9 @@ class TypedText(_Typed, QPlainTextEdit):
 class TypedSentence(TypedText):
     """A sentence in as many lines as it takes, as far as there is room for them; Enter accepts it."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, *, most_lines: int = MOST_LINES) -> None:
         super().__init__(name)
+        self._most_lines = most_lines
         self.setProperty("dense", "true")
         self.document().setDocumentMargin(0)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -223,7 +224,7 @@ class TypedSentence(TypedText):
         while block.isValid():
             needed += self.document().documentLayout().blockBoundingRect(block).height()
             block = block.next()
-        most = MOST_LINES * self.fontMetrics().lineSpacing()
+        most = self._most_lines * self.fontMetrics().lineSpacing()
         scrolls = Qt.ScrollBarPolicy.ScrollBarAsNeeded if needed > most else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
         self.setVerticalScrollBarPolicy(scrolls)
         self.setFixedHeight(max(FIELD_PX, min(most, math.ceil(needed)) + SENTENCE_EDGE_PX))

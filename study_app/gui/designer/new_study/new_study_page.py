@@ -28,6 +28,7 @@ from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.gui.widgets.main_view import last_focused
 from study_app.viewmodels.designer.designer_view import StudyChoice
+from study_app.viewmodels.designer.keys import key_cap, tip
 from study_app.viewmodels.designer.new_study import TemplateChoice
 
 SIDE_PX, SIDE_NARROW_PX, NARROW_BELOW = 400, 330, 1200
@@ -43,7 +44,9 @@ class NoStudyCard(Card):
     def __init__(self) -> None:
         super().__init__(padding=28, gap=12)
         self.drafts: list[ActionButton] = []
-        self.new = ActionButton("plus", "New study …", role="primary")
+        self.new = ActionButton("plus", "New study …", cap=key_cap("new"), role="primary")
+        self.new.setAccessibleName(tip("new"))
+        self.new.setToolTip(tip("new"))
         self.column.addStretch(2)
         for part in (
             Icon("designer", "accent", 44),
@@ -65,9 +68,6 @@ class NoStudyCard(Card):
             apply_theme_within(made, self.theme)
             self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignHCenter)
             self.drafts.append(made)
-        self.new.raise_()  # the last of the children: so Tab goes to it last
-        for before, after in pairwise((*self.drafts, self.new)):
-            QWidget.setTabOrder(before, after)
 
 
 class ChosenCard(Card):
