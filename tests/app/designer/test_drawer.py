@@ -84,6 +84,24 @@ def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: 
     assert ("blocks", "liquids") not in expanded(small)
 
 
+def test_an_edit_and_its_undo_leave_what_is_seen_and_what_is_closed(qtbot: Any, small: Any) -> None:
+    tree = small.place.outline.tree
+    small.editing.select(("blocks", "liquids"))
+    open_drawer(qtbot, small)
+    tree.collapse(index_of(small, "blocks", "liquids"))
+    tree.verticalScrollBar().setValue(400)
+    before = expanded(small), tree.verticalScrollBar().value()
+    assert before[1] == 400
+    small.editing.ask(SetText(("blocks", "liquids", "title"), "en", "Another title"))
+    small.controller.show_outline()
+    QApplication.processEvents()
+    assert (expanded(small), tree.verticalScrollBar().value()) == before
+    small.editing.undo()
+    small.controller.show_outline()
+    QApplication.processEvents()
+    assert (expanded(small), tree.verticalScrollBar().value()) == before
+
+
 def test_a_copy_closes_the_drawer_and_has_the_keyboard_in_its_first_text(qtbot: Any, small: Any) -> None:
     small.editing.select(("blocks", "liquids"))
     open_drawer(qtbot, small)

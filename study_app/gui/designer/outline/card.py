@@ -121,7 +121,8 @@ class OutlineCard(Card):
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
         """Show rows; what was open stays open."""
         if rows != self.rows:
-            several = self.selected
+            several, current = self.selected, self.tree.currentIndex()
+            before = current.data(ROW_ROLE).path if current.isValid() else None
             self.rows = rows
             self._filling = True
             scrolled = self.tree.verticalScrollBar().value()
@@ -142,15 +143,16 @@ class OutlineCard(Card):
                 if self._key(index) in self._opened or self._finding:
                     self.tree.expand(index)
             self._finding = False
+            self.tree.doItemsLayout()  # without it there is nothing to scroll
             self.tree.verticalScrollBar().setValue(scrolled)
             self._filling = False
-            self.mark(selected)
+            self.mark(selected, reveals=selected != before)
             if selected in several and len(several) > 1:
                 self.select_several(several)
         self.mark(selected)
 
-    def mark(self, path: object) -> None:
-        """Mark the row of an element, the nearest to the one that is marked."""
+    def mark(self, path: object, *, reveals: bool = True) -> None:
+        """Mark the row of an element; ``reveals`` opens what it is in, and scrolls to it."""
         current = self.tree.currentIndex()
         if current.isValid() and current.data(ROW_ROLE).path == path:
             return
@@ -160,13 +162,17 @@ class OutlineCard(Card):
             self.tree.clearSelection()
             self.tree.setCurrentIndex(QModelIndex())
         else:
-            if found.parent().isValid():
+            if reveals and found.parent().isValid():
                 self.tree.expand(found.parent())
-            if "blocks" in path[:1]:  # type: ignore[index]  # a path
+            if reveals and "blocks" in path[:1]:  # type: ignore[index]  # a path
                 self.tree.expand(found)
+            down = self.tree.verticalScrollBar().value()
             flags = QItemSelectionModel.SelectionFlag
             self.tree.selectionModel().setCurrentIndex(found, flags.ClearAndSelect)
-            self.tree.scrollTo(found)
+            if reveals:
+                self.tree.scrollTo(found)
+            else:  # Qt scrolls to it, too
+                self.tree.verticalScrollBar().setValue(down)
         self._filling = False
 
     def _open_menu(self, at: QPoint) -> None:
