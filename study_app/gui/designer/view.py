@@ -344,7 +344,8 @@ class DesignerPlace(Place):
             self.outline.select_several(several)
         if said:
             say(self, said)
-        if fresh:
+        beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
+        if fresh and not (several and beside):  # a copy made in an outline beside the form is gone on with there
             self.parts.show_side("form")
             self.form.focus_first_text(filled=bool(several))  # a copy has its texts
 

@@ -8,6 +8,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.gui.designer.form.languages_field import LanguagesField
+from study_app.gui.designer.form.typed_fields import TypedText
 from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.viewmodels.designer.requests import SetValue
 
@@ -45,7 +47,15 @@ def test_a_duplicate_is_selected_everywhere_and_has_the_keyboard(
     assert designer.editing.selected == copy
     assert designer.place.form.form.path == copy
     assert outline.selected == (copy,)
-    assert tree.hasFocus() if area == "outline" else first_row(designer).isAncestorOf(keyboard)
+    texts = [row for row in designer.place.form.rows if isinstance(row.field, LanguagesField)]
+    if area == "outline" and width == 1600:
+        assert tree.hasFocus()
+    elif texts:
+        assert texts[0].isAncestorOf(keyboard)
+        chosen = keyboard.textCursor().selectedText() if isinstance(keyboard, TypedText) else keyboard.selectedText()
+        assert chosen == keyboard.words() != ""
+    else:
+        assert first_row(designer).isAncestorOf(keyboard)
     assert press(qtbot, KEY.Key_1, CONTROL) is tree
     assert tree.currentIndex().data(ROW_ROLE).path == copy
     assert tree.viewport().rect().contains(tree.visualRect(tree.currentIndex()))
