@@ -2,80 +2,25 @@
 
 from __future__ import annotations
 
-import threading
-
 import pytest
-from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAccessible, QFontMetrics
-from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QPushButton
 
-from study_app.authoring.drafts import Draft, keep
 from study_app.devices.descriptor import NONE, Backend
-from study_app.gui.home import view
-from study_app.gui.home.main_window import LEAST, MainWindow
+from study_app.gui.home.main_window import LEAST
 from study_app.gui.home.study_cards import BrokenCard, StudyCard
-from study_app.gui.home.view import HomePlace
 from study_app.gui.theme.theme import DARK, font
 from study_app.gui.widgets.row_table import GAP
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import source_bytes
 from study_app.protocol.source.files import shipped_file
 from study_app.store.exclusions import exclude
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import MachineSettings
 from study_app.viewmodels.devices.list_view import devices_shown
 from study_app.viewmodels.home import study_facts
+from tests.gui.home.home_window import cell, hold, open_home, study_cards
 
 pytestmark = pytest.mark.slow
-
-# The platform without a screen cannot limit or raise windows, and says so.
-
-
-def hold(folder, participant, *, simulated=False):
-    with begin(
-        folder,
-        load("demo"),
-        source_bytes("demo"),
-        SessionStart(
-            participant, seed=1, operator="", language="en", device={"name": "mouse"}, screens={}, simulated=simulated
-        ),
-    ) as store:
-        store.finish("completed")
-
-
-@pytest.fixture
-def results(tmp_path):
-    folder = tmp_path / "results"
-    hold(folder / "demo", "P001")
-    return folder
-
-
-def open_home(qtbot, results, size=None):
-    window = MainWindow({"home": lambda: HomePlace(results)})
-    qtbot.addWidget(window)
-    if size is not None:
-        window.resize(size)
-    window.show()
-    home = window.place("home")
-    home.main = window  # or it would be collected here
-    qtbot.waitUntil(lambda: not home.reading and home.sessions.where.text() != "")
-    return home
-
-
-@pytest.fixture
-def home(qtbot, results):
-    return open_home(qtbot, results)
-
-
-def cell(home, row, heading, role=Qt.ItemDataRole.AccessibleTextRole):
-    """Return what a cell of the table of sessions says."""
-    model = home.sessions.rows.table.model()
-    across = Qt.Orientation.Horizontal
-    column = [model.headerData(at, across) for at in range(model.columnCount())].index(heading)
-    return model.index(row, column).data(role)
-
-
-def study_cards(home):
-    return [card for card in home.grid.cards if isinstance(card, StudyCard)]
 
 
 def test_every_protocol_has_a_card_and_one_is_the_next_step(home):
@@ -215,145 +160,6 @@ def test_a_protocol_opened_from_elsewhere_gets_a_card(home, qtbot, tmp_path, mon
     qtbot.waitUntil(lambda: study_cards(home)[0].facts.protocol.study.name == "own")
     home.open_protocol.click()
     qtbot.waitUntil(lambda: isinstance(home.grid.cards[0], BrokenCard))
-
-
-def own_study(folder, title="Own"):
-    """Write a study into a workspace, and return its file."""
-    file = folder / "protocols" / "own.toml"
-    file.parent.mkdir(exist_ok=True)
-    text = (
-        source_bytes("demo").decode().replace('name = "demo"', 'name = "own"').replace('"A first look"', f'"{title}"')
-    )
-    file.write_text(text, encoding="utf-8")
-    return file
-
-
-def titles(home):
-    return [card.facts.title if isinstance(card, StudyCard) else "broken" for card in home.grid.cards]
-
-
-@pytest.mark.parametrize("way", ["enter", "activation"])
-def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_path, monkeypatch, way):
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    home = open_home(qtbot, tmp_path / "results")
-    before = titles(home)
-
-    elsewhere = QWidget()
-    qtbot.addWidget(elsewhere)
-    elsewhere.show()
-
-    def come_back():
-        if way == "enter":
-            home.enter()
-            return
-        elsewhere.activateWindow()
-        qtbot.waitUntil(lambda: not home.isActiveWindow())
-        home.main.activateWindow()
-
-    file = own_study(tmp_path)
-    come_back()
-    qtbot.waitUntil(lambda: sorted(titles(home)) == sorted([*before, "Own"]))
-    own_study(tmp_path, "Own, edited")
-    come_back()
-    qtbot.waitUntil(lambda: "Own, edited" in titles(home))
-    file.write_text("format = 1\n")
-    come_back()
-    qtbot.waitUntil(lambda: "broken" in titles(home))
-    file.unlink()
-    come_back()
-    qtbot.waitUntil(lambda: titles(home) == before)
-
-
-def test_a_card_says_that_a_draft_was_not_saved_and_its_pen_opens_it(qtbot, tmp_path, monkeypatch):
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    file = own_study(tmp_path)
-    home = open_home(qtbot, tmp_path / "results")
-
-    def card_of(title):
-        return next(card for card in home.grid.cards if getattr(card.facts, "title", "") == title)
-
-    def hidden():
-        return not card_of("Own").draft.isVisible()
-
-    assert hidden()
-    keep(file, Draft(file.read_text(encoding="utf-8") + "# edited\n", ""))  # as after a kill
-    keep(tmp_path / "protocols" / "fresh.toml", Draft('format = 2\n[study]\nname = "fresh"\ntitle = "Fresh"\n', ""))
-    home.enter()
-    qtbot.waitUntil(lambda: any(getattr(card.facts, "title", "") == "Fresh" for card in home.grid.cards))
-    for title, end in (("Own", ", not saved. This card shows the saved file."), ("Fresh", ", not saved")):
-        words = card_of(title).draft.text()
-        assert words.startswith("Draft of today ")
-        assert words.endswith(end)
-    asked = []
-    home.edit_asked.connect(asked.append)
-    qtbot.mouseClick(card_of("Fresh").pen, Qt.MouseButton.LeftButton)
-    qtbot.mouseClick(card_of("Own").pen, Qt.MouseButton.LeftButton)
-    assert asked == [str(tmp_path / "protocols" / "fresh.toml"), "own"]
-    keep(file, Draft(file.read_text(encoding="utf-8"), ""))
-    home.enter()
-    qtbot.waitUntil(hidden)
-
-
-def test_the_window_is_painted_before_the_studies_are_read_and_nothing_moves_when_they_come(
-    qtbot, results, monkeypatch
-):
-    go_on, read = threading.Event(), view.read_studies
-    monkeypatch.setattr(view, "read_studies", lambda opened: go_on.wait(10) and read(opened))
-    window = MainWindow({"home": lambda: HomePlace(results)})
-    qtbot.addWidget(window)
-    home = window.place("home")
-    with qtbot.waitExposed(window):
-        window.show()
-    qtbot.waitUntil(lambda: home.reading)
-    QApplication.processEvents()
-
-    def places():
-        """Return where each text and button stands that is shown."""
-        parts = [*home.findChildren(QLabel), *home.findChildren(QPushButton)]
-        return {part: part.mapTo(window, QPoint()) for part in parts if part.isVisible()}
-
-    before = places()
-    del before[home.waiting]
-    assert home.grid.cards == []
-    go_on.set()
-    qtbot.waitUntil(lambda: not home.reading)
-    QApplication.processEvents()
-    after = places()
-    assert {part: after[part] for part in before} == before
-    assert home.waiting not in after
-    assert study_cards(home)[0].new in after
-    assert home.lab.open in after
-    window.activateWindow()
-    window.rail.switch.setFocus()
-    window.focusNextChild()
-    assert window.focusWidget() is home.open_protocol
-    assert cell(home, 0, "Answers") == "0 of 8"
-
-
-def test_studies_that_cannot_be_read_are_named_and_the_sessions_stay(qtbot, results, monkeypatch):
-    monkeypatch.setattr(view, "read_studies", lambda _opened: 1 // 0)
-    monkeypatch.setattr(threading, "excepthook", lambda _what: None)
-    home = open_home(qtbot, results)
-    assert home.main.notice.windowTitle() == "The studies could not be read"
-    assert home.below.isVisible()
-    assert len(home.sessions.shown) == 1
-
-
-def test_cards_stay_where_no_file_has_changed(home, qtbot):
-    cards = home.grid.cards
-    home.enter()
-    qtbot.waitUntil(lambda: not home.reading)
-    assert home.grid.cards is cards
-
-
-def test_cards_of_studies_with_one_title_show_their_files(qtbot, tmp_path, monkeypatch):
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    own_study(tmp_path, "A first look")
-    home = open_home(qtbot, tmp_path / "results")
-    cards = [card for card in study_cards(home) if card.facts.title == "A first look"]
-    shown = [{it.text() for it in card.findChildren(QLabel)} & {"demo", "own"} for card in cards]
-    assert sorted(map(sorted, shown)) == [["demo"], ["own"]]
-    assert len({card.new.accessibleName() for card in cards}) == 2
 
 
 def test_the_theme_changes(home, qtbot):

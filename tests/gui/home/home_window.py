@@ -1,0 +1,47 @@
+"""Home in its window, with sessions that were held."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+
+from study_app.gui.home.main_window import MainWindow
+from study_app.gui.home.study_cards import StudyCard
+from study_app.gui.home.view import HomePlace
+from study_app.protocol.load import load, source_bytes
+from study_app.store.sessions.begin import SessionStart, begin
+
+
+def hold(folder, participant, *, simulated=False):
+    with begin(
+        folder,
+        load("demo"),
+        source_bytes("demo"),
+        SessionStart(
+            participant, seed=1, operator="", language="en", device={"name": "mouse"}, screens={}, simulated=simulated
+        ),
+    ) as store:
+        store.finish("completed")
+
+
+def open_home(qtbot, results, size=None):
+    window = MainWindow({"home": lambda: HomePlace(results)})
+    qtbot.addWidget(window)
+    if size is not None:
+        window.resize(size)
+    window.show()
+    home = window.place("home")
+    home.main = window  # or it would be collected here
+    qtbot.waitUntil(lambda: not home.reading and home.sessions.where.text() != "")
+    return home
+
+
+def study_cards(home):
+    return [card for card in home.grid.cards if isinstance(card, StudyCard)]
+
+
+def cell(home, row, heading, role=Qt.ItemDataRole.AccessibleTextRole):
+    """Return what a cell of the table of sessions says."""
+    model = home.sessions.rows.table.model()
+    across = Qt.Orientation.Horizontal
+    column = [model.headerData(at, across) for at in range(model.columnCount())].index(heading)
+    return model.index(row, column).data(role)

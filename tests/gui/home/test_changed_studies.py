@@ -1,0 +1,158 @@
+"""Home when studies, drafts and files come, change and go."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
+
+from study_app.authoring.drafts import Draft, keep
+from study_app.gui.home import view
+from study_app.gui.home.main_window import MainWindow
+from study_app.gui.home.study_cards import StudyCard
+from study_app.gui.home.view import HomePlace
+from study_app.protocol.load import source_bytes
+from tests.gui.home.home_window import cell, open_home, study_cards
+
+pytestmark = pytest.mark.slow
+
+
+def own_study(folder, title="Own"):
+    """Write a study into a workspace, and return its file."""
+    file = folder / "protocols" / "own.toml"
+    file.parent.mkdir(exist_ok=True)
+    text = (
+        source_bytes("demo").decode().replace('name = "demo"', 'name = "own"').replace('"A first look"', f'"{title}"')
+    )
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def titles(home):
+    return [card.facts.title if isinstance(card, StudyCard) else "broken" for card in home.grid.cards]
+
+
+@pytest.mark.parametrize("way", ["enter", "activation"])
+def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_path, monkeypatch, way):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    home = open_home(qtbot, tmp_path / "results")
+    before = titles(home)
+
+    elsewhere = QWidget()
+    qtbot.addWidget(elsewhere)
+    elsewhere.show()
+
+    def come_back():
+        if way == "enter":
+            home.enter()
+            return
+        elsewhere.activateWindow()
+        qtbot.waitUntil(lambda: not home.isActiveWindow())
+        home.main.activateWindow()
+
+    file = own_study(tmp_path)
+    come_back()
+    qtbot.waitUntil(lambda: sorted(titles(home)) == sorted([*before, "Own"]))
+    own_study(tmp_path, "Own, edited")
+    come_back()
+    qtbot.waitUntil(lambda: "Own, edited" in titles(home))
+    file.write_text("format = 1\n")
+    come_back()
+    qtbot.waitUntil(lambda: "broken" in titles(home))
+    file.unlink()
+    come_back()
+    qtbot.waitUntil(lambda: titles(home) == before)
+
+
+def test_a_card_says_that_a_draft_was_not_saved_and_its_pen_opens_it(qtbot, tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    file = own_study(tmp_path)
+    home = open_home(qtbot, tmp_path / "results")
+
+    def card_of(title):
+        return next(card for card in home.grid.cards if getattr(card.facts, "title", "") == title)
+
+    def hidden():
+        return not card_of("Own").draft.isVisible()
+
+    assert hidden()
+    keep(file, Draft(file.read_text(encoding="utf-8") + "# edited\n", ""))  # as after a kill
+    keep(tmp_path / "protocols" / "fresh.toml", Draft('format = 2\n[study]\nname = "fresh"\ntitle = "Fresh"\n', ""))
+    home.enter()
+    qtbot.waitUntil(lambda: any(getattr(card.facts, "title", "") == "Fresh" for card in home.grid.cards))
+    for title, end in (("Own", ", not saved. This card shows the saved file."), ("Fresh", ", not saved")):
+        words = card_of(title).draft.text()
+        assert words.startswith("Draft of today ")
+        assert words.endswith(end)
+    asked = []
+    home.edit_asked.connect(asked.append)
+    qtbot.mouseClick(card_of("Fresh").pen, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(card_of("Own").pen, Qt.MouseButton.LeftButton)
+    assert asked == [str(tmp_path / "protocols" / "fresh.toml"), "own"]
+    keep(file, Draft(file.read_text(encoding="utf-8"), ""))
+    home.enter()
+    qtbot.waitUntil(hidden)
+
+
+def test_the_window_is_painted_before_the_studies_are_read_and_nothing_moves_when_they_come(
+    qtbot, results, monkeypatch
+):
+    go_on, read = threading.Event(), view.read_studies
+    monkeypatch.setattr(view, "read_studies", lambda opened: go_on.wait(10) and read(opened))
+    window = MainWindow({"home": lambda: HomePlace(results)})
+    qtbot.addWidget(window)
+    home = window.place("home")
+    with qtbot.waitExposed(window):
+        window.show()
+    qtbot.waitUntil(lambda: home.reading)
+    QApplication.processEvents()
+
+    def places():
+        """Return where each text and button stands that is shown."""
+        parts = [*home.findChildren(QLabel), *home.findChildren(QPushButton)]
+        return {part: part.mapTo(window, QPoint()) for part in parts if part.isVisible()}
+
+    before = places()
+    del before[home.waiting]
+    assert home.grid.cards == []
+    go_on.set()
+    qtbot.waitUntil(lambda: not home.reading)
+    QApplication.processEvents()
+    after = places()
+    assert {part: after[part] for part in before} == before
+    assert home.waiting not in after
+    assert study_cards(home)[0].new in after
+    assert home.lab.open in after
+    window.activateWindow()
+    window.rail.switch.setFocus()
+    window.focusNextChild()
+    assert window.focusWidget() is home.open_protocol
+    assert cell(home, 0, "Answers") == "0 of 8"
+
+
+def test_studies_that_cannot_be_read_are_named_and_the_sessions_stay(qtbot, results, monkeypatch):
+    monkeypatch.setattr(view, "read_studies", lambda _opened: 1 // 0)
+    monkeypatch.setattr(threading, "excepthook", lambda _what: None)
+    home = open_home(qtbot, results)
+    assert home.main.notice.windowTitle() == "The studies could not be read"
+    assert home.below.isVisible()
+    assert len(home.sessions.shown) == 1
+
+
+def test_cards_stay_where_no_file_has_changed(home, qtbot):
+    cards = home.grid.cards
+    home.enter()
+    qtbot.waitUntil(lambda: not home.reading)
+    assert home.grid.cards is cards
+
+
+def test_cards_of_studies_with_one_title_show_their_files(qtbot, tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    own_study(tmp_path, "A first look")
+    home = open_home(qtbot, tmp_path / "results")
+    cards = [card for card in study_cards(home) if card.facts.title == "A first look"]
+    shown = [{it.text() for it in card.findChildren(QLabel)} & {"demo", "own"} for card in cards]
+    assert sorted(map(sorted, shown)) == [["demo"], ["own"]]
+    assert len({card.new.accessibleName() for card in cards}) == 2
