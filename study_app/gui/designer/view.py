@@ -23,6 +23,7 @@ from study_app.gui.designer.pane.right_pane import PanePage, RightPane
 from study_app.gui.designer.problem_steps import ProblemSteps
 from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt
+from study_app.gui.designer.selected_elements import SelectedElements
 from study_app.gui.designer.shortcuts import make_shortcuts
 from study_app.gui.designer.tab_order import go_on
 from study_app.gui.participant.pages.screen_reader import say
@@ -35,7 +36,7 @@ from study_app.viewmodels.designer.new_study import TemplateChoice
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.prompts import DeletePrompt
-from study_app.viewmodels.designer.requests import AskSeries, DuplicateElement, GoTo, MoveElement, MoveTo, RetypeFile
+from study_app.viewmodels.designer.requests import AskSeries, GoTo, MoveTo, RetypeFile
 
 
 class DesignerPlace(Place):
@@ -86,6 +87,7 @@ class DesignerPlace(Place):
         self.problem_steps = ProblemSteps(self.problems, self.form, self.file, self.areas)
         self.adding, self.nothing, self.keys = AddList(self), NoStudyCard(), KeysCard(self)
         self._steps = [partial(self._ask, asked) for asked in (self.undo_asked, self.redo_asked, self.save_asked)]
+        self.elements = SelectedElements(self.outline, self.form, lambda: self.view)
         self._lay_out()
         self._connect()
         self._take_keys()
@@ -129,27 +131,32 @@ class DesignerPlace(Place):
         outline.form_asked.connect(self.areas.focus_form)
         outline.element_clicked.connect(self.areas.leave_drawer)
         outline.add_asked.connect(self.ask_to_add)
-        outline.duplicate_asked.connect(self._duplicate)
-        outline.delete_asked.connect(self._delete)
+        outline.duplicate_asked.connect(self.elements.duplicate)
+        outline.delete_asked.connect(self.elements.delete)
         outline.copy_asked.connect(lambda: self.copy_asked.emit(outline.selected))
         outline.paste_asked.connect(self.paste_asked)
         outline.rename_asked.connect(self._rename)
-        outline.move_asked.connect(self._move_by)
+        outline.move_asked.connect(self.elements.move_by)
         outline.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
         self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
         self.parts.path.open_asked.connect(self._select)
         form.asked.connect(self._take_asked)
         form.open_asked.connect(self._select)
-        form.join_asked.connect(self._join)
-        form.head.up.clicked.connect(lambda: self._move_by(-1))
-        form.head.down.clicked.connect(lambda: self._move_by(1))
-        form.head.copy.clicked.connect(self._duplicate)
-        form.head.delete.clicked.connect(self._delete)
-        form.head.series.clicked.connect(self._series)
+        form.join_asked.connect(self.elements.join)
+        form.head.up.clicked.connect(lambda: self.elements.move_by(-1))
+        form.head.down.clicked.connect(lambda: self.elements.move_by(1))
+        form.head.copy.clicked.connect(self.elements.duplicate)
+        form.head.delete.clicked.connect(self.elements.delete)
+        form.head.series.clicked.connect(self.elements.make_series)
         outline.several_changed.connect(lambda: form.show_selected(outline.selected))
         form.head.id_typed.connect(self.id_typed)
         form.copy_asked.connect(self.copy_asked)
         self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
+        self.elements.typed.connect(self.flush)
+        self.elements.asked.connect(self.asked)
+        self.elements.delete_asked.connect(self.delete_asked)
+        self.elements.series_asked.connect(self.series_asked)
+        self.elements.selected.connect(self._select)
         self.problem_steps.selected.connect(self._select)
         self.problem_steps.repair_asked.connect(self._ask_for_repair)
         self.problems.close_asked.connect(self.problems.hide)
@@ -166,9 +173,9 @@ class DesignerPlace(Place):
                 "problems": areas.focus_problems, "header": areas.focus_header,
                 "next part": lambda: areas.cycle(1), "part before": lambda: areas.cycle(-1),
                 "find": self.parts.focus_find, "next problem": self._next_problem, "file": areas.switch_to_file,
-                "back": self.back_asked.emit, "duplicate": self._duplicate, "series": self._series,
+                "back": self.back_asked.emit, "duplicate": self.elements.duplicate, "series": self.elements.make_series,
                 "rename": self._rename,
-                "up": lambda: self._move_by(-1), "down": lambda: self._move_by(1),
+                "up": lambda: self.elements.move_by(-1), "down": lambda: self.elements.move_by(1),
                 "new": lambda: None if self.stack.currentIndex() else self._ask(self.new_asked),
                 "save": save, "undo": undo, "redo": redo, "keys": self.keys.switch,
             },
@@ -297,46 +304,6 @@ class DesignerPlace(Place):
         """Select an element and give the keyboard to one of its fields."""
         self._select(element)
         self.areas.focus_field(field)
-
-    def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
-        """Return the element of the form, and those that are selected with it."""
-        form = self.view.form
-        path = () if form is None else form.path
-        return path, tuple(one for one in self.outline.selected if one != path)
-
-    def _join(self, path: ElementPath, all_between: bool) -> None:
-        """Select a question with the one of the form, or no longer; where none is edited, open it."""
-        form = self.view.form
-        if form is None or form.path[:-1] != path[:-1]:
-            self._select(path)
-        elif all_between:
-            first, last = sorted((int(form.path[-1]), int(path[-1])))
-            self.outline.select_several(tuple((*path[:-1], at) for at in range(first, last + 1)))
-        else:
-            self.outline.select_several((path,), selects=path not in self.outline.selected)
-
-    def _duplicate(self) -> None:
-        path, also = self._several()
-        if self.form.head.copy.isEnabled():
-            self.flush()
-            self.asked.emit(DuplicateElement(path, also))
-
-    def _series(self) -> None:
-        if self.view.form is not None:
-            self.flush()
-            self.series_asked.emit(AskSeries(self.view.form.path))
-
-    def _delete(self) -> None:
-        path, also = self._several()
-        if self.form.head.delete.isEnabled():
-            self.flush()
-            self.delete_asked.emit(path, also)
-
-    def _move_by(self, by: int) -> None:
-        path, also = self._several()
-        if path and not self.view.header.read_only:
-            self.flush()
-            self.asked.emit(MoveElement(path, by, also))
 
     def show_step(self, several: tuple[ElementPath, ...], said: str, *, fresh: bool) -> None:
         """Select the elements of a step together, say what it did, and lead to the first text of a new one."""

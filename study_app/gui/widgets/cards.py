@@ -12,6 +12,8 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.labels import Ink, label
 from study_app.viewmodels.tones import Tone
 
+QWIDGETSIZE_MAX = (1 << 24) - 1
+"""Of Qt; PySide does not offer it."""
 SHADOW = 3
 SHADOW_ALPHAS = (5, 5, 4)
 

@@ -11,6 +11,7 @@ from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.viewmodels.designer.form.form_rows import Form
@@ -18,7 +19,6 @@ from study_app.viewmodels.designer.keys import tip
 from study_app.viewmodels.designer.requests import RenameElement, SetValue
 
 TILE = 40
-QWIDGETSIZE_MAX = (1 << 24) - 1
 LABEL_PX = 116
 
 

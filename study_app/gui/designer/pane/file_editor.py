@@ -22,7 +22,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QWidget
 
 from study_app.gui.designer.form.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
-from study_app.gui.designer.text_lines import visible_lines
+from study_app.gui.designer.pane.text_lines import visible_lines
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Themed

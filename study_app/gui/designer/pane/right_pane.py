@@ -11,11 +11,10 @@ from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from study_app.gui.designer.pane.measure_cards import FactsRow
 from study_app.gui.designer.segments import Segments
-from study_app.gui.widgets.cards import SHADOW
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW
 
 FACTS_FROM, FACTS_FROM_OWN, FACTS_LEAST = 740, 560, 110
 """The height of the window and of the pane from which there is room for facts, and what they need themselves [px]."""
-QWIDGETSIZE_MAX = (1 << 24) - 1
 GAP = 24
 
 

@@ -39,6 +39,7 @@ from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX
 from study_app.session.pages import Page, QuestionnairePage, TaskPage
 from study_app.session.trial import TankView
 from study_app.viewmodels.designer.participant_page import SIZES, ParticipantView, ScreenSize
@@ -46,7 +47,6 @@ from study_app.viewmodels.designer.participant_page import SIZES, ParticipantVie
 FRAME_MS: Final = 33
 RING: Final = 2
 LEAVES: Final = "Esc leaves the page"
-QWIDGETSIZE_MAX: Final = (1 << 24) - 1
 """The height of a part without a limit, as Qt has it [px]."""
 
 

@@ -8,11 +8,11 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from study_app.gui.designer.participant.live_page import QWIDGETSIZE_MAX, LivePage
+from study_app.gui.designer.participant.live_page import LivePage
 from study_app.gui.designer.segments import Segments
 from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import font
-from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
 from study_app.gui.widgets.controls import Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.number_field import NumberField

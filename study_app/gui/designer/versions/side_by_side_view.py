@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QPainter, QPaintEvent, QResizeEvent, QTextCursor
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QTextEdit, QVBoxLayout, QWidget
 
-from study_app.gui.designer.text_lines import visible_lines
+from study_app.gui.designer.pane.text_lines import visible_lines
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import Rule
