@@ -55,7 +55,6 @@ CATCH = ('method = "few"', 'method = "few"\ncatch = { share = 0.25 }')
 KNOWN = {0.2371, 2.1193, 1.3717 + 1.3717 * 0.2371}
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("edits", "known"),
     [
@@ -64,6 +63,7 @@ KNOWN = {0.2371, 2.1193, 1.3717 + 1.3717 * 0.2371}
             (STAIRCASE, CATCH),
             {0.6917, 2.1193, 1.3717 + 1.3717 * 0.6917},
             id="staircase",
+            marks=pytest.mark.nightly,
         ),
     ],
 )

@@ -49,7 +49,6 @@ def race(folder: Path, start: Any, won: Any) -> None:
     won.put(taken)
 
 
-@pytest.mark.nightly
 def test_of_two_programs_exactly_one_gets_each_id(tmp_path: Path) -> None:
     forking = multiprocessing.get_context("fork")
     start, won = forking.Barrier(2), forking.Queue()

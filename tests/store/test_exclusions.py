@@ -182,7 +182,6 @@ for line in sys.stdin:
 """
 
 
-@pytest.mark.nightly
 @pytest.mark.slow
 def test_of_two_people_at_once_no_decision_is_lost(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
     """Whoever is told that it was written finds it in the list; the other is told to try again."""

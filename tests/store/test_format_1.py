@@ -54,7 +54,6 @@ def hashes(folder: StudyFolder) -> Iterator[tuple[str, str]]:
         yield f"{place}/protocol", sha256(json.loads(session.receipt.read_text(encoding="utf-8"))["protocol"])
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize("name", sorted(RECORDED))
 @pytest.mark.slow
 def test_rehearsal_writes_the_bytes_recorded_for_format_1(name: str, rehearsal_of: Callable[[str], Path]) -> None:

@@ -71,7 +71,6 @@ def test_cells_are_those_of_the_sessions_own_tables(rek: Results, to: Path) -> N
     assert exported[0]["notes"] == "'" + '=1+1, "so"\nnew line π 😀'
 
 
-@pytest.mark.nightly
 def test_what_earlier_versions_wrote_in_clear_is_not_handed_out_sealed(rek: Results, to: Path) -> None:
     """Their tables have the columns that tell a condition: files that are handed out have them after unblinding."""
     rek.add("P001", lambda *_: 6, changes={"force_mean_n": 4.8151623})

@@ -26,7 +26,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return rehearse_answers(path / "grouped.toml", participants=6, seed=2, results=path / "r", felt=felt)
 
 
-@pytest.mark.nightly
 def test_groups_are_reported_after_unblinding_alone(folder: Path, tmp_path: Path) -> None:
     sealed = load_study(folder)
     assert group_counts(sealed) == {}

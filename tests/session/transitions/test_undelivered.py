@@ -168,7 +168,6 @@ def events_of(state: SessionState, fails: frozenset[tuple[int, int]]) -> Iterato
 FAILS = frozenset({(8, 0), (9, 0), (9, 1), (10, 0), (10, 1), (10, 2)})
 
 
-@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_session_killed_after_any_line_gives_up_the_same_trials_as_one_that_was_not() -> None:
     protocol = pairs.protocol()

@@ -114,7 +114,6 @@ for number in range(40):
 """
 
 
-@pytest.mark.nightly
 @pytest.mark.slow
 def test_two_programs_at_once_never_share_an_entry(tmp_path: Path) -> None:
     open_or_draw_key(tmp_path, grouped())

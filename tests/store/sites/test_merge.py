@@ -163,8 +163,7 @@ def test_a_session_that_begins_before_the_copy_is_refused(
     assert list(results.iterdir()) == []
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("exists", [False, True])
+@pytest.mark.parametrize("exists", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_a_killed_merge_leaves_the_old_state_or_the_new_one(exists: bool, labs: dict[str, Path], results: Path) -> None:
     to, old, states = results / "killed", dict[str, bytes](), []
     for kill_at in (0, 3, 10, *range(20, 60, 2), *range(60, 90)):

@@ -93,7 +93,6 @@ def contents(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and path.name not in left_out}
 
 
-@pytest.mark.nightly
 def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, results: Path) -> None:
     own = personal(study)
     assert len(own) > 30

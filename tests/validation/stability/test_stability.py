@@ -289,7 +289,6 @@ def test_the_command_judges_one_case_in_words():
     assert on.startswith("safety on: stable")
 
 
-@pytest.mark.nightly
 @compiled
 def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     judged = stability.judge(parse(UNSTABLE), safe=False)

@@ -179,7 +179,6 @@ def stop_of(participant: ParticipantWindow) -> CompactStop:
     return stop
 
 
-@pytest.mark.nightly
 def test_stop_above_the_page_closing_the_window_a_failure_and_leaving_the_place_stop(
     qtbot: Any, likert: Any, folders: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

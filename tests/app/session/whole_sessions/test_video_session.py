@@ -67,7 +67,6 @@ def run(study: Path, results: Path) -> Callable[[], int]:
     return begin
 
 
-@pytest.mark.nightly
 def test_footage_is_shown_recorded_and_sealed(study: Path, run: Any, results: Path) -> None:
     write_clip(study.parent / NAME, frames=20, size=(320, 180))
     assert run() == 0
