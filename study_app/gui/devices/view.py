@@ -17,7 +17,7 @@ from study_app.devices.descriptor import DeviceOption
 from study_app.gui.devices.device_rows import LEAST_WORDS, DeviceList
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within
-from study_app.gui.widgets.cards import SHADOW, Card, scrolled
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
@@ -192,4 +192,4 @@ class DevicesPlace(Place):
         self._body.setDirection(way)
         for card in (*self.options.values(), self.help):
             card.setMinimumWidth(0 if stacked else COLUMN_PX)
-            card.setMaximumWidth(16_777_215 if stacked else COLUMN_PX)
+            card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else COLUMN_PX)

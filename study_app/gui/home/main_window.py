@@ -70,6 +70,7 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(LEAST)
         self.theme = theme
         self.notice: Question | None = None
+        self._resting = False  # whether a session has the screen
         self.not_opened: BaseException | None = None  # why a place could not be opened: a notice has said so
         self._had_keyboard: QWidget | None = None
         self._makers = makers
@@ -211,6 +212,7 @@ class MainWindow(QMainWindow):
         notice = Question(self, self.theme, f"“{word}” could not be opened", what)
         notice.add_buttons("Close", ActionButton("", "Try again", role="primary"))
         notice.accepted.connect(lambda: self.go(name))
+        notice.rejected.connect(lambda: self.went.emit(self._here))
         self._show_notice(notice)
 
     def _now(self) -> Place:
@@ -221,6 +223,7 @@ class MainWindow(QMainWindow):
         """Leave the place one is at, and the screen: a session takes over."""
         self._now().leave()
         self._had_keyboard = self.focusWidget()
+        self._resting = True
         self.hide()
 
     def come_back(self) -> None:
@@ -230,6 +233,9 @@ class MainWindow(QMainWindow):
         keyboard to the part after the one that had it.
         """
         self.show()
+        self._resting = False
+        if self.notice is not None and isValid(self.notice):
+            self.notice.show()
         if self._had_keyboard is not None and isValid(self._had_keyboard):
             self._had_keyboard.setFocus()
         self._now().enter()
@@ -241,7 +247,8 @@ class MainWindow(QMainWindow):
     def _show_notice(self, notice: Question) -> None:
         notice.finished.connect(notice.deleteLater)
         self.notice = notice
-        notice.show()
+        if not self._resting:  # else it would be in front of a session
+            notice.show()
 
     def show_theme(self, theme: Theme) -> None:
         """Wear a theme from now on."""

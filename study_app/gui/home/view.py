@@ -26,7 +26,7 @@ from study_app.gui.home.study_cards import BrokenCard, CardGrid, StudyCard
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.cards import SHADOW, scrolled
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
@@ -81,6 +81,7 @@ class HomePlace(Place):
         self._opened: list[str] = []
         self._facts: tuple[Facts, ...] = ()
         self._files: frozenset[tuple[Path, int, int]] | None = None  # as the studies were read from them last
+        self._unread = False  # whether reading them failed
         self._studies = Background(self)
         self._studies.done.connect(self._show_studies)
         self._studies.failed.connect(self._show_unread)
@@ -120,7 +121,7 @@ class HomePlace(Place):
 
     def event(self, event: QEvent) -> bool:
         """Look for changed protocols when one comes back to the window, as from a text editor."""
-        if event.type() == QEvent.Type.WindowActivate and self.isVisible():
+        if event.type() == QEvent.Type.WindowActivate and self.isVisible() and not self._unread:
             self.read_changes()
         return super().event(event)
 
@@ -165,12 +166,8 @@ class HomePlace(Place):
         row = QVBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self.area)
-        for part in self._shown_with_cards():
-            part.hide()
-
-    def _shown_with_cards(self) -> tuple[QWidget, ...]:
-        """Return what the cards, and a scroll bar beside them, would move."""
-        return self.open_protocol, self.new_study, self.below
+        self.below.hide()  # until the cards are there, which would move it
+        self.area.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)  # else it would move the buttons
 
     @property
     def reading(self) -> bool:
@@ -185,19 +182,20 @@ class HomePlace(Place):
     def show_studies(self) -> None:
         """Read the protocols at hand, outside the window's thread; show a card for each, and the sessions."""
         self.folder.show_text(f"Workspace: {workspace().folder}")
-        self._files = file_states(self._opened)
+        self._files, self._unread = file_states(self._opened), False
         self._studies.run(partial(read_studies, tuple(self._opened)))
 
     def _show_studies(self, read: tuple[Facts, ...]) -> None:
         self.waiting.hide()
         if read != self._facts:
             self._show_facts(read)
-        for part in self._shown_with_cards():
-            part.show()
+        self.below.show()
+        self.area.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self.show_sessions()
 
     def _show_unread(self, error: Exception) -> None:
         self._show_studies(self._facts)
+        self._files, self._unread = None, True  # read again when one comes back here, not at each activation
         what = f"{type(error).__name__}: {error}"
         self.message.emit("The studies could not be read", f"{what}. The terminal shows the details.")
 
@@ -314,7 +312,7 @@ class HomePlace(Place):
         self._beside.setDirection(right if stacked else down)
         for card in (self.device, self.lab):
             card.setMinimumWidth(0 if stacked else COLUMN_PX)
-            card.setMaximumWidth(16_777_215 if stacked else COLUMN_PX)
+            card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else COLUMN_PX)
         self.grid.arrange(self.width() - 56)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name

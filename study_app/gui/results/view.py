@@ -16,7 +16,7 @@ from study_app.gui.sessions.decision_dialogs import LeaveOutDialog, TakeBackDial
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import remove_widget
-from study_app.gui.widgets.cards import SHADOW, Chip, scrolled
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Chip, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
@@ -26,7 +26,6 @@ from study_app.viewmodels.sessions import SessionFacts
 STACKED_BELOW = 1160
 PANEL_PX, PANEL_WIDE_PX, WIDE_FROM = 400, 430, 1700
 STACKED_HEIGHT, EXCLUSIONS = 330, 360
-MOST = 16_777_215
 REASON_SIGNS = 40
 EXTRAS: Final = (
     Extra("wide", "Wide table: one row per participant"),
@@ -290,10 +289,10 @@ class ResultsPlace(Place):
         self._row.setDirection(down if stacked else right)
         self._left.setDirection(right if stacked else down)
         width = PANEL_WIDE_PX if self.width() >= WIDE_FROM else PANEL_PX
-        least, most = QSize(0, STACKED_HEIGHT), QSize(MOST, STACKED_HEIGHT)
+        least, most = QSize(0, STACKED_HEIGHT), QSize(QWIDGETSIZE_MAX, STACKED_HEIGHT)
         self._panel.setMinimumSize(least if stacked else QSize(width, 0))
-        self._panel.setMaximumSize(most if stacked else QSize(width, MOST))
-        self.exclusions.setMaximumWidth(EXCLUSIONS if stacked else MOST)
+        self._panel.setMaximumSize(most if stacked else QSize(width, QWIDGETSIZE_MAX))
+        self.exclusions.setMaximumWidth(EXCLUSIONS if stacked else QWIDGETSIZE_MAX)
         self.figures.show_whole(stacked)
         self._head.removeWidget(self._chips_there)
         self._below.removeWidget(self._chips_there)

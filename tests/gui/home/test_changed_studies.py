@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
 from study_app.authoring.drafts import Draft, keep
@@ -139,6 +139,12 @@ def test_studies_that_cannot_be_read_are_named_and_the_sessions_stay(qtbot, resu
     assert home.main.notice.windowTitle() == "The studies could not be read"
     assert home.below.isVisible()
     assert len(home.sessions.shown) == 1
+    home.main.notice.accept()
+    monkeypatch.undo()
+    QApplication.sendEvent(home, QEvent(QEvent.Type.WindowActivate))
+    assert not home.reading, "each activation would say it again"
+    home.enter()
+    qtbot.waitUntil(lambda: len(home.grid.cards) > 1)
 
 
 def test_cards_stay_where_no_file_has_changed(home, qtbot):

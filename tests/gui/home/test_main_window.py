@@ -111,6 +111,15 @@ def test_a_session_and_the_end_leave_the_place(main, log):
     assert "leave lab" in log[-2:]
 
 
+def test_what_is_said_during_a_session_is_shown_after_it(main):
+    main.rest()
+    main.show_message("The studies could not be read", "The folder is gone.")
+    assert not main.notice.isVisible()
+    main.come_back()
+    assert main.notice.isVisible()
+    main.notice.accept()
+
+
 def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
     qtbot.waitUntil(main.isActiveWindow)
     began = main.place("home").findChild(QPushButton)
