@@ -52,15 +52,16 @@ class SeriesPrompts(QObject):
         self.place.show_prompt(card, card.first)
 
     def _choose(self, card: SeriesCard, asked: AskSeries) -> None:
-        """Ask for a series of the element that was chosen in the card; its values stay."""
-        values = card.values.text()
+        """Ask for a series of the element that was chosen in the card; values stay if it has the same number."""
+        number, values = card.number.currentText(), card.values.text()
         self.ask(asked)
         if isinstance(shown := self.place.prompt, SeriesCard):
             shown.elements.setFocus(Qt.FocusReason.OtherFocusReason)
-            shown.take_values(values)
+            if not number or shown.number.findText(number) >= 0:
+                shown.take_values(number, values)
 
     def _plan(self, card: SeriesCard, asked: MakeSeries) -> None:
-        """Show what the values make; whether the study can take it takes longer, and is found when the keys rest."""
+        """Show what the values make; whether the study can take it is checked once typing pauses."""
         if (opened := self.editing.writable) is None:
             return
         card.show_plan(series_plan(opened.study, asked.path, asked.field, asked.values))

@@ -17,6 +17,7 @@ from study_app.authoring.writer.refused import Refused
 from study_app.haptics.model.liquid import MAX_ID
 from study_app.number_text import MINUS, exact_text, number_of, typed_numbers
 from study_app.protocol.source.document import Path, names, value_at
+from study_app.protocol.source.problems import Fault
 
 MOST: Final = 24
 """So many values a series may have; code letters end at Z."""
@@ -150,13 +151,21 @@ def check_made(before: Study, after: Study, original: Path, made: Sequence[Path]
     Refused
         A problem is new.
     """
-    known = {(fault.path, fault.message) for fault in before.faults}
+    known = {_as_before(fault, original, ()) for fault in before.faults}
     for fault in after.faults:
-        of_made = fault.path[:2] in made
-        if not ({(fault.path, fault.message), (original + fault.path[2:], fault.message) if of_made else None} & known):
+        if _as_before(fault, original, made) not in known:
             inside = (label_of(step) for step in fault.path[2:] if isinstance(step, str))
             where = ", ".join((title_of(after.document, fault.path[:2]), *inside))
-            raise Refused(f"this series would make a problem. {where}: {fault.message}")
+            raise Refused(f"this series would cause a problem: {where}: {fault.message}")
+
+
+def _as_before(fault: Fault, original: Path, made: Sequence[Path]) -> tuple[Path, str]:
+    """Return a problem as it was of the original element: copies have its name, and entries of lists no number."""
+    path = original + fault.path[2:] if fault.path[:2] in made else fault.path
+    message = fault.message
+    for _, name in made:
+        message = message.replace(f'"{name}"', f'"{original[1]}"')
+    return tuple(step for step in path if isinstance(step, str)), message
 
 
 def _given(member: Member, path: Path, before: Path, row: Row) -> Iterator[Edit]:

@@ -168,8 +168,9 @@ class SeriesCard(Prompt):
         self.make.show_action("bars", plan.make)
         self.make.setEnabled(bool(plan.lines))
 
-    def take_values(self, values: str) -> None:
-        """Take values that were typed for another element."""
+    def take_values(self, number: str, values: str) -> None:
+        """Take the number and the values that were chosen for another element."""
+        self.number.setCurrentText(number)
         self.values.setText(values)
         self._type()
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.prompts import SeriesCard
 from study_app.viewmodels.designer.prompts import series_plan
@@ -162,6 +163,32 @@ def test_a_series_that_would_make_a_problem_is_refused_while_it_is_typed(qtbot: 
     assert card(water).make.text() == "Make 2 conditions"
 
 
+def test_a_problem_that_a_study_had_before_refuses_no_series(designer: Any) -> None:
+    text = designer.file.read_text().replace('conditions = ["thin", "thick"]', 'conditions = ["thin", "nosuch"]')
+    designer.file.write_text(text)
+    designer.controller.open("kitchen")
+    designer.select(CONDITION)
+    assert [fault.message for fault in designer.editing.opened.study.faults]
+    before = designer.text
+    designer.editing.ask(MakeSeries(CONDITION, (*CONDITION, "delay_ms"), "0 60"))
+    assert designer.text != before
+
+
+def test_values_of_another_number_are_not_kept_for_another_element(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    liquids = (("liquids", "thin"), ("liquids", "thick"))
+    designer.place.series_asked.emit(AskSeries(liquids[0], liquids))
+    shown = card(designer)
+    shown.number.setCurrentIndex(shown.number.count() - 1)
+    number = shown.number.currentText()
+    qtbot.keyClicks(shown.values, "1 2")
+    qtbot.keyClick(shown.elements, Qt.Key.Key_Down)
+    shown = card(designer)
+    assert shown.asked.path == liquids[1]
+    assert (shown.number.currentText(), shown.values.text()) in {(number, "1 2"), (shown.number.itemText(0), "")}
+    assert shown.number.findText(number) < 0 or shown.number.currentText() == number
+
+
 def test_the_button_of_a_series_stays_where_it_is_while_values_are_typed(qtbot: Any, water: Any) -> None:
     water.place.series_asked.emit(AskSeries(CONDITION))
     shown = card(water)
@@ -169,7 +196,7 @@ def test_the_button_of_a_series_stays_where_it_is_while_values_are_typed(qtbot: 
     for typed in ("", "0", "0 60 120", "0 6x", " ".join(map(str, range(0, 240, 10)))):
         shown.values.selectAll()
         qtbot.keyClicks(shown.values, typed) if typed else None
-        qtbot.wait(20)
+        QApplication.processEvents()
         bottoms.add(shown.make.mapTo(shown.window(), shown.make.rect().bottomRight()).toTuple())
     assert len(bottoms) == 1
 
@@ -241,7 +268,6 @@ def test_a_long_series_leaves_its_buttons_free_in_a_low_window(qtbot: Any, water
     water.place.series_asked.emit(AskSeries(CONDITION))
     shown = card(water)
     qtbot.keyClicks(shown.values, " ".join(map(str, range(0, 240, 10))))
-    qtbot.wait(50)
     assert shown.make.text() == "Make 24 conditions"
-    assert shown.area.isVisible()
-    assert shown.area.geometry().bottom() < shown.make.geometry().top()
+    qtbot.waitUntil(shown.area.isVisible)
+    qtbot.waitUntil(lambda: shown.area.geometry().bottom() < shown.make.geometry().top())
