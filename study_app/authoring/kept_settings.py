@@ -26,7 +26,8 @@ def kept_participants(file: Path) -> int | None:
 
 def kept_language(file: Path) -> str:
     """Return the language in which a study's pages are shown; "" where none is kept."""
-    return str(_kept(file).get("language", ""))
+    language = _kept(file).get("language")
+    return language if isinstance(language, str) else ""
 
 
 def keep_setting(file: Path, name: Setting, value: int | str | None) -> None:
@@ -34,6 +35,9 @@ def keep_setting(file: Path, name: Setting, value: int | str | None) -> None:
     others = {key: one for key, one in _kept(file).items() if key not in {"file", name}}
     if value is not None:
         others[name] = value
+    if not others:
+        forget_settings(file)
+        return
     with contextlib.suppress(StoreError, OSError):
         write_whole(_kept_file(file), json.dumps({"file": str(file.resolve()), **others}).encode())
 
@@ -53,4 +57,4 @@ def _kept(file: Path) -> dict[str, Any]:
 
 
 def _kept_file(file: Path) -> Path:
-    return data_folder() / "measures" / f"{file_key(file)}.json"
+    return data_folder() / "settings" / f"{file_key(file)}.json"
