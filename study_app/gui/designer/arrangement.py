@@ -117,6 +117,7 @@ class Arrangement(QWidget):
         self.sides.tips = {"form": tip("form"), "pane": tip("views")}
         self.sides.chosen.connect(lambda side: self.show_side(str(side)))
         self.prompts = QVBoxLayout()
+        self.prompt: QWidget | None = None  # in that layout: its items outlive their widgets in Python
         self._across = across = QHBoxLayout()
         across.setSpacing(GAP)
         self._left = QVBoxLayout()
@@ -148,9 +149,8 @@ class Arrangement(QWidget):
     @property
     def in_order(self) -> list[QWidget]:
         """The parts in the order in which Tab goes through them."""
-        asked = (self.prompts.itemAt(at).widget() for at in range(self.prompts.count()))
         beside = [self.form.head, self.form.inside, *self.pane.in_order, self.problems]
-        return [self.outline, self.top, *(part for part in asked if part is not None), *beside]
+        return [self.outline, self.top, *([] if self.prompt is None else [self.prompt]), *beside]
 
     def show_side(self, side: str) -> None:
         """Show form or pane where they share a column."""

@@ -34,6 +34,9 @@ def go_on(parts: Sequence[QWidget], by_qt: Callable[[bool], bool], *, forward: b
     shown = [(part, found) for part in parts if (found := _shown(part))]
     here = window.focusWidget()
     at = next((at for at, (part, _) in enumerate(shown) if here is not None and part.isAncestorOf(here)), None)
+    if at is None and forward and shown and here is not None and here.isAncestorOf(parts[0]):
+        shown[0][1][0].setFocus(Qt.FocusReason.TabFocusReason)  # from the place itself
+        return True
     if at is None or here not in shown[at][1]:
         return by_qt(forward)
     part, found = shown[at]

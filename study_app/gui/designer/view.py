@@ -99,7 +99,7 @@ class DesignerPlace(Place):
         column = QVBoxLayout(main)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(10)
-        column.addWidget(self.nothing, 1)  # first, as Tab goes
+        column.addWidget(self.nothing, 1)  # first in the order of Tab
         column.insertWidget(0, self.header)
         column.insertWidget(1, self.banner)
         column.addWidget(self.parts, 1)
@@ -120,7 +120,7 @@ class DesignerPlace(Place):
         header.redo_asked.connect(redo)
         header.save_asked.connect(save)
         header.keys_asked.connect(self.keys.switch)
-        header.strip.changed.connect(lambda shown: self.banner.wait(waits=shown))
+        header.strip.changed.connect(lambda shown: self.banner.make_room(other=shown))
         self.nothing.new.clicked.connect(self.new_asked)
         self.nothing.study_asked.connect(self.study_asked)
         self.nothing.study_asked.connect(self.areas.focus_form)
@@ -256,12 +256,14 @@ class DesignerPlace(Place):
         prompt.given_up.connect(self.close_prompt)
         apply_theme_within(prompt, self.theme)
         self.parts.prompts.addWidget(prompt)
+        self.parts.prompt = prompt
         first.setFocus()
 
     def close_prompt(self, *, elsewhere: bool = False) -> None:
         """Close a question that is open; ``elsewhere`` says that another element is selected from now on."""
         if self.prompt is not None:
-            closing, self.prompt = self.prompt, None
+            closing = self.prompt
+            self.prompt = self.parts.prompt = None
             held = closing.isAncestorOf(self.focusWidget())
             remove_widget(closing)
             if held:  # else Qt hands the keyboard to the rail
@@ -312,7 +314,7 @@ class DesignerPlace(Place):
         if said:
             say(self, said)
         beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
-        if fresh and not (several and beside):  # a copy made in an outline beside the form is gone on with there
+        if fresh and not (several and beside):  # after a copy in an open outline, the keyboard stays there
             self.parts.show_side("form")
             self.form.focus_first_text(filled=bool(several))  # a copy has its texts
 

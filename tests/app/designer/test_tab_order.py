@@ -152,7 +152,7 @@ def test_tab_goes_to_the_drafts_to_continue_where_no_study_is_open(qtbot: Any, d
     place = designer.place
     qtbot.waitUntil(lambda: [one.isVisible() for one in place.nothing.drafts] == [True])
     place.setFocus()
-    for expected in (place.nothing.new, *place.nothing.drafts, place.header.study):
+    for expected in (*place.nothing.drafts, place.nothing.new, place.header.study):
         place.focusNextChild()
         assert QApplication.focusWidget() is expected
 

@@ -68,6 +68,7 @@ class NoStudyCard(Card):
             apply_theme_within(made, self.theme)
             self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignHCenter)
             self.drafts.append(made)
+        self.new.raise_()  # the last of the children: so Tab goes to it last
 
 
 class ChosenCard(Card):

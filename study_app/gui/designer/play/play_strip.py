@@ -19,7 +19,7 @@ ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
 
 
 class PlayStrip(Card):
-    """Signals: ``asked`` (action), ``changed`` (whether there is one), ``left`` when it goes that had the keyboard."""
+    """Signals: ``asked`` (action), ``changed`` (whether there is one), ``left`` (it closes and had the keyboard)."""
 
     asked = Signal(str)
     changed = Signal(bool)
@@ -32,6 +32,7 @@ class PlayStrip(Card):
         self.icon = Icon("play")
         self.words = label("", "body", wraps=True)
         self.buttons: dict[str, ActionButton] = {}
+        self._lines: list[QWidget] = []
         self._row = QHBoxLayout()
         self._row.setSpacing(10)
         self._row.addWidget(self.icon)
@@ -50,11 +51,9 @@ class PlayStrip(Card):
         self.state = state
         focused = self.window().focusWidget()
         had_focus = focused is not None and self.isAncestorOf(focused)
-        shown: list[QWidget] = [*self.buttons.values()]
-        shown += [item.widget() for at in range(self._listed.count()) if (item := self._listed.itemAt(at)) is not None]
-        for part in shown:
+        for part in (*self.buttons.values(), *self._lines):
             remove_widget(part)
-        self.buttons = {}
+        self.buttons, self._lines = {}, []
         self.setVisible(state is not None)
         self.changed.emit(state is not None)
         if state is None:
@@ -65,8 +64,9 @@ class PlayStrip(Card):
         self.words.setText(state.words)
         self.setAccessibleDescription(state.words)
         say(self, state.words)
-        for line in state.listed:
-            self._listed.addWidget(label(line, "label", "text2", wraps=True))
+        self._lines = [label(line, "label", "text2", wraps=True) for line in state.listed]
+        for line in self._lines:
+            self._listed.addWidget(line)
         for action, words in state.actions:
             made = ActionButton(ICONS.get(action, ""), words, role=ROLES.get(action, ""), height=36)
             made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
