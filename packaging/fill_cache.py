@@ -1,4 +1,4 @@
-"""Compile what sessions, the lab, rehearsals and replay need; the bundled program runs me with a cache of its own."""
+"""Compile what sessions, the lab, rehearsals and replay need: for a bundle, and for tests."""
 
 import sys
 import tempfile

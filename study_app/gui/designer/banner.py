@@ -16,7 +16,10 @@ from study_app.viewmodels.designer.designer_view import Banner
 
 
 class BannerCard(Card):
-    """Draws a `Banner`; ``asked`` carries the action of a button. It waits while another line is shown in its place."""
+    """Draws a `Banner`; ``asked`` carries the action of a button.
+
+    Where the study is read-only, it is hidden while another line is shown; any other banner needs an answer.
+    """
 
     asked = Signal(str)
 
@@ -25,7 +28,8 @@ class BannerCard(Card):
         self.words = label("", "label", wraps=True)
         self.sign = Icon("info", "accent", 20)
         self.buttons: list[ActionButton] = []
-        self._there = self._waits = False
+        self._banner: Banner | None = None
+        self._other = False
         self._row = QHBoxLayout()
         self._row.setSpacing(10)
         self._row.addWidget(self.sign)
@@ -33,10 +37,10 @@ class BannerCard(Card):
         self.column.addLayout(self._row)
         self.hide()
 
-    def wait(self, *, waits: bool) -> None:
-        """Hide while another line is shown; one line at a time leaves the parts their room."""
-        self._waits = waits
-        self.setVisible(self._there and not waits)
+    def make_room(self, *, other: bool) -> None:
+        """Hide what needs no answer while another line is shown (``other``)."""
+        self._other = other
+        self.setVisible(self._banner is not None and not (other and self._banner.only_offers_copy))
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint a tinted surface with an accent edge, unlike the cards of the study."""
@@ -49,8 +53,8 @@ class BannerCard(Card):
 
     def show_banner(self, banner: Banner | None) -> None:
         """Show another banner; None hides it."""
-        self._there = banner is not None
-        self.wait(waits=self._waits)
+        self._banner = banner
+        self.make_room(other=self._other)
         if banner is None:
             self.words.clear()
             return

@@ -167,7 +167,7 @@ class DesignerHeader(QWidget):
         button.setEnabled(on)
 
     def _make_room(self) -> None:
-        """Hide the title, then the version, where the name of the study has no room else; the draft is always seen."""
+        """Hide the title, then the version, if the name of the study is too long; the draft is always shown."""
         state = self.state
         named = min(NAME_MOST_PX, self.study.fontMetrics().horizontalAdvance(self.study.currentText()) + NAME_EDGES_PX)
         more = max(0, named - self.study.minimumWidth())

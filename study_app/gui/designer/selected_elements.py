@@ -16,8 +16,8 @@ from study_app.viewmodels.designer.requests import AskSeries, DuplicateElement, 
 class SelectedElements(QObject):
     """The element of the form, and those that the outline selects with it.
 
-    Each signal follows ``typed``, which hands on what is being typed. ``asked`` carries a request of
-    `viewmodels.designer.requests`, ``delete_asked`` the element and the others, ``selected`` another element.
+    ``asked`` carries a request of `viewmodels.designer.requests`, ``delete_asked`` the element and the others; before
+    each request, ``typed`` asks to hand on what is being typed. ``selected`` carries another element.
     """
 
     typed = Signal()

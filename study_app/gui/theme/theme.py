@@ -184,6 +184,7 @@ QLineEdit[state='changed'], QComboBox[state='changed'] {{ border: 2px solid {t.a
 QPlainTextEdit[state='refused'] {{ border: 2px solid {t.bad}; }}
 QLineEdit[state='refused'] {{ border: 2px solid {t.bad}; padding: 2px 5px; }}
 {disabled}, QLineEdit:read-only {{ background: {t.sunk}; color: {t.text2}; border-color: {t.sunk}; }}
+QLineEdit:read-only:focus {{ border-color: {t.accent}; }}
 QComboBox {{ combobox-popup: 0; }}
 QComboBox::drop-down {{ border: none; width: 28px; }}
 QComboBox QAbstractItemView {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};

@@ -47,6 +47,11 @@ class Banner:
     words: str
     actions: tuple[tuple[BannerAction, str], ...] = ()
 
+    @property
+    def only_offers_copy(self) -> bool:
+        """Whether it only says why the study is read-only."""
+        return [action for action, _ in self.actions] == ["copy"]
+
 
 @dataclass(frozen=True, slots=True)
 class HeaderState:

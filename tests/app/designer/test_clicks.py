@@ -10,6 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton
 from shiboken6 import isValid
 
+from study_app.gui.designer.measures.parts import Strip
 from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.viewmodels.designer.requests import SetValue
 
@@ -146,6 +147,39 @@ def test_the_arrow_of_an_entry_opens_what_it_names(qtbot: Any, designer: Any) ->
     (arrow,) = (one for one in field.rows[1].findChildren(QPushButton) if one.accessibleName() == words)
     qtbot.mouseClick(arrow, LEFT)
     assert designer.editing.selected == ("conditions", field.row.row.value[1])
+
+
+@pytest.mark.parametrize("way", ["Enter", "double click"])
+def test_an_entry_opens_by_enter_and_a_double_click(qtbot: Any, designer: Any, way: str) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("blocks", "liquids"))
+    field = designer.row("blocks", "liquids", "conditions").field
+    qtbot.mouseClick(field.rows[1], LEFT)
+    assert designer.editing.selected == ("blocks", "liquids")
+    if way == "Enter":
+        qtbot.keyClick(field.rows[1], Qt.Key.Key_Return)
+    else:
+        qtbot.mouseDClick(field.rows[1], LEFT)
+    assert designer.editing.selected == ("conditions", field.row.row.value[1])
+
+
+def test_a_row_of_a_section_opens_by_a_click(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    designer.select(("liquids",))
+    qtbot.mouseClick(designer.row("liquids").field.rows[1], LEFT)
+    assert designer.editing.selected == ("liquids", "thick")
+
+
+def test_a_step_of_the_session_bar_opens_by_the_left_button_alone(qtbot: Any, designer: Any) -> None:
+    designer.controller.open("kitchen")
+    strip, asked = Strip(), list[object]()
+    strip.resize(100, 14)
+    strip.show_segments((("Welcome", 1.0, False, ("pages", "welcome")),))
+    strip.open_asked.connect(asked.append)
+    qtbot.mouseClick(strip, Qt.MouseButton.RightButton)
+    assert asked == []
+    qtbot.mouseClick(strip, LEFT)
+    assert asked == [("pages", "welcome")]
 
 
 def test_the_question_before_a_delete_says_what_goes(designer: Any) -> None:

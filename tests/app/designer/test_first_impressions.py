@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QLabel
 
@@ -69,7 +69,8 @@ def test_the_description_grows_to_three_lines(qtbot: Any, designer: Any) -> None
     heights = []
     for words in (1, 16, 40, 400):
         designer.editing.ask(SetValue(("study", "description"), " ".join(["liquid"] * words)))
-        qtbot.wait(20)
+        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest)
+        QApplication.processEvents()
         heights.append(line.height())
     assert heights[0] < heights[1] < heights[2] == heights[3]
     line.selectAll()
@@ -81,7 +82,7 @@ def test_the_description_grows_to_three_lines(qtbot: Any, designer: Any) -> None
 def test_a_deletion_says_what_else_it_deletes_right_above_the_buttons(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("rek2024", "mine")
     designer.controller.ask_to_delete(("liquids", "water"))
-    qtbot.wait(50)
+    QApplication.processEvents()
     shown = designer.place.prompt
     (also,) = [one for one in shown.findChildren(QLabel) if one.text().startswith("Also deletes: Block Delay effect")]
     places = [one for one in shown.findChildren(QLabel) if one.text().startswith("Condition Delay 200:")]

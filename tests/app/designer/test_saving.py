@@ -168,15 +168,21 @@ def test_saving_says_that_the_study_cannot_be_run_until_it_is_edited(drafted: An
     assert drafted.file.read_text() == drafted.text
 
 
-def test_one_line_at_a_time_is_shown_above_the_parts(drafted: Any) -> None:
-    place = drafted.place
-    drafted.file.write_text(drafted.file.read_text() + "# outside\n")
-    drafted.saving.look_again()
+def test_a_read_only_study_shows_one_line_at_a_time_above_the_parts(designer: Any) -> None:
+    place = designer.place
+    designer.controller.open("demo")
     assert place.banner.isVisible()
     place.header.strip.show_state(under_way("Welcome", "Scripted hand"))
-    drafted.editing.announce()
-    assert place.header.strip.isVisible()
     assert not place.banner.isVisible()
     place.header.strip.show_state(None)
+    assert place.banner.isVisible()
+
+
+def test_a_line_about_a_pilot_hides_no_question_about_the_file(drafted: Any) -> None:
+    place = drafted.place
+    place.header.strip.show_state(under_way("Welcome", "Scripted hand"))
+    drafted.file.write_text(drafted.file.read_text() + "# outside\n")
+    drafted.saving.save()
+    assert place.header.strip.isVisible()
     assert place.banner.isVisible()
     assert place.banner_words.text().startswith("Another program changed this file")

@@ -336,7 +336,7 @@ class ParticipantPreview(QObject):
             if not self._holds(self._protocol, study):
                 return f"{title} cannot be shown: {own[0].message}"
             if own[0] in lacks:
-                return f"{title} lacks a text in {language_name(self._language)}: that of another language is shown."
+                return f"{title} has no {language_name(self._language)} text; the text of another language is shown."
             value = "an initial value" if self._valid is None else "the last valid value"
             value = "the text as it is written" if own[0].reads_alike else value
             return f"{title} has a problem ({own[0].message}): {value} is shown."

@@ -20,7 +20,7 @@ from study_app.gui.designer.form.row_widget import RowWidget, is_wide, language_
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.designer.repair_button import RepairButton
 from study_app.gui.theme.themed import apply_theme_within
-from study_app.gui.widgets.cards import Card, Rule, scrolled
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Rule, scrolled
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
 from study_app.viewmodels.designer.form.form_changes import added_row, shape_of
@@ -31,7 +31,6 @@ from study_app.viewmodels.designer.special.questions import QuestionLine
 
 ACROSS = 2
 ROW_PX = FIELD_PX + 7
-INFINITE_PX = 1 << 24
 FOOT_FROM = 460
 """The height of the form from which it has a foot [px]."""
 SHOWN_OR_HIDDEN = Qt.WidgetAttribute.WA_WState_ExplicitShowHide
@@ -96,12 +95,13 @@ class FormCard(Card):
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
         """Show a form: in place where its rows stay the same, else anew."""
-        before, self.form, self.read_only = self.form, form, read_only
+        before, was_read_only = self.form, self.read_only
+        self.form, self.read_only = form, read_only
         self.head.show_form(form, read_only=read_only)
         self.own.setText("\n".join(form.faults))
         self.own.setVisible(bool(form.faults))
         stays = before is not None and form.path in {before.path, self._renamed}
-        same = before is not None and stays and shape_of(before) == shape_of(form)
+        same = before is not None and stays and shape_of(before) == shape_of(form) and was_read_only == read_only
         if same and [row.key for row in self.rows] == [structure_of(row) for row in form.rows]:
             for widget, row in zip(self.rows, form.rows, strict=True):
                 widget.show_row(row)
@@ -130,7 +130,7 @@ class FormCard(Card):
         whole.setSpacing(7)
         self._made, self.adds, self.others = [], {}, []
         self._unmade = self._fill(form, whole)
-        room = self.area.viewport().height() if before is None else INFINITE_PX
+        room = self.area.viewport().height() if before is None else QWIDGETSIZE_MAX
         for height in self._unmade:
             room -= height
             if room < 0:

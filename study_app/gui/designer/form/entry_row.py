@@ -25,7 +25,8 @@ class EntryRow(Themed, QWidget):
     Signals: ``pressed`` (whether it extends the selection, and whether it joins or leaves it), ``clicked``, ``stepped``
     (by how many rows a key goes on, and whether it extends the selection); ``dragged`` (how far down its parent the
     pointer is; None cancels), ``dropped``, ``moved`` (by how many places a key moves it); ``remove_asked``,
-    ``duplicate_asked``, ``copy_asked``, ``pasted`` (a text).
+    ``duplicate_asked``, ``copy_asked``, ``pasted`` (a text); ``opened`` (by Enter, a double click, or a click where
+    there is no grip).
     """
 
     pressed = Signal(bool, bool)
@@ -38,6 +39,7 @@ class EntryRow(Themed, QWidget):
     moved = Signal(int)
     copy_asked = Signal()
     pasted = Signal(str)
+    opened = Signal()
 
     def __init__(self, entry: Entry, words: str, *, grip: bool = False) -> None:
         super().__init__()
@@ -95,6 +97,8 @@ class EntryRow(Themed, QWidget):
             self.moved.emit(by)
         elif (by := _arrow(event)) and (extends or not _held(event)):
             self.stepped.emit(by, extends)
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and not _held(event):
+            self.opened.emit()
         elif event.key() == Qt.Key.Key_Delete and self.grip:
             self.remove_asked.emit()
         elif _duplicates(event) and self.grip:
@@ -120,6 +124,11 @@ class EntryRow(Themed, QWidget):
             shift, control = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
             self.pressed.emit(bool(held & shift), bool(held & control))
 
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        """Open what the row names."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.opened.emit()
+
     def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
         """Drag."""
         if not self.grip or not event.buttons() & Qt.MouseButton.LeftButton or not self._pressed:
@@ -138,6 +147,8 @@ class EntryRow(Themed, QWidget):
             self.dropped.emit()
         elif self._pressed and not event.modifiers():
             self.clicked.emit()
+            if not self.grip:
+                self.opened.emit()
         self._pressed = 0
 
     def _let_go(self) -> None:

@@ -59,7 +59,8 @@ class EntriesField(EntryList):
                     button.clicked.connect(lambda _checked=False, at=at, to=to: self.move_entries((at,), to))
             opens = shown.button("arrow_right", f"Open {entry.title}")
             opens.setEnabled(bool(entry.target))
-            opens.clicked.connect(lambda _checked=False, at=at: self.open_asked.emit(self.row.entries[at].target))
+            opens.clicked.connect(lambda _checked=False, at=at: self._open(at))
+            shown.opened.connect(lambda at=at: self._open(at))
             if kind != "tables":
                 away = shown.button("cross", f"Remove {entry.title} from {row.row.label}")
                 away.setToolTip(with_key(away.accessibleName(), "delete"))
@@ -93,6 +94,10 @@ class EntriesField(EntryList):
     def place(self, at: int) -> tuple[str | int, ...]:
         """Return the place of an entry in the study."""
         return self.row.entries[at].path
+
+    def _open(self, at: int) -> None:
+        if target := self.row.entries[at].target:
+            self.open_asked.emit(target)
 
     def _add_name(self, at: int) -> None:
         name, section = self.names.itemText(at), self.names.itemData(at)

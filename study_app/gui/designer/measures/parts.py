@@ -125,6 +125,8 @@ class Strip(Themed, QWidget):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
         """Ask to open the step that is clicked."""
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
         x = 0.0
         for _, share, _, path in self.segments:
             x += share * self.width()

@@ -47,7 +47,6 @@ from study_app.viewmodels.designer.participant_page import SIZES, ParticipantVie
 FRAME_MS: Final = 33
 RING: Final = 2
 LEAVES: Final = "Esc leaves the page"
-"""The height of a part without a limit, as Qt has it [px]."""
 
 
 class LivePage(Themed, QGraphicsView):

@@ -171,7 +171,7 @@ def _people(simulated: Simulated, participants: int, precision: float, warned: i
     needed = f"{100 * ENOUGH:g} % needed" if enough else f"{many} participants are needed for {100 * ENOUGH:g} %"
     more = f"{needed}; with {found.more_trials} trials: {100 * found.more_share:.0f} %"
     if warned is not None:
-        more += f". The warning of check is for the {warned} planned participants; it uses the expected precision"
+        more += f". The warning of check refers to the {warned} planned participants and uses the expected precision"
     return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, "group" in simulated.anew, more)
 
 

@@ -153,7 +153,7 @@ def test_a_new_study_has_no_number_of_participants_of_one_that_was_discarded(
 def test_a_verdict_says_whether_the_participants_are_enough(qtbot: Any, designer: Any, worker: Worker) -> None:
     jnd(designer)
     people = designer.place.measures.numbers.parts[2]
-    of_check = ". The warning of check is for the 20 planned participants; it uses the expected precision"
+    of_check = ". The warning of check refers to the 20 planned participants and uses the expected precision"
     for participants, number, verdict, more in (
         (20, "93", ("ok", "check", "Enough"), f"80 % needed; with 107 trials: 98 %{of_check}"),
         (

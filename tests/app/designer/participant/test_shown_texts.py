@@ -43,7 +43,7 @@ def test_a_missing_text_is_said_in_the_language_that_lacks_it(designer: Any, tab
     assert tab.view.language == "en"
     assert not tab.view.note
     designer.controller.preview.show_language("nl")
-    assert tab.view.note == "Like honey lacks a text in Dutch: that of another language is shown."
+    assert tab.view.note == "Like honey has no Dutch text; the text of another language is shown."
     designer.select(("device",))
     assert tab.view.note.endswith(" texts missing in Dutch: shown in another language.")
     designer.editing.ask(SetText((*ITEM, "text"), "en", ""))
@@ -67,7 +67,6 @@ def test_a_page_at_fit_is_as_wide_as_its_column_in_a_small_window(qtbot: Any, de
     designer.window.resize(1366, 768)
     designer.controller.open("thickness")  # read-only: a line above the parts takes height, too
     designer.select(("study",))
-    qtbot.wait(1000)  # the facts have come
     tab = designer.controller.preview.tab
     room = tab.column.contentsMargins()
     qtbot.waitUntil(
