@@ -19,7 +19,7 @@ Setting: TypeAlias = Literal["participants", "language"]
 
 
 def kept_participants(file: Path) -> int | None:
-    """Return how many participants a study is simulated with; None where no number is kept that can be read."""
+    """Return how many participants a study is simulated with; None if none is kept, or it cannot be read."""
     number = _kept(file).get("participants")
     return number if isinstance(number, int) and not isinstance(number, bool) else None
 

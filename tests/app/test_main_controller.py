@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,18 @@ class Machine:
         self.stopped = True
         if self._lost:
             raise DeviceLost("the device 'falcon' is gone")
+
+
+def take_steps(visit: MainController, steps: Iterable[Callable[[], object]]) -> None:
+    """Take the steps one after another, with the window's events between them."""
+    left = iter(steps)
+
+    def step() -> None:
+        next(left, timer.stop)()
+
+    timer = QTimer(visit.window, interval=10)
+    timer.timeout.connect(step)
+    timer.start()
 
 
 @pytest.mark.slow
@@ -207,14 +220,7 @@ def test_a_place_that_cannot_be_made_is_told_of_once_and_the_help_of_a_key_is_to
 
     def then(visit: MainController) -> None:
         go = partial(visit.window.go, "help")
-        steps = iter((go, partial(look, visit), visit.show_help, partial(look, visit), visit.window.close))
-
-        def step() -> None:
-            next(steps, timer.stop)()
-
-        timer = QTimer(visit.window, interval=10)
-        timer.timeout.connect(step)
-        timer.start()
+        take_steps(visit, (go, partial(look, visit), visit.show_help, partial(look, visit), visit.window.close))
 
     with qtbot.captureExceptions() as printed:
         home(tmp_path / "results", then=then)
@@ -235,14 +241,7 @@ def test_an_exception_that_no_slot_catches_is_shown_once_and_printed(qtbot: Any,
             visit.window.notice = None
 
     def then(visit: MainController) -> None:
-        steps = iter((fail, lambda: look(visit), fail, lambda: look(visit), visit.window.close))
-
-        def step() -> None:
-            next(steps, timer.stop)()
-
-        timer = QTimer(visit.window, interval=10)
-        timer.timeout.connect(step)
-        timer.start()
+        take_steps(visit, (fail, partial(look, visit), fail, partial(look, visit), visit.window.close))
 
     with qtbot.captureExceptions() as printed:
         home(tmp_path / "results", then=then)

@@ -160,7 +160,7 @@ def check_made(before: Study, after: Study, original: Path, made: Sequence[Path]
 
 
 def _as_before(fault: Fault, original: Path, made: Sequence[Path]) -> tuple[Path, str]:
-    """Return a problem as it was of the original element: copies have its name, and entries of lists no number."""
+    """Return a problem as the original element had it: with its id instead of a copy's, without list indices."""
     path = original + fault.path[2:] if fault.path[:2] in made else fault.path
     message = fault.message
     for _, name in made:

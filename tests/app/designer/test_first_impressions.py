@@ -62,6 +62,16 @@ def test_fields_of_a_read_only_study_have_a_muted_ground(qtbot: Any, designer: A
     assert ground(designer.row("blocks", "liquids", "title").field.lines["en"]) == QColor(place.theme.surface).name()
 
 
+def test_the_fields_of_a_copy_can_be_edited_at_once(designer: Any) -> None:
+    title = ("pages", "welcome", "title")
+    designer.controller.open("demo")
+    designer.select(title[:2])
+    assert not designer.row(*title).field.isEnabled()
+    designer.controller.begin("demo", "mine")
+    designer.select(title[:2])
+    assert designer.row(*title).field.isEnabled()
+
+
 def test_the_description_grows_to_three_lines(qtbot: Any, designer: Any) -> None:
     designer.controller.open("kitchen")
     designer.select(("study",))
