@@ -49,6 +49,21 @@ def pytest_sessionstart() -> None:
         gc.disable()
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the variants of a test as nightly but for n, evenly spread, of `variants(n)`."""
+    collected: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("variants"):
+            collected.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for found in collected.values():
+        (count,) = found[0].get_closest_marker("variants").args
+        kept = {len(found) * place // count for place in range(count)}
+        for place, item in enumerate(found):
+            if place not in kept:
+                item.add_marker("nightly")
+
+
 def pytest_collection_finish() -> None:
     """Do not look at the modules again that collecting the tests imported."""
     if QT_IS_HERE:

@@ -12,6 +12,7 @@ STUDIES = 12
 """tests/benchmarks/analysis/random_studies.py checks 2,000."""
 
 
+@pytest.mark.variants(6)
 @pytest.mark.parametrize("number", range(STUDIES))
 def test_no_exception_leaves_the_evaluation_of_any_study(number: int) -> None:
     check(number)

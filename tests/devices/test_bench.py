@@ -106,6 +106,7 @@ def test_report_and_settings_hold_what_was_found(found_of, tmp_path, monkeypatch
     assert "bench" not in with_bench({"name": "mouse"})
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize("at", ["damping", "grams"])
 @pytest.mark.parametrize("name", ["scripted", "falcon-emulated"])
 def test_interrupt_ends_in_zero_force(name, at):

@@ -49,6 +49,7 @@ def answers(world: StoredWorld) -> list[tuple[str, str, str]]:
         return [(row["trial"], row["item"], row["response"]) for row in csv.DictReader(file)]
 
 
+@pytest.mark.variants(5)
 @pytest.mark.slow
 @pytest.mark.parametrize("phase", [Phase.READING, Phase.TASK, Phase.ANSWERING])
 @pytest.mark.parametrize("room", [0, 1, 40])

@@ -30,6 +30,7 @@ TEXTS = (
 )
 
 
+@pytest.mark.variants(5)
 @pytest.mark.slow
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_free_text_survives_journal_tables_and_readers(tmp_path: Path, text: str) -> None:

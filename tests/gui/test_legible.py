@@ -112,6 +112,7 @@ def test_contrast_is_that_of_ink_and_ground() -> None:
     assert contrast(luminances(image), QRect(0, 0, 40, 10)) == pytest.approx(21.0)
 
 
+@pytest.mark.variants(9)
 @pytest.mark.parametrize("name", pages())
 @pytest.mark.parametrize("size", SIZES, ids=str)
 def test_every_word_stands_out_from_its_ground(
@@ -147,6 +148,7 @@ def test_edges_of_cells_and_the_ring_of_the_keyboard_stand_out(
 # sizes
 
 
+@pytest.mark.variants(15)
 @pytest.mark.parametrize("name", pages())
 @pytest.mark.parametrize("size", [*SIZES, (1024, 640), (880, 640)], ids=str)
 def test_whatever_can_be_hit_is_44_px_high_and_wide(
@@ -237,6 +239,7 @@ def misplaced(window: ParticipantWindow, found: list[Drawn]) -> list[str]:
 ROOMS = [*(((1366, 768), text_scale) for text_scale in SCALES), ((1920, 1080), 1.0), ((1920, 1080), 2.0)]
 
 
+@pytest.mark.variants(36)
 @pytest.mark.parametrize("name", ["break", "explore", "reach", "answers"])
 @pytest.mark.parametrize(("size", "text_scale"), [*ROOMS, ((1024, 640), 1.0), ((1024, 640), 2.0)], ids=str)
 @pytest.mark.parametrize("said", ["en", "longer", "ar"])

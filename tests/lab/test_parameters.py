@@ -20,6 +20,7 @@ def every(scene: Scene) -> list[Parameter]:
     return [it for section in sections(scene) for it in section.parameters]
 
 
+@pytest.mark.variants(10)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_every_value_of_a_preset_can_be_set_again(name: str) -> None:
@@ -32,6 +33,7 @@ def test_every_value_of_a_preset_can_be_set_again(name: str) -> None:
         assert changed(scene, it.name, value) == scene, it.name
 
 
+@pytest.mark.variants(10)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_both_ends_of_every_range_are_taken(name: str) -> None:

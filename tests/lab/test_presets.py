@@ -39,6 +39,7 @@ def edited(scene: Scene) -> Scene:
     return scene
 
 
+@pytest.mark.variants(7)
 @pytest.mark.slow
 @pytest.mark.parametrize("source", shipped())
 @pytest.mark.parametrize("edit", [False, True])

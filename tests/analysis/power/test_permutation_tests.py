@@ -77,6 +77,7 @@ def test_where_everybody_answers_alike_nothing_is_found() -> None:
     assert not permutation_tests.equivalent((same[:, :, 0] - same[:, :, 1])[:, :10], 1.0, 0.05, rng()).any()
 
 
+@pytest.mark.variants(1)
 @pytest.mark.slow
 @pytest.mark.parametrize(("n", "bound"), [(14, 1.5), (16, 1.5), (20, 1.5)])
 def test_equivalence_is_the_reports(n: int, bound: float) -> None:

@@ -232,6 +232,7 @@ def test_seven_settings_are_drawn_and_many_people_approximated() -> None:
         assert (many.p, many.smallest_p) == (many.p_chi2, None)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("k", [3, 4, 7])
 def test_the_approximation_is_near_the_drawn_p_where_it_takes_over(k: int) -> None:

@@ -246,6 +246,7 @@ class TestForce:
         assert pushes[-1] == pytest.approx(2.0, rel=5e-3)
         assert opened.hand.highest_unhomed_torque == 0
 
+    @pytest.mark.variants(1)
     @pytest.mark.parametrize("name", GEOMETRIES)
     def test_the_emulators_own_mechanics_make_of_it_what_was_asked_for(self, name):
         """Everywhere in the box that encoders are known to reach, in any direction, within half a percent."""

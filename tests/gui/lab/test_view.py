@@ -318,6 +318,7 @@ def test_entered_and_left(place: Any, still: LabView) -> None:
     assert [len(one) for one in said] == [1, 1]
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("size", [(928, 560), (952, 640), (1294, 768), (1528, 900), (1848, 1080), (3768, 2160)])
 def test_everything_fits(place: Any, moved: LabView, size: tuple[int, int]) -> None:
     place.resize(*size)

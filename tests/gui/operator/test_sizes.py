@@ -193,6 +193,7 @@ def beyond_the_plot(window: OperatorWindow) -> list[str]:
     return found
 
 
+@pytest.mark.variants(5)
 @pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)
 def test_nothing_is_clipped(window: OperatorWindow, told: Any, health: Any, state: Any) -> None:
     filled(window, told, health, state)
@@ -210,6 +211,7 @@ def test_nothing_is_clipped(window: OperatorWindow, told: Any, health: Any, stat
     assert {size: found for size, found in problems.items() if found} == {}
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("size", [*FEW, (1356, 709)])  # the last: 1366 × 768 less frame and task bar
 def test_header_has_room_for_the_way_to_the_participants_window(window: Any, told: Any, health: Any, size: Any) -> None:
     window.header.page.show()  # as where both windows share a screen

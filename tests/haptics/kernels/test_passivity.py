@@ -330,6 +330,7 @@ def test_no_hand_gets_more_than_one_steps_work_whatever_it_does_and_the_liquid_i
     assert felt_n > 1.0 or not COMPILED
 
 
+@pytest.mark.variants(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 @settings(max_examples=examples(80), deadline=None)

@@ -34,6 +34,7 @@ acts = st.one_of(
 )
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("name", ALL)
 @settings(max_examples=examples(60), deadline=None)
 @given(todo=st.lists(acts, max_size=30), estimator=st.sampled_from(list(ESTIMATORS)), faded_in=st.booleans())
@@ -84,6 +85,7 @@ ROUND = {name: round_scene(one) for name, one in {"pool": POOL, "places": PLACES
 ROUND |= {name: round_scene(felt.liquids[0]) for name, felt in THESIS.items()}
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize("name", ROUND)
 @settings(max_examples=examples(25), deadline=None)
 @given(angle=st.floats(0, 2 * np.pi), seed=st.integers(0, 2**32 - 1), estimator=st.sampled_from(list(ESTIMATORS)))

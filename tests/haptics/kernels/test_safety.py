@@ -351,6 +351,7 @@ def test_a_force_that_is_no_number_becomes_zero_and_a_status():
     assert not hand.tick((0.0051, 0, 0)).device_force_n.any()
 
 
+@pytest.mark.variants(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*THESIS, *EVERYTHING])
 @settings(max_examples=examples(60), deadline=None)

@@ -135,6 +135,7 @@ if sys.argv[2].startswith("SIG"):
 """
 
 
+@pytest.mark.variants(3)
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(

@@ -84,6 +84,7 @@ def test_another_thread_changes_nothing():
     allow_suspension(holder)
 
 
+@pytest.mark.variants(2)
 @pytest.mark.slow
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="devices are C functions")
 @pytest.mark.parametrize("name", SUSPENDING)

@@ -54,6 +54,7 @@ def test_intervals_of_1000_observers_cover_their_thresholds(trials):
     assert abs((found.medians - truth).mean() * math.log(10)) <= 0.05
 
 
+@pytest.mark.variants(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ['kind = "questplus"', 'kind = "updown"', 'kind = "constant"'])
 @pytest.mark.parametrize("design", ["2ifc", pytest.param("4ifc", marks=pytest.mark.nightly), "yesno"])

@@ -177,6 +177,7 @@ def test_no_state_that_can_be_reached_is_a_dead_end(codes: int, repetitions: int
         assert dead_ends(codes, repetitions, 1, run) == 0, run
 
 
+@pytest.mark.variants(4)
 @pytest.mark.slow
 @pytest.mark.parametrize(("codes", "repetitions", "constraint"), SMALL)
 def test_the_chain_ends_close_to_all_orders_being_equally_likely(codes: int, repetitions: int, constraint: Constraint):

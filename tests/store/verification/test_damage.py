@@ -60,6 +60,7 @@ def study(tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[
     return tmp_path / "study"
 
 
+@pytest.mark.variants(8)
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("damage", [with_a_bit_flipped, with_an_odd_value, with_deep_nesting])
 def test_no_damage_ends_in_a_traceback_or_hides_a_session(

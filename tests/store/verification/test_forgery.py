@@ -139,6 +139,7 @@ def change_and_rebuild(study: Path) -> None:
     rebuild(study / P007)
 
 
+@pytest.mark.variants(5)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("act", "sentence"),
@@ -208,6 +209,7 @@ def add_a_session(study: Path) -> None:
         table.unlink()
 
 
+@pytest.mark.variants(4)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("act", "sentence"),

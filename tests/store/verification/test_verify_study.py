@@ -67,6 +67,7 @@ RECORDING = f"{SESSION}/recordings/trial-001.parquet"
 FRAMES = f"{SESSION}/recordings/trial-002_attempt-2_frames.parquet"
 
 
+@pytest.mark.variants(18)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "act", "sentence"),

@@ -26,13 +26,15 @@ def automatic_collection(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Collect as the interpreter does; the other tests collect between tests alone.
 
     What those left goes first: while another thread frees it, nobody else can collect. However much it is, it is less
-    than the bound.
+    than the bound. What is left of other tests is looked at once only, not in each collection.
     """
     monkeypatch.setattr(garbage_collection, "MOST_FROZEN", 10**9)
     gc.collect()
+    gc.freeze()
     gc.enable()
     yield
     gc.disable()
+    gc.freeze()
 
 
 class Cycle:

@@ -35,6 +35,7 @@ def test_six_sliders_are_one_part(opening: Any) -> None:
     assert len(opened.page.part) == 6
 
 
+@pytest.mark.variants(10)
 @pytest.mark.parametrize("items", [QUESTIONS, TLX, SUS, ELEVEN, TWELVE], ids=["all", "tlx", "sus", "eleven", "twelve"])
 @pytest.mark.parametrize(
     ("size", "language", "text_scale"),
