@@ -13,6 +13,7 @@ from typing import Final
 from PySide6.QtCore import QtMsgType, qInstallMessageHandler
 
 from study_app.app.screenshots.capture import Camera
+from study_app.app.screenshots.designer_pictures import take_designer, write_studies
 from study_app.app.screenshots.example_study import STUDY, quick, rehearsed
 from study_app.app.screenshots.main_views import take_places
 from study_app.app.screenshots.session_pictures import take_session, take_single_blind
@@ -22,7 +23,7 @@ from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.user_folder import FOLDER_VARIABLE
 from study_app.workspace import FOLDER_NAME, WORKSPACE_VARIABLE
 
-GROUPS: Final = ("places", "session", "single-blind")
+GROUPS: Final = ("places", "designer", "session", "single-blind")
 
 
 def screenshots(to: Path, *, only: str | None = None, progress: Callable[[str], object] = print) -> tuple[Path, ...]:
@@ -49,6 +50,10 @@ def screenshots(to: Path, *, only: str | None = None, progress: Callable[[str], 
             results = rehearsed(Path(FOLDER_NAME))
             for theme in (LIGHT, DARK):
                 take_places(camera, results, theme)
+        if only in (None, "designer"):
+            write_studies(Path(FOLDER_NAME, "protocols"))
+            for theme in (LIGHT, DARK):
+                take_designer(camera, Path(FOLDER_NAME, "results"), theme)
         if only in (None, "session"):
             take_session(camera, quick(Path()), Path("held", STUDY))
         if only in (None, "single-blind"):
